@@ -1,0 +1,125 @@
+"""How the daemon runs: wiring, loop, limits, sockets, state."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from compd.configuration.geometry import Positive, Section
+
+GaugeChannel = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$")]
+Sign = Literal[1, -1]
+
+
+class ScaleWire(Section):
+    """Which gauge is the linear scale of a link."""
+
+    link: Annotated[int, Field(ge=1, le=6)]
+    gauge: GaugeChannel = Field(description="gauge, or gauge.channel")
+    sign: Sign = Field(default=1, description="-1 where the display counts down as the link grows")
+
+
+class JointWire(Section):
+    """Which gauge is which joint comparator; their order numbers them 1, 2, 3 ..."""
+
+    link: Annotated[int, Field(ge=1, le=6)]
+    role: Literal["S", "Ra", "Rb", "B"] = Field(
+        description="S: spherical joint, counts once; Ra, Rb: the ball shanks of a revolute joint, half each; "
+        "B: one comparator at the other joint, counts once"
+    )
+    gauge: GaugeChannel
+    sign: Sign = 1
+
+
+class FrameWire(Section):
+    """Which gauge measures which of the nine frame distances."""
+
+    distance: Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
+    gauge: GaugeChannel
+    sign: Sign = 1
+
+
+class QuantityWire(Section):
+    """Anything else measured: a temperature, a force, a pressure."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*_(degC|N|hPa|pct|mm|1)$")] = Field(
+        description="name with its unit, as a recording's column: temperature_link_1_degC"
+    )
+    gauge: GaugeChannel
+
+
+class Wiring(Section):
+    """From gauges to the machine's quantities."""
+
+    scale: tuple[ScaleWire, ...]
+    joint: tuple[JointWire, ...]
+    frame: tuple[FrameWire, ...]
+    quantities: tuple[QuantityWire, ...] = ()
+
+
+class Loop(Section):
+    """The compute loop."""
+
+    rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)]
+    stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
+    on_stale: Literal["hold", "fade", "stop"] = Field(
+        description="hold: keep the last correction for hold_s, then stop; fade: take it back to zero over hold_s, "
+        "then stop; stop: invalid at once"
+    )
+    hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
+    priority: Annotated[int, Field(ge=1, le=98)] = Field(default=40, description="SCHED_FIFO priority, where permitted")
+    lock_memory: bool = Field(default=True, description="mlockall, where permitted")
+
+
+class Limits(Section):
+    """What a correction may be: per link."""
+
+    correction_mm: Positive = Field(description="largest correction of one link")
+    slew_mm_per_s: Positive = Field(description="fastest change of a correction")
+    on_limit: Literal["clamp", "refuse"] = Field(
+        description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
+    )
+
+
+class TcpSocket(Section):
+    """Clients over TCP."""
+
+    host: str = Field(default="127.0.0.1", description="address to listen on; loopback unless you write another")
+    port: Annotated[int, Field(ge=0, le=65535)] = Field(default=7750, description="0 = any free port")
+
+    @field_validator("host")
+    @classmethod
+    def _is_address(cls, host: str) -> str:
+        if host != "localhost":
+            ipaddress.ip_address(host)
+        return host
+
+
+class UnixSocket(Section):
+    """Clients on this computer; machine zero is taken here only."""
+
+    path: str = Field(pattern=r"^/", max_length=100, description="absolute path of the Unix socket")
+
+
+class UdpTarget(Section):
+    """Where the binary SETPOINT goes, one packet per cycle."""
+
+    host: str
+    port: Annotated[int, Field(ge=1, le=65535)]
+
+
+class Sockets(Section):
+    """Where clients connect."""
+
+    tcp: TcpSocket | None = None
+    unix: UnixSocket
+    udp: UdpTarget | None = None
+    valid_for_s: Positive = Field(description="how long a setpoint may be used: valid_until = time + this")
+
+
+class State(Section):
+    """What the daemon keeps across restarts."""
+
+    directory: str = Field(pattern=r"^/", description="absolute directory for machine zero")

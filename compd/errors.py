@@ -1,0 +1,66 @@
+"""Errors that say what is wrong, where, the value, what is allowed and the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing a person can mend.
+
+    Attributes
+    ----------
+    where : file, line and key, or device and channel: the place to go to.
+    what : what is wrong there, in one clause.
+    value : the offending value as the person wrote it, or "" where there is none.
+    allowed : what would be right.
+    next_step : what to do now.
+    """
+
+    where: str
+    what: str
+    value: str = ""
+    allowed: str = ""
+    next_step: str = ""
+
+    def __str__(self) -> str:
+        parts = [f"{self.where}: {self.what}"]
+        if self.value:
+            parts.append(f"value: {self.value}")
+        if self.allowed:
+            parts.append(f"allowed: {self.allowed}")
+        if self.next_step:
+            parts.append(f"next: {self.next_step}")
+        return "\n    ".join(parts)
+
+
+class CompdError(Exception):
+    """Base of every error that compd raises on purpose; carries all its problems at once."""
+
+    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
+        self.problems: tuple[Problem, ...] = (
+            (problems,) if isinstance(problems, Problem) else tuple(problems)
+        )
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class ConfigurationError(CompdError):
+    """The configuration cannot be used; every problem in it is listed."""
+
+
+class KinematicsError(CompdError):
+    """A pose or frame that cannot be computed: unreachable, near-singular, not finite."""
+
+
+class PluginError(CompdError):
+    """A driver or effect that cannot be loaded."""
+
+
+class StateError(CompdError):
+    """What is on disk (machine zero, model file) does not fit this machine."""
+
+
+class DaemonError(CompdError):
+    """The daemon cannot be reached, or refused a request."""
