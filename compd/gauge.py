@@ -132,6 +132,7 @@ class GaugeOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    driver: str = Field(description="entry point in `compd.gauges`, or /absolute/file.py:ClassName")
     line: str = Field(description="the line (under `lines:`) that this gauge is wired to")
     stale_after_s: float | None = Field(
         default=None, gt=0, allow_inf_nan=False,

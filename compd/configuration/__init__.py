@@ -1,0 +1,5 @@
+"""The machine configuration: written by a person, checked whole, never rewritten by the program."""
+
+from compd.configuration.load import Configuration, load
+
+__all__ = ["Configuration", "load"]

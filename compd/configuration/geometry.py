@@ -129,7 +129,9 @@ class Geometry(Section):
             "platform.revolute_axes_P": len(self.platform.revolute_axes_P),
         }
         wanted = {**dict.fromkeys(counts, n), "platform.revolute_axes_P": n if n == 3 else 0}
-        wrong = [f"{key} has {counts[key]} entries, needs {wanted[key]}" for key in counts if counts[key] != wanted[key]]
+        wrong = [
+            f"{key} has {counts[key]} entries, needs {wanted[key]}" for key in counts if counts[key] != wanted[key]
+        ]
         if wrong:
             raise ValueError(f"{self.kinematics}: " + "; ".join(wrong))
         if n == 3 and any(self.tool.zero_rotation_P_in_M_rad):

@@ -27,9 +27,7 @@ class _SerialSettings(_LineSettings):
     )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
-    low_latency: bool = Field(
-        default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)"
-    )
+    low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")
 
 
 class SerialLine(_SerialSettings):

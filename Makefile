@@ -1,0 +1,56 @@
+# Two commands do everything: `make demo` and `make test`. They need Python >= 3.11 and make, nothing else.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+.PHONY: help demo test long lint wheel bench clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
+	@echo "make test    the tests"
+	@echo "make long    the tests that take minutes"
+	@echo "make lint    ruff, mypy, import contracts"
+	@echo "make wheel   build the wheel, install it in a clean environment, run it"
+	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "compd needs Python >= 3.11; this is $$($(PYTHON) --version). Try: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || \
+	  { echo "Python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
+	@echo "Installing compd and what it needs into $(VENV) (a minute or two, once) ..."
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+demo: $(STAMP)
+	@$(BIN)/compd demo
+
+test: $(STAMP)
+	$(BIN)/pytest
+
+long: $(STAMP)
+	$(BIN)/pytest -m long
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+wheel: $(STAMP)
+	rm -rf dist build/wheel-test
+	$(BIN)/python -m build --wheel --outdir dist .
+	$(PYTHON) -m venv build/wheel-test
+	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
+	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
+
+bench: $(STAMP)
+	$(BIN)/python -m tests.benchmarks.bench_kinematics
+	$(BIN)/python -m tests.benchmarks.bench_cycle
+	$(BIN)/python -m tests.benchmarks.bench_loop
+	$(BIN)/python -m tests.benchmarks.bench_latency
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

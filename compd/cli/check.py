@@ -1,0 +1,53 @@
+"""`compd check`: is this configuration a machine?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def check(
+    config: Annotated[Path | None, typer.Argument(help="The machine's configuration (YAML).")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema for editors and stop.")] = False,
+    drivers: Annotated[bool, typer.Option("--drivers", help="List the installed gauge drivers and stop.")] = False,
+) -> None:
+    """Check a configuration; report every error at once, with file, line, key, value, what is allowed, next step."""
+    if schema:
+        from compd.configuration.schema import schema as json_schema
+
+        typer.echo(json.dumps(json_schema(), indent=2))
+        return
+    if drivers:
+        _list_drivers()
+        return
+    if config is None:
+        raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
+    from compd.assembly import build_model
+    from compd.configuration import load
+
+    configuration = load(config)
+    build_model(configuration.geometry, configuration.wiring)
+    for warning in configuration.warnings:
+        typer.echo(f"warning: {warning}")
+    wiring = configuration.wiring
+    typer.echo(
+        f"{config}: {configuration.machine} is complete: {configuration.geometry.links} links, "
+        f"{len(wiring.joint)} joint and {len(wiring.frame)} frame comparators, {len(wiring.quantities)} quantities, "
+        f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines; hash {configuration.config_hash}"
+    )
+
+
+def _list_drivers() -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.plugins import GAUGES, load, names
+
+    table = Table("driver", "needs a line that carries", "what it is")
+    for name in names(GAUGES):
+        driver = load(GAUGES, name, name)
+        table.add_row(name, driver.line_kind, (driver.__doc__ or "").strip().splitlines()[0])
+    Console().print(table)

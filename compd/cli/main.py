@@ -1,0 +1,40 @@
+"""`compd`: one command for each thing that a person wants to do.
+
+Commands import what they need when they run, so that `compd --help` is quick.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from compd import __version__
+from compd.cli.check import check
+from compd.cli.demo import demo
+from compd.cli.run import run
+from compd.cli.simulate import simulate
+from compd.cli.watch import watch
+from compd.cli.zero import zero
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Live error compensation for parallel kinematic machines: joints, links and frame.",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"compd {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Live error compensation for parallel kinematic machines: joints, links and frame."""
+
+
+for command in (demo, check, simulate, run, watch, zero):
+    app.command()(command)

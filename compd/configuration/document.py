@@ -1,0 +1,124 @@
+"""A YAML document with the line of every key, so that an error can point at it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from compd.errors import ConfigurationError, Problem
+
+Location = tuple[str | int, ...]
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML 1.2 scalars: `on` is a word, 1e-6 a number."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in {
+        "tag:yaml.org,2002:bool", "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp"}]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}  # fmt: skip
+_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|false|False)$"), list("tTfF"))
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    # 7E2 stays a word: it is a serial format before it is 700
+    re.compile(r"^[-+]?(?:\.\d+|\d+\.\d*)(?:[eE][-+]?\d+)?$|^[-+]?\d+(?:[eE][-+]|e)\d+$|^[-+]?\.inf$|^\.nan$"),
+    list("-+.0123456789"),
+)
+
+
+@dataclass(frozen=True)
+class Document:
+    """Parsed YAML: plain data, and the 1-based line of every location in it."""
+
+    path: Path
+    data: dict[str, Any]
+    lines: dict[Location, int]
+
+    def where(self, location: Location) -> str:
+        """`file:line key.path` of the deepest part of `location` that the file has."""
+        for length in range(len(location), -1, -1):
+            if location[:length] in self.lines:
+                return f"{self.path}:{self.lines[location[:length]]} {dotted(location)}".rstrip()
+        return f"{self.path} {dotted(location)}".rstrip()
+
+    def value(self, location: Location) -> Any:
+        """What the file says at `location`; None where it says nothing."""
+        found: Any = self.data
+        for part in location:
+            try:
+                found = found[part]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return found
+
+
+def dotted(location: Location) -> str:
+    """('wiring', 'joint', 0, 'link') -> "wiring.joint[1].link"; entries are counted from 1, as people do."""
+    text = ""
+    for part in location:
+        text += f"[{part + 1}]" if isinstance(part, int) else f"{'.' if text else ''}{part}"
+    return text
+
+
+def read(path: Path) -> Document:
+    """Read a configuration; ConfigurationError for a file that is missing, not YAML, or says a key twice."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            Problem(str(path), f"cannot be read: {error}", next_step="give the path of a configuration file")
+        ) from error
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        problems: list[Problem] = []
+        lines: dict[Location, int] = {}
+        data = _plain(loader, root, (), lines, problems, path) if root is not None else None
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ConfigurationError(
+            Problem(f"{path}:{line}", f"not YAML: {error.problem or error.context}",
+                    next_step="mend this line; indent with spaces, write `key: value`")
+        ) from error  # fmt: skip
+    finally:
+        loader.dispose()
+    if not isinstance(data, dict):
+        raise ConfigurationError(Problem(str(path), "must hold `key: value` sections at its top"))
+    if problems:
+        raise ConfigurationError(problems)
+    return Document(path, data, lines)
+
+
+def _plain(
+    loader: _Loader,
+    node: yaml.Node,
+    location: Location,
+    lines: dict[Location, int],
+    problems: list[Problem],
+    path: Path,
+) -> Any:
+    """Data below `node`; notes the line of every key, and keys said twice."""
+    lines.setdefault(location, node.start_mark.line + 1)
+    if isinstance(node, yaml.MappingNode):
+        result: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            key = loader.construct_object(key_node, deep=True)
+            here = (*location, key)
+            line = key_node.start_mark.line + 1
+            if key in result:
+                problems.append(
+                    Problem(f"{path}:{line} {dotted(here)}", f"said twice, first in line {lines[here]}",
+                            next_step="keep one of them")
+                )  # fmt: skip
+            lines[here] = line
+            result[key] = _plain(loader, value_node, here, lines, problems, path)
+        return result
+    if isinstance(node, yaml.SequenceNode):
+        return [_plain(loader, child, (*location, i), lines, problems, path) for i, child in enumerate(node.value)]
+    return loader.construct_object(node, deep=True)

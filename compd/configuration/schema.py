@@ -1,0 +1,45 @@
+"""A JSON Schema for editors, from the same models that check the file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from compd.configuration.load import SECTIONS
+from compd.plugins import GAUGES, load, names
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a configuration, with the options of every installed driver."""
+    definitions: dict[str, Any] = {}
+    properties: dict[str, Any] = {}
+    for name, kind in SECTIONS.items():
+        properties[name] = _collect(kind, definitions)
+    gauges = []
+    for driver in names(GAUGES):
+        options = _collect(load(GAUGES, driver, driver).Options, definitions)
+        options.setdefault("properties", {})["driver"] = {"const": driver}
+        gauges.append(options)
+    by_path = {
+        "type": "object",
+        "required": ["driver", "line"],
+        "properties": {"driver": {"type": "string", "pattern": r"^/.+\.py:[A-Za-z_]\w*$"}},
+    }
+    properties["gauges"] = {"type": "object", "additionalProperties": {"oneOf": [*gauges, by_path]}}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "compd machine configuration",
+        "type": "object",
+        "additionalProperties": False,
+        "required": [*SECTIONS, "gauges"],
+        "properties": properties,
+        "$defs": definitions,
+    }
+
+
+def _collect(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    """One model's schema; what it defines goes to the common place."""
+    part = TypeAdapter(kind).json_schema(ref_template="#/$defs/{model}")
+    definitions.update(part.pop("$defs", {}))
+    return part
