@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, get_args
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -168,29 +168,24 @@ def _keys_beside(kind: Any, loc: Location) -> list[str]:
     """The keys that the section around `loc` allows, found by walking the models along it."""
     for part in loc[:-1]:
         kind = _step(kind, part)
-    return list(kind.model_fields) if isinstance(kind, type) and issubclass(kind, BaseModel) else []
+    models = _models(kind)
+    return list(models[0].model_fields) if models else []
 
 
 def _step(kind: Any, part: str | int) -> Any:
+    """What stands below `part`: a field's type, the member of a union with that tag, or an entry's type."""
+    for model in _models(kind):
+        if part in model.model_fields:
+            return model.model_fields[str(part)].annotation
+        if any(part in get_args(field.annotation) for field in model.model_fields.values()):
+            return model
+    return kind
+
+
+def _models(kind: Any) -> list[type[BaseModel]]:
     if isinstance(kind, type) and issubclass(kind, BaseModel):
-        field = kind.model_fields.get(str(part))
-        return field.annotation if field else kind
-    arguments = [a for a in get_args(kind) if a is not type(None)]
-    for argument in arguments:  # a union's tag: kind or on
-        for candidate in (argument, *get_args(argument)):
-            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-                for name in ("kind", "on"):
-                    field = candidate.model_fields.get(name)
-                    if field is not None and part in get_args(field.annotation):
-                        return candidate
-    origin = get_origin(kind)
-    return (
-        arguments[-1]
-        if origin in {dict, tuple} and arguments[-1] is not Ellipsis
-        else arguments[0]
-        if arguments
-        else kind
-    )
+        return [kind]
+    return [model for argument in get_args(kind) for model in _models(argument)]
 
 
 def _line_number(where: str) -> int:
