@@ -1,0 +1,57 @@
+"""How strong each physical cause of the simulated machine is: its unit, and where the value comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class Strengths:
+    """One number per cause. Zero takes the cause away; `NOTHING` is the ideal machine.
+
+    Expansion coefficients are handbook values at 20 degC; the others are typical of a small
+    coordinate measuring machine, with the reason beside each.
+    """
+
+    # Weather: daily swing of an air-conditioned laboratory is 1 K or so (VDI/VDE 2627, class 3).
+    room_swing_K: float = 1.0
+    # Heat of drives and electronics, as a share of what warm_up.py lists in watts.
+    heat_share: float = 1.0
+
+    # Frame: grey cast iron 10-11.5 ppm/K; low-expansion cast iron, the paper's joint supports, 2-3 ppm/K.
+    column_expansion_ppm_per_K: float = 11.0
+    ring_expansion_ppm_per_K: float = 11.0
+    support_expansion_ppm_per_K: float = 2.5
+    # Granite 4-8 ppm/K.
+    plate_expansion_ppm_per_K: float = 6.0
+    # A welded or cast column of this size takes 100-200 N/um along and ten times less across.
+    column_give_along_um_per_N: float = 0.007
+    column_give_across_um_per_N: float = 0.05
+
+    # Rods: Super-Invar 0.3-0.8 ppm/K (paper, section 2.2).
+    frame_rod_expansion_ppm_per_K: float = 0.5
+    scale_rod_expansion_ppm_per_K: float = 0.5
+
+    # Platform of low-expansion cast iron; stylus stem of tungsten carbide, 5 ppm/K.
+    platform_expansion_ppm_per_K: float = 2.5
+    tool_expansion_ppm_per_K: float = 5.0
+
+    # Ball joints: how the ball's centre wanders per harmonic of a joint angle. The paper's comparators
+    # saw several um; the preload seats the ball, so that it wanders less across the link than along it.
+    ball_runout_um: float = 6.0
+    ball_runout_across_share: float = 0.05
+    # A preloaded ball of 25 mm: 50-100 N/um along the link, less across.
+    ball_give_along_um_per_N: float = 0.015
+    ball_give_across_um_per_N: float = 0.004
+
+    # What the comparators show wrongly: form of the reference balls (grade 3: 0.08 um), noise and step
+    # of an inductive comparator.
+    ball_form_um: float = 0.03
+    comparator_noise_um: float = 0.02
+    comparator_step_um: float = 0.01
+    # Interpolation noise of a grating scale of 20 um period.
+    scale_noise_um: float = 0.005
+    thermometer_noise_K: float = 0.01
+
+
+NOTHING = Strengths(**{field.name: 0.0 for field in fields(Strengths)})

@@ -1,0 +1,47 @@
+"""The room: air temperature, pressure and humidity as functions of time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+REFERENCE_degC = 20.0  # ISO 1
+STANDARD_PRESSURE_hPa = 1013.25  # ISO 2533, sea level
+MIDDLE_HUMIDITY_pct = 50.0
+
+# Period in s and share of the daily swing: the day, a shift, the air conditioning's own cycle.
+_TEMPERATURE_WAVES = ((86400.0, 1.0), (9000.0, 0.35), (1300.0, 0.12))
+# A front passes in two or three days; within a day the pressure tide is 1 hPa.
+_PRESSURE_WAVES_hPa = ((200000.0, 8.0), (43200.0, 1.0))
+_HUMIDITY_WAVES_pct = ((86400.0, 6.0), (14400.0, 2.0))
+
+
+class Weather:
+    """Slow waves with seeded phases. At time 0 the room is at reference conditions."""
+
+    def __init__(self, swing_K: float, rng: np.random.Generator) -> None:
+        """`swing_K`: amplitude of the daily wave of the room's temperature."""
+        self._temperature = _phased([(period, share * swing_K) for period, share in _TEMPERATURE_WAVES], rng)
+        self._pressure = _phased(_PRESSURE_WAVES_hPa, rng)
+        self._humidity = _phased(_HUMIDITY_WAVES_pct, rng)
+
+    def room_degC(self, time_s: float) -> float:
+        return REFERENCE_degC + _waves(self._temperature, time_s)
+
+    def pressure_hPa(self, time_s: float) -> float:
+        return STANDARD_PRESSURE_hPa + _waves(self._pressure, time_s)
+
+    def humidity_pct(self, time_s: float) -> float:
+        return MIDDLE_HUMIDITY_pct + _waves(self._humidity, time_s)
+
+
+_Waves = list[tuple[float, float, float]]
+
+
+def _phased(waves: list[tuple[float, float]] | tuple[tuple[float, float], ...], rng: np.random.Generator) -> _Waves:
+    return [(2 * math.pi / period, amplitude, rng.uniform(0, 2 * math.pi)) for period, amplitude in waves]
+
+
+def _waves(waves: _Waves, time_s: float) -> float:
+    return sum(a * (math.sin(w * time_s + phase) - math.sin(phase)) for w, a, phase in waves)
