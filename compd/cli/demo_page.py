@@ -1,0 +1,135 @@
+"""What the demo saw: a summary for the terminal and a page with pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from plotly.graph_objects import Box, Figure, Histogram, Scatter
+from rich.table import Table as TerminalTable
+
+from compd.cli.demo_session import KINDS, Session
+from compd.workbench.page import COLOURS, Panel, Table, styled, write_page
+
+LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}
+KIND_COLOURS = {"none": COLOURS["worst"], "joints": COLOURS["middle"], "full": COLOURS["best"]}
+MM_TO_UM = 1e3
+
+
+def rms(values: list[float]) -> float:
+    """Root of the mean square; nan of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
+
+
+def error_rows(session: Session) -> list[list[str]]:
+    """Tip error against the truth: rms, 95 % and largest distance, by kind of compensation."""
+    rows = []
+    for kind in KINDS:
+        errors = [visit.error_um[kind] for visit in session.visits]
+        p95, largest = (float(np.percentile(errors, 95)), max(errors)) if errors else (float("nan"),) * 2
+        rows.append([LABELS[kind], f"{rms(errors):.2f} um", f"{p95:.2f} um", f"{largest:.2f} um"])
+    return rows
+
+
+def timing_rows(session: Session) -> list[list[str]]:
+    """The loop's period and the gauges' ages, as the daemon and its setpoints tell them."""
+    loop = session.status.get("loop", {})
+    ages = [message["age_s"] * 1e3 for message in session.setpoints if "age_s" in message]
+    rows = [[key.replace("_", " "), f"{value:.6g}"] for key, value in loop.items() if isinstance(value, int | float)]
+    if ages:
+        rows.append(["age of the oldest gauge used, median / largest",
+                     f"{np.median(ages):.1f} / {max(ages):.1f} ms"])  # fmt: skip
+    return rows
+
+
+def summarise(session: Session) -> TerminalTable:
+    """The table at the end of the demo."""
+    table = TerminalTable("tip error against the truth", "rms", "95 %", "largest",
+                          title=f"{session.machine}: {len(session.visits)} points measured at rest")  # fmt: skip
+    for row in error_rows(session):
+        table.add_row(*row)
+    table.add_section()
+    for name, value in timing_rows(session):
+        table.add_row(name, value, "", "")
+    return table
+
+
+def verdict(session: Session) -> str:
+    """The result in one sentence."""
+    by_kind = {kind: rms([visit.error_um[kind] for visit in session.visits]) for kind in KINDS}
+    return (
+        f"At {len(session.visits)} points the tip missed its target by {by_kind['none']:.1f} um (rms) without "
+        f"compensation, by {by_kind['joints']:.1f} um with the joints compensated, and by {by_kind['full']:.2f} um with "
+        "joints and frame compensated."
+    )
+
+
+def write_demo_page(path: Path, session: Session) -> None:
+    """The page: verdict, tables, pictures."""
+    panels = [
+        Panel("Error of the tool tip", "Distance between the true tip and its target, machine at rest.",
+              Table(("", "rms", "95 %", "largest"), error_rows(session))),
+        Panel("Error while the machine warms up",
+              "One dot per point. The frame grows as it warms, so the uncompensated error grows; what the frame "
+              "comparators see is taken out.", _errors(session)),
+        Panel("What the correction is made of",
+              "Correction of each link's command at the end of each visit, by source.", _sources(session)),
+        Panel("How the frame moved", "Position of the base platform {B} since machine zero, in {M}.", _frame(session)),
+        Panel("Age of the oldest gauge", "Every setpoint says how old its oldest reading is.", _ages(session)),
+        Panel("Spread by kind", "The same errors side by side; the scale is logarithmic.", _spread(session)),
+        Panel("Loop", "As the daemon's STATUS tells it.", Table(("", "value"), timing_rows(session))),
+    ]  # fmt: skip
+    write_page(path, f"compd demo: {session.machine}", verdict(session), panels,
+               "Simulated machine, gauges on real ptys and TCP ports; the truth shares no code with the model.")  # fmt: skip
+
+
+def _times(session: Session) -> list[float]:
+    return [visit.time_s for visit in session.visits]
+
+
+def _errors(session: Session) -> Figure:
+    figure = Figure()
+    for kind in KINDS:
+        figure.add_scatter(x=_times(session), y=[visit.error_um[kind] for visit in session.visits], name=LABELS[kind],
+                           mode="lines+markers", line={"color": KIND_COLOURS[kind]})  # fmt: skip
+    return styled(figure, "time since the start, s", "tip error, um")
+
+
+def _sources(session: Session) -> Figure:
+    figure = Figure()
+    sources = list(session.visits[-1].setpoint["sources_mm"]) if session.visits else []
+    shades = dict(zip(sources, [COLOURS["plain"], COLOURS["middle"], COLOURS["quiet"]], strict=False))
+    for source in sources:
+        per_link = np.array([visit.setpoint["sources_mm"][source] for visit in session.visits]) * MM_TO_UM
+        for link in range(per_link.shape[1]):
+            figure.add_trace(Scatter(x=_times(session), y=per_link[:, link], name=source, legendgroup=source,
+                                     showlegend=link == 0, mode="lines+markers", marker={"size": 4},
+                                     line={"color": shades.get(source, COLOURS["quiet"])},
+                                     hovertemplate=f"{source}, link {link + 1}: %{{y:.2f}} um"))  # fmt: skip
+    return styled(figure, "time since the start, s", "correction, um")
+
+
+def _frame(session: Session) -> Figure:
+    figure = Figure()
+    moved = [(m["time_s"], m["frame"]["displacement_mm"]) for m in session.setpoints if "frame" in m]
+    start = moved[0][0] if moved else 0.0
+    for axis, colour in zip(range(3), ("worst", "plain", "best"), strict=True):
+        figure.add_scatter(x=[t - start for t, _ in moved], y=[v[axis] * MM_TO_UM for _, v in moved], name="xyz"[axis],
+                           mode="lines", line={"color": COLOURS[colour]})  # fmt: skip
+    return styled(figure, "time since the start, s", "displacement of {B}, um")
+
+
+def _ages(session: Session) -> Figure:
+    ages = [message["age_s"] * 1e3 for message in session.setpoints if "age_s" in message]
+    return styled(Figure(Histogram(x=ages, marker_color=COLOURS["plain"])), "age of the oldest gauge, ms", "setpoints")
+
+
+def _spread(session: Session) -> Figure:
+    figure = Figure()
+    for kind in KINDS:
+        figure.add_trace(Box(y=[visit.error_um[kind] for visit in session.visits], name=LABELS[kind], boxpoints="all",
+                             marker_color=KIND_COLOURS[kind], showlegend=False))  # fmt: skip
+    figure.update_yaxes(type="log")
+    return styled(figure, "", "tip error, um")
+
+
