@@ -36,17 +36,19 @@ class Strengths:
     platform_expansion_ppm_per_K: float = 2.5
     tool_expansion_ppm_per_K: float = 5.0
 
-    # Ball joints: how the ball's centre wanders per harmonic of a joint angle. The paper's comparators
-    # saw several um; the preload seats the ball, so that it wanders less across the link than along it.
-    ball_runout_um: float = 6.0
+    # Ball joints: eccentricity of ball and socket; over the few degrees that a joint turns, the ball's
+    # centre then wanders by several um, as the paper's comparators saw. The preload seats the ball, so
+    # that it wanders less across the link than along it.
+    ball_runout_um: float = 20.0
     ball_runout_across_share: float = 0.05
     # A preloaded ball of 25 mm: 50-100 N/um along the link, less across.
     ball_give_along_um_per_N: float = 0.015
     ball_give_across_um_per_N: float = 0.004
 
-    # What the comparators show wrongly: form of the reference balls (grade 3: 0.08 um), noise and step
-    # of an inductive comparator.
-    ball_form_um: float = 0.03
+    # The two reference balls of a revolute joint's shank are ground eccentric, in opposite directions:
+    # that is why the paper takes the mean of Ra and Rb.
+    shank_eccentricity_um: float = 6.0
+    # Noise and step of an inductive comparator.
     comparator_noise_um: float = 0.02
     comparator_step_um: float = 0.01
     # Interpolation noise of a grating scale of 20 um period.

@@ -7,6 +7,8 @@ radiation together: 8 W/(m2 K).
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,8 +28,8 @@ _FACES = ("inner", "outer")
 _DRIVE_HOLDING_W = 0.3
 _DRIVE_MOVING_W = 1.2
 _DRIVE_PIECE = 1
-_RING_W = 6.0
-_CABINET_W = (2.0, 0.5, 0.8)
+_RING_W = 12.0
+_CABINET_W = (8.0, 3.0, 4.0)
 _PLATFORM_W = 0.4
 _LAMPS_W = 3.0
 
@@ -122,18 +124,18 @@ class WarmUp:
         for pieces in self._links:  # a tube of 3 kg, 0.1 m2; joints conduct badly
             capacity |= dict.fromkeys(pieces, 1380.0 / LINK_PIECES)
             to_room |= dict.fromkeys(pieces, 0.75 / LINK_PIECES)
-            between += [(a, b, 0.3) for a, b in zip(pieces, pieces[1:], strict=False)]
+            between += [(a, b, 0.3) for a, b in itertools.pairwise(pieces)]
             between += [("base", pieces[0], 0.2), (pieces[-1], "platform", 0.2)]
         for column in self._columns:  # 30 kg and 0.35 m2 each; the outer face stands towards the room
             for face, metres2 in (("inner", 0.15), ("outer", 0.20)):
                 storeys = column[face]
                 capacity |= dict.fromkeys(storeys, 6900.0 / COLUMN_STOREYS)
                 to_room |= dict.fromkeys(storeys, 8.0 * metres2 / COLUMN_STOREYS)
-                between += [(a, b, 0.8) for a, b in zip(storeys, storeys[1:], strict=False)]
+                between += [(a, b, 0.8) for a, b in itertools.pairwise(storeys)]
             between += [(a, b, 1.5) for a, b in zip(column["inner"], column["outer"], strict=True)]
             between += [(column[face][-1], "base", 0.5) for face in _FACES]
         # granite, 0.64 m2, 0.2 m thick; the bottom stands on three feet over a closed stand
         capacity |= dict.fromkeys(self._plate, 297000.0 / PLATE_LAYERS)
         to_room |= {self._plate[0]: 5.0, self._plate[-1]: 2.0}
-        between += [(a, b, 45.0) for a, b in zip(self._plate, self._plate[1:], strict=False)]
+        between += [(a, b, 45.0) for a, b in itertools.pairwise(self._plate)]
         return HeatNetwork(capacity, to_room, between)
