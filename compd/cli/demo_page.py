@@ -1,11 +1,14 @@
-"""What the demo saw: a summary for the terminal and a page with pictures."""
+"""What the demo sees: a live table, a summary for the terminal, and a page with pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from plotly.graph_objects import Box, Figure, Histogram, Scatter
+from rich.console import Group, RenderableType
+from rich.progress_bar import ProgressBar
 from rich.table import Table as TerminalTable
 
 from compd.cli.demo_session import KINDS, Session
@@ -42,6 +45,18 @@ def timing_rows(session: Session) -> list[list[str]]:
     return rows
 
 
+def progress(session: Session, elapsed_s: float, seconds: float, setpoint: dict[str, Any]) -> RenderableType:
+    """The live table: the newest points, and the setpoint in force."""
+    table = TerminalTable("s", "target, mm", *(f"{LABELS[kind]}, um" for kind in KINDS),
+                          title=f"distance of the true tip from its target; {len(session.visits)} points")  # fmt: skip
+    for visit in session.visits[-10:]:
+        table.add_row(f"{visit.time_s:.1f}", " ".join(f"{x:7.2f}" for x in visit.target_mm),
+                      *(f"{visit.error_um[kind]:.2f}" for kind in KINDS))  # fmt: skip
+    correction = " ".join(f"{value * MM_TO_UM:+.2f}" for value in setpoint.get("correction_mm", []))
+    line = f"setpoint {setpoint['seq']}: {setpoint['state']} {setpoint['reason']}  correction {correction} um"
+    return Group(table, line, ProgressBar(total=seconds, completed=min(elapsed_s, seconds), width=60))
+
+
 def summarise(session: Session) -> TerminalTable:
     """The table at the end of the demo."""
     table = TerminalTable("tip error against the truth", "rms", "95 %", "largest",
@@ -59,8 +74,8 @@ def verdict(session: Session) -> str:
     by_kind = {kind: rms([visit.error_um[kind] for visit in session.visits]) for kind in KINDS}
     return (
         f"At {len(session.visits)} points the tip missed its target by {by_kind['none']:.1f} um (rms) without "
-        f"compensation, by {by_kind['joints']:.1f} um with the joints compensated, and by {by_kind['full']:.2f} um with "
-        "joints and frame compensated."
+        f"compensation, by {by_kind['joints']:.1f} um with the joints compensated, and by {by_kind['full']:.2f} um "
+        "with joints and frame compensated."
     )
 
 
@@ -79,8 +94,8 @@ def write_demo_page(path: Path, session: Session) -> None:
         Panel("Spread by kind", "The same errors side by side; the scale is logarithmic.", _spread(session)),
         Panel("Loop", "As the daemon's STATUS tells it.", Table(("", "value"), timing_rows(session))),
     ]  # fmt: skip
-    write_page(path, f"compd demo: {session.machine}", verdict(session), panels,
-               "Simulated machine, gauges on real ptys and TCP ports; the truth shares no code with the model.")  # fmt: skip
+    footer = "Simulated machine, gauges on real ptys and TCP ports; the truth shares no code with the model."
+    write_page(path, f"compd demo: {session.machine}", verdict(session), panels, footer)
 
 
 def _times(session: Session) -> list[float]:
@@ -111,7 +126,7 @@ def _sources(session: Session) -> Figure:
 
 def _frame(session: Session) -> Figure:
     figure = Figure()
-    moved = [(m["time_s"], m["frame"]["displacement_mm"]) for m in session.setpoints if "frame" in m]
+    moved = [(m["time_s"], m["frame"]["displacement_M_mm"]) for m in session.setpoints if "frame" in m]
     start = moved[0][0] if moved else 0.0
     for axis, colour in zip(range(3), ("worst", "plain", "best"), strict=True):
         figure.add_scatter(x=[t - start for t, _ in moved], y=[v[axis] * MM_TO_UM for _, v in moved], name="xyz"[axis],
@@ -131,5 +146,3 @@ def _spread(session: Session) -> Figure:
                              marker_color=KIND_COLOURS[kind], showlegend=False))  # fmt: skip
     figure.update_yaxes(type="log")
     return styled(figure, "", "tip error, um")
-
-
