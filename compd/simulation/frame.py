@@ -62,14 +62,14 @@ class Frame:
     def _growth(self, warm: WarmUp) -> Floats:
         ring = self._strengths.ring_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
         column = self._strengths.column_expansion_ppm_per_K * PPM * warm.columns_K.mean(axis=(1, 2))
-        growth_M = ring * self._arms_M
+        growth_M: Floats = ring * self._arms_M
         growth_M[:, 2] += column * self._heights_mm
         return growth_M
 
     def _lean(self, warm: WarmUp) -> Floats:
         """A warmer outer face curves its column inwards; each storey turns all that stands on it."""
         inner_K, outer_K = warm.columns_K[:, 0, :], warm.columns_K[:, 1, :]
-        curvature = self._strengths.column_expansion_ppm_per_K * PPM * (outer_K - inner_K) / COLUMN_DEPTH_MM
+        curvature = self._strengths.column_expansion_ppm_per_K * PPM / COLUMN_DEPTH_MM * (outer_K - inner_K)
         storey = (np.arange(COLUMN_STOREYS) + 0.5) / COLUMN_STOREYS
         inwards = (curvature * (1 - storey)).sum(axis=1) * self._heights_mm**2 / COLUMN_STOREYS
         lean_M = -inwards[:, None] * self._outward_M
