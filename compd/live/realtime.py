@@ -1,0 +1,97 @@
+"""What the compute loop asks of the system: priority, memory in place, no collector in its way."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import sys
+from typing import NamedTuple
+
+# /usr/include/x86_64-linux-gnu/bits/mman-linux.h; ONFAULT: pages stay once they are there, but thread
+# stacks are not filled in advance.
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
+_CLOCK_MONOTONIC, _TIMER_ABSTIME = 1, 1  # linux/time.h
+_EINTR = 4
+
+# How long a driver thread may keep the interpreter once the loop wants it; Python's own 5 ms is a whole
+# period at 200 Hz.
+SWITCH_INTERVAL_S = 50e-6
+# Drivers' exceptions leave cycles of a few kB each; collected this often they stay a few MB.
+_COLLECT_EVERY_S = 5.0
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+_libc.clock_nanosleep.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Timespec), ctypes.c_void_p)
+
+
+class Permission(NamedTuple):
+    """Whether the system granted something, and what it said."""
+
+    granted: bool
+    detail: str
+
+
+def sleep_until(time_s: float) -> None:
+    """Sleep to an absolute time on CLOCK_MONOTONIC (clock_nanosleep(2)), through any signal, without the GIL.
+
+    An absolute time does not drift: what the cycle costs is not added to the period.
+    """
+    seconds = int(time_s)
+    wake = _Timespec(seconds, int((time_s - seconds) * 1e9))
+    while (error := _libc.clock_nanosleep(_CLOCK_MONOTONIC, _TIMER_ABSTIME, ctypes.byref(wake), None)) != 0:
+        if error != _EINTR:
+            raise OSError(error, os.strerror(error))
+
+
+def use_fifo(priority: int) -> Permission:
+    """SCHED_FIFO for the calling thread alone."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        return Permission(False, f"{error.strerror}; needs CAP_SYS_NICE or LimitRTPRIO={priority}")
+    return Permission(True, f"priority {priority}")
+
+
+def lock_memory() -> Permission:
+    """mlockall(2): no page of the daemon is written to swap."""
+    if _libc.mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) != 0:
+        return Permission(False, f"{os.strerror(ctypes.get_errno())}; needs CAP_IPC_LOCK or LimitMEMLOCK=infinity")
+    return Permission(True, "all pages, as they are touched")
+
+
+def shorten_switch_interval() -> Permission:
+    """Let the loop have the interpreter soon after it asks."""
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return Permission(True, f"{SWITCH_INTERVAL_S * 1e6:g} us")
+
+
+class QuietCollector:
+    """The garbage collector, run by the loop after a cycle instead of in the middle of one."""
+
+    def __init__(self) -> None:
+        self._next_s = 0.0
+
+    def start(self, now_s: float) -> Permission:
+        """What exists now is never looked at again; nothing collects by itself."""
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        self._next_s = now_s + _COLLECT_EVERY_S
+        return Permission(True, f"{gc.get_freeze_count()} objects frozen, collected in the loop's slack")
+
+    def rest(self, now_s: float) -> None:
+        """The cycle is done: collect, when it is time."""
+        if now_s >= self._next_s:
+            self._next_s = now_s + _COLLECT_EVERY_S
+            gc.collect()
+
+    def stop(self) -> None:
+        """As it was before `start`."""
+        gc.enable()
+        gc.unfreeze()

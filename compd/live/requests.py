@@ -1,0 +1,98 @@
+"""What clients ask for, and who may: watching, the controller role, status, machine zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from compd.clock import Clock
+from compd.live.loop import Orders
+from compd.live.protocol import (
+    ErrorCode,
+    ProtocolError,
+    TargetKeys,
+    line,
+    parse,
+    parse_bare,
+    parse_target,
+    parse_watch,
+)
+from compd.live.session import Session
+
+# Takes a function that answers the client later, from any thread. Raises ProtocolError (busy).
+TakeZero = Callable[[Callable[[bytes], None]], None]
+
+
+class Requests:
+    """Answers messages. Runs on the publisher's thread, and is the only writer of the target."""
+
+    def __init__(
+        self,
+        version: Mapping[str, Any],
+        target_keys: TargetKeys,
+        orders: Orders,
+        status: Callable[[], Mapping[str, Any]],
+        take_zero: TakeZero,
+        clock: Clock,
+    ) -> None:
+        """`version`: the VERSION message; `status`: makes the STATUS message."""
+        self.version = line(version)
+        self._target_keys = target_keys
+        self._orders = orders
+        self._status = status
+        self._take_zero = take_zero
+        self._clock = clock
+        self._controller: Session | None = None
+
+    def answer(self, session: Session, data: bytes, later: Callable[[bytes], None]) -> bytes:
+        """The answer to one line, b"" where there is none; `later` sends one that takes time.
+
+        Raises ProtocolError for a message that cannot be followed.
+        """
+        message = parse(data)
+        match message["class"]:
+            case "WATCH":
+                rate_hz = parse_watch(message)
+                session.watch(rate_hz, self._clock.monotonic())
+                return line({key: message[key] for key in ("class", "rate_hz") if key in message})
+            case "TARGET":
+                target = parse_target(message, self._target_keys)
+                if self._controller not in {None, session}:
+                    raise ProtocolError(ErrorCode.ROLE_TAKEN, "another client is the controller")
+                self._controller = session
+                self._orders.target = target
+                return b""
+            case "RELEASE":
+                parse_bare(message)
+                if self._controller is not session:
+                    raise ProtocolError(ErrorCode.NOT_CONTROLLER, "only the controller can release its role")
+                self.left(session)
+                return line({"class": "RELEASE"})
+            case "STATUS":
+                parse_bare(message)
+                return line(self._status())
+            case "VERSION":
+                parse_bare(message)
+                return self.version
+            case "ZERO":
+                parse_bare(message)
+                if not session.local:
+                    raise ProtocolError(ErrorCode.UNIX_ONLY, "machine zero is taken over the Unix socket only")
+                self._take_zero(later)
+                return b""
+            case unknown:
+                raise ProtocolError(
+                    ErrorCode.UNKNOWN_CLASS,
+                    f"class {unknown[:40]!r}, allowed: WATCH, TARGET, RELEASE, STATUS, VERSION, ZERO",
+                )
+
+    def left(self, session: Session) -> None:
+        """A client has gone or gives its role back: without a controller the mode is CMM."""
+        if self._controller is session:
+            self._controller = None
+            self._orders.target = None
+
+    @property
+    def controlled(self) -> bool:
+        """Some client is the controller."""
+        return self._controller is not None

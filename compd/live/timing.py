@@ -1,0 +1,87 @@
+"""How well the loop keeps time: periods, lateness, cost, in fixed memory."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+_BIN_US = 5.0
+_BINS = 2000  # 10 ms; later ones share the last bin, the largest is kept exactly
+
+
+class Histogram:
+    """Durations in bins of 5 us: a median and a p99 that cost nothing to keep."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * (_BINS + 1)
+        self.count = 0
+        self.largest_us = 0.0
+
+    def add(self, duration_s: float) -> None:
+        """Count one duration; a negative one counts as zero."""
+        us = max(duration_s * 1e6, 0.0)
+        self._counts[min(int(us / _BIN_US), _BINS)] += 1
+        self.count += 1
+        self.largest_us = max(self.largest_us, us)
+
+    def quantile_us(self, share: float) -> float:
+        """Upper edge of the bin below which `share` of the durations lie; nan of nothing."""
+        wanted = math.ceil(share * self.count)
+        seen = 0
+        for i, count in enumerate(self._counts):
+            seen += count
+            if count and seen >= wanted:
+                return min((i + 1) * _BIN_US, self.largest_us)
+        return math.nan
+
+    def summary(self) -> dict[str, float]:
+        """Median, p99 and largest; {} of nothing."""
+        if not self.count:
+            return {}
+        return {
+            "median_us": round(self.quantile_us(0.5), 1),
+            "p99_us": round(self.quantile_us(0.99), 1),
+            "largest_us": round(self.largest_us, 1),
+        }
+
+
+class LoopTiming:
+    """Written by the loop thread alone."""
+
+    def __init__(self, period_s: float) -> None:
+        self.period_s = period_s
+        self.cycles = 0
+        self.missed = 0
+        self.lateness = Histogram()
+        self.cost = Histogram()
+        self._last_start_s = math.nan
+        self._mean_s = 0.0
+        self._squares_s2 = 0.0
+        self._periods = 0
+
+    def started(self, wake_s: float, now_s: float) -> None:
+        """A cycle begins that should have begun at `wake_s`."""
+        self.lateness.add(now_s - wake_s)
+        period_s = now_s - self._last_start_s
+        if math.isfinite(period_s):  # Welford's running mean and variance
+            self._periods += 1
+            delta = period_s - self._mean_s
+            self._mean_s += delta / self._periods
+            self._squares_s2 += delta * (period_s - self._mean_s)
+        self._last_start_s = now_s
+
+    def finished(self, start_s: float, now_s: float, missed: int) -> None:
+        """The cycle that began at `start_s` is done; `missed` following ones are skipped."""
+        self.cost.add(now_s - start_s)
+        self.cycles += 1
+        self.missed += missed
+
+    def summary(self) -> dict[str, Any]:
+        """For STATUS; what has not been measured yet is left out."""
+        found: dict[str, Any] = {"rate_hz": 1 / self.period_s, "cycles": self.cycles, "missed_cycles": self.missed}
+        if self._periods > 1:
+            deviation_s = math.sqrt(self._squares_s2 / (self._periods - 1))
+            found["period_mean_ms"] = round(self._mean_s * 1e3, 6)
+            found["period_deviation_ms"] = round(deviation_s * 1e3, 6)
+        found |= {f"lateness_{name}": value for name, value in self.lateness.summary().items()}
+        return found | {f"cycle_{name}": value for name, value in self.cost.summary().items()}
