@@ -1,0 +1,154 @@
+"""What a line's bytes go through: a serial port (device or pyserial URL) or a TCP connection.
+
+A port waits in `select`, so that a waiting thread costs nothing. It raises LineFault(LINE_LOST) for
+everything that the system reports when a plug is pulled; after that only a new port helps.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import termios
+from typing import Protocol
+
+import serial
+import structlog
+
+from compd.gauge import LineFault, Quality
+
+log = structlog.get_logger()
+
+# Pulling a plug raises SerialException (an OSError), a plain OSError or termios.error, depending on the call.
+PORT_FAULTS = (OSError, termios.error)
+MOST_BYTES = 4096  # of one read: far more than any reply
+# Ports without a file descriptor (rfc2217://, loop://) can only be asked again and again.
+SLICE_S = 0.02
+
+
+class Port(Protocol):
+    """Bytes in and out; `character_s` is the time that one character takes on the wire, 0 if unknown."""
+
+    character_s: float
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come, as soon as something has; b"" after `timeout_s` without a byte."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """All of `data`."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back; the port is of no further use."""
+        ...
+
+
+class SerialPort:
+    """A serial port. Everything is set when it is opened and never touched after."""
+
+    def __init__(self, port: str, baud: int, form: str, low_latency: bool, write_timeout_s: float) -> None:
+        """`port`: device path or pyserial URL; `form`: "8N1", "7E2" ... LineFault(LINE_LOST) if it cannot be opened."""
+        data_bits, parity, stop_bits = int(form[0]), form[1], int(form[2])
+        is_device = "://" not in port
+        try:
+            self._port = serial.serial_for_url(
+                port, baudrate=baud, bytesize=data_bits, parity=parity, stopbits=stop_bits,
+                timeout=SLICE_S, write_timeout=write_timeout_s, exclusive=True if is_device else None,
+            )  # fmt: skip
+        except (*PORT_FAULTS, ValueError) as error:
+            raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error}") from error
+        # Behind a URL the baud rate is the device server's affair.
+        bits = 1 + data_bits + (parity != "N") + stop_bits
+        self.character_s = bits / baud if is_device else 0.0
+        self._fd: int | None = None if port.startswith(("rfc2217:", "loop:")) else self._port.fileno()
+        if is_device:
+            try:
+                if parity != "N":
+                    self._check_parity()
+                if low_latency:
+                    self._ask_low_latency(port)
+            except PORT_FAULTS as error:
+                self._port.close()
+                raise LineFault(Quality.LINE_LOST, f"cannot set up {port}: {error}") from error
+
+    def _check_parity(self) -> None:
+        """A character with a wrong parity shall read as NUL, which no reply contains: pyserial leaves
+        checking off, and a damaged digit would pass as another digit (termios(3), INPCK)."""
+        fd = self._port.fileno()
+        attributes = termios.tcgetattr(fd)
+        attributes[0] = (attributes[0] | termios.INPCK) & ~(termios.IGNPAR | termios.PARMRK)
+        termios.tcsetattr(fd, termios.TCSANOW, attributes)
+
+    def _ask_low_latency(self, port: str) -> None:
+        try:
+            self._port.set_low_latency_mode(True)
+        except ValueError as error:  # pyserial's word for an adapter, or a pty, that does not know it
+            log.info("low_latency not granted", port=port, reason=str(error))
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            if self._fd is None:
+                return self._read_in_slices(timeout_s)
+            if not select.select([self._fd], [], [], max(0.0, timeout_s))[0]:
+                return b""
+            data = os.read(self._fd, MOST_BYTES)
+        except PORT_FAULTS as error:
+            raise LineFault(Quality.LINE_LOST, f"read: {error}") from error
+        if not data:  # an unplugged adapter is always ready and has nothing to say
+            raise LineFault(Quality.LINE_LOST, "read: the port has hung up")
+        return data
+
+    def _read_in_slices(self, timeout_s: float) -> bytes:
+        for _ in range(int(timeout_s / SLICE_S) + 1):
+            if first := bytes(self._port.read(1)):
+                return first + bytes(self._port.read(self._port.in_waiting))
+        return b""
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except PORT_FAULTS as error:
+            raise LineFault(Quality.LINE_LOST, f"write: {error}") from error
+
+    def close(self) -> None:
+        try:
+            self._port.close()
+        except PORT_FAULTS as error:
+            log.info("a lost port did not close cleanly", reason=str(error))
+
+
+class TcpPort:
+    """A TCP connection to a device or device server."""
+
+    character_s = 0.0
+
+    def __init__(self, host: str, port: int, timeout_s: float) -> None:
+        """Connect within `timeout_s`; LineFault(LINE_LOST) if it cannot be reached."""
+        try:
+            self._socket = socket.create_connection((host, port), timeout=timeout_s)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            # A device that lost its power never says so: without this the kernel retries for a quarter of an hour.
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, max(1000, int(5000 * timeout_s)))
+        except OSError as error:
+            raise LineFault(Quality.LINE_LOST, f"cannot connect to {host}:{port}: {error}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            if not select.select([self._socket], [], [], max(0.0, timeout_s))[0]:
+                return b""
+            data = self._socket.recv(MOST_BYTES)
+        except OSError as error:
+            raise LineFault(Quality.LINE_LOST, f"read: {error}") from error
+        if not data:
+            raise LineFault(Quality.LINE_LOST, "read: the device closed the connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise LineFault(Quality.LINE_LOST, f"write: {error}") from error
+
+    def close(self) -> None:
+        self._socket.close()

@@ -1,0 +1,184 @@
+"""Generic Modbus gauge: a register map in the configuration; Modbus RTU, TCP and RTU over TCP.
+
+Source of the protocol: Modbus Application Protocol V1.1b3, functions 3 and 4 (M). No comparator with a complete
+public register map was found, so the map is yours, out of your module's manual; for example (M: manual, C: code)
+
+    ICP DAS M-7017C (M)       function 4, address 0-7, int16
+    Advantech ADAM-4117 (C)   function 3, address 0-7, uint16, invalid [65535], scale (max - min) / 65535
+    Moxa ioLogik E1240 (M)    function 4, address 8-23, float32, status {address: 60 ...}: 0 ok, 1 burn-out,
+                              2 over, 3 under
+    R4DCB08 (C)               function 3, address 0-7, int16, scale 0.1, unit degC, invalid [-32768]
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
+
+Address = Annotated[int, Field(ge=0, le=0xFFFF)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Function = Literal[3, 4]
+# One less than Modbus allows: the RTU master wants to ask for one more.
+MOST_REGISTERS = 124
+
+_FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
+
+
+class Status(BaseModel):
+    """A register that says whether a channel's value counts."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    address: Address = Field(description="of the status register; read by the channel's own function")
+    ok: tuple[int, ...] = Field(default=(0,), description="values that mean: good")
+    over_range: tuple[int, ...] = Field(default=(), description="values that mean: over range")
+    under_range: tuple[int, ...] = Field(default=(), description="values that mean: under range")
+
+
+class ModbusChannel(BaseModel):
+    """One value in the register map: value = raw x scale + offset."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
+    function: Function = Field(description="3: holding registers, 4: input registers")
+    address: Address = Field(description="first register as on the wire, from 0")
+    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(description="how the number is stored")
+    word_order: Literal["high_first", "low_first"] = Field(
+        default="high_first", description="of a number in two registers"
+    )
+    byte_order: Literal["big", "little"] = Field(default="big", description="inside a register; big is Modbus's own")
+    scale: Number = Field(default=1.0, description="unit per count; negative turns the sign")
+    offset: Number = Field(default=0.0, description="in the channel's unit")
+    unit: Unit = Field(description="of the value after scale and offset")
+    invalid: tuple[Number, ...] = Field(default=(), description="raw values that mean: no sensor, broken wire")
+    lowest: Number | None = Field(default=None, description="smallest value that the sensor can deliver, in its unit")
+    highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
+    status: Status | None = Field(default=None, description="register that says whether the value counts")
+
+    @property
+    def length(self) -> int:
+        """Registers that the number takes."""
+        return 1 if self.type in {"int16", "uint16"} else 2
+
+    @model_validator(mode="after")
+    def _ends_inside(self) -> Self:
+        if self.address + self.length > 0x10000:
+            raise ValueError("ends beyond register 65535")
+        return self
+
+
+class ModbusOptions(GaugeOptions):
+    """Options of a Modbus gauge."""
+
+    unit: int = Field(ge=0, le=247, description="slave address (0 only behind some TCP devices)")
+    channels: tuple[ModbusChannel, ...] = Field(min_length=1, description="the register map")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        names = [channel.name for channel in self.channels]
+        if doubled := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"channel named twice: {', '.join(doubled)}")
+        return self
+
+
+class Block(NamedTuple):
+    """Adjacent registers that are read together."""
+
+    function: int
+    address: int
+    length: int
+
+
+class _Place(NamedTuple):
+    """Where a channel's registers are in the blocks."""
+
+    block: int
+    first: int
+
+
+class Modbus(Gauge[RegisterLine]):
+    """One slave; as few reads as its map allows, each channel with the time of its own read."""
+
+    Options = ModbusOptions
+    line_kind = "registers"
+
+    def __init__(self, options: ModbusOptions) -> None:
+        super().__init__(options)
+        self._unit = options.unit
+        self._map = options.channels
+        self._channels = tuple(Channel(channel.name, channel.unit) for channel in options.channels)
+        spans = [(c.function, c.address, c.length) for c in self._map]
+        spans += [(c.function, c.status.address, 1) for c in self._map if c.status]
+        self.blocks = blocks(spans)
+        self._values = [self._place(c.function, c.address, c.length) for c in self._map]
+        self._statuses = [self._place(c.function, c.status.address, 1) if c.status else None for c in self._map]
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: RegisterLine) -> Sequence[Reading]:
+        """Raises LineFault as the line does: a block that cannot be read leaves the whole gauge without values."""
+        replies = [line.read_registers(self._unit, *block) for block in self.blocks]
+        readings = []
+        for channel, value, status in zip(self._map, self._values, self._statuses, strict=True):
+            registers, time_s = replies[value.block]
+            said = replies[status.block].registers[status.first] if status else None
+            readings.append(_reading(channel, registers[value.first : value.first + channel.length], said, time_s))
+        return readings
+
+    def _place(self, function: int, address: int, length: int) -> _Place:
+        return next(
+            _Place(i, address - block.address)
+            for i, block in enumerate(self.blocks)
+            if block.function == function and 0 <= address - block.address <= block.length - length
+        )
+
+
+def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[Block, ...]:
+    """(function, address, registers) of every number -> reads that cover adjacent registers and split no number."""
+    found: list[Block] = []
+    for function, address, length in sorted(spans):
+        end = address + length
+        if found and found[-1].function == function and address <= found[-1].address + found[-1].length:
+            last = found[-1]
+            covered = max(end - last.address, last.length)
+            if covered <= MOST_REGISTERS:
+                found[-1] = Block(function, last.address, covered)
+                continue
+        found.append(Block(function, address, length))
+    return tuple(found)
+
+
+def _reading(channel: ModbusChannel, registers: tuple[int, ...], said: int | None, time_s: float) -> Reading:
+    if channel.status is not None and said is not None and said not in channel.status.ok:
+        return bad(time_s, _status_quality(channel.status, said), f"status {said}")
+    raw = decode(channel, registers)
+    if raw in channel.invalid:
+        return bad(time_s, Quality.SENSOR_FAULT, f"raw value {raw:g}")
+    value = raw * channel.scale + channel.offset
+    if channel.highest is not None and value > channel.highest:
+        return bad(time_s, Quality.OVER_RANGE, f"{value:g} {channel.unit}")
+    if channel.lowest is not None and value < channel.lowest:
+        return bad(time_s, Quality.UNDER_RANGE, f"{value:g} {channel.unit}")
+    return good(value, time_s)
+
+
+def _status_quality(status: Status, said: int) -> Quality:
+    if said in status.over_range:
+        return Quality.OVER_RANGE
+    return Quality.UNDER_RANGE if said in status.under_range else Quality.SENSOR_FAULT
+
+
+def decode(channel: ModbusChannel, registers: Sequence[int]) -> float:
+    """The raw number in a channel's registers (unsigned, as on the wire)."""
+    words = registers if channel.word_order == "high_first" else registers[::-1]
+    data = b"".join(word.to_bytes(2, channel.byte_order) for word in words)
+    (raw,) = struct.unpack(_FORMATS[channel.type], data)
+    return float(raw)
