@@ -136,7 +136,7 @@ def test_base_under_or_beside_the_work(turn_rad: tuple[float, float, float]) -> 
     turned = tripod(turn_rad)
     first, second = Mechanism(upright), Mechanism(turned)
     np.testing.assert_allclose(second.lengths0_mm, first.lengths0_mm, atol=1e-9)
-    lengths_mm = first.lengths0_mm + [12.0, -7.0, 3.0]
+    lengths_mm = first.lengths0_mm + np.array([12.0, -7.0, 3.0])
     tips_B0 = []
     for machine in (first, second):
         posture = machine.closure.by_lengths(machine.joints0_M, machine.joints_P, lengths_mm, machine.posture0)

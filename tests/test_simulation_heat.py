@@ -40,7 +40,7 @@ def test_steady_state_lets_out_what_the_drives_put_in() -> None:
 
 def test_warm_up_rises_without_overshoot() -> None:
     warm = warm_up()
-    before = {name: REFERENCE_degC for name in warm.thermometers_degC()}
+    before = dict.fromkeys(warm.thermometers_degC(), REFERENCE_degC)
     for _ in range(60):
         warm.advance(600.0, 1.0)
         now = warm.thermometers_degC()

@@ -39,8 +39,8 @@ class Strengths:
     # Ball joints: eccentricity of ball and socket; over the few degrees that a joint turns, the ball's
     # centre then wanders by several um, as the paper's comparators saw. The preload seats the ball, so
     # that it wanders less across the link than along it.
-    ball_runout_um: float = 20.0
-    ball_runout_across_share: float = 0.05
+    ball_runout_um: float = 40.0
+    ball_runout_across_share: float = 0.025
     # A preloaded ball of 25 mm: 50-100 N/um along the link, less across.
     ball_give_along_um_per_N: float = 0.015
     ball_give_across_um_per_N: float = 0.004

@@ -59,7 +59,7 @@ class World:
             np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
         )
         self._speedup = speedup
-        self._hold_s = zero_hold_s
+        self.zero_hold_s = zero_hold_s
         self._mechanism = Mechanism(geometry)
         self._weather = Weather(self._strengths.room_swing_K, weather_rng)
         self._warm = WarmUp(self._mechanism.links, self._weather, self._strengths.heat_share)
@@ -84,8 +84,8 @@ class World:
         """Let `time_s` pass. Drives that would pull the links apart stop before it (mode `blocked`)."""
         self.time_s += time_s
         if self.mode == "zero":
-            held_s = min(time_s, self._hold_s)
-            self._hold_s -= held_s
+            held_s = min(time_s, self.zero_hold_s)
+            self.zero_hold_s -= held_s
             time_s -= held_s
             if time_s > 0:
                 self.tour()
@@ -102,7 +102,7 @@ class World:
     def tour(self) -> None:
         """Visit seeded points of the workspace, dwelling at each, as a measuring machine does."""
         self._drives = Tour(self._settled.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
-        self.mode = "tour"
+        self.mode, self.zero_hold_s = "tour", 0.0
 
     def command(self, scale_mm: Sequence[float]) -> None:
         """Drive to scale values, (n,) mm, at limited speed.
@@ -114,7 +114,7 @@ class World:
         if not isinstance(self._drives, Follower):
             self._drives = Follower(self._settled.scale_mm)
         self._drives.setpoint_mm = setpoint_mm
-        self.mode = "commanded"
+        self.mode, self.zero_hold_s = "commanded", 0.0
 
     # --- what is true -------------------------------------------------------------------------------
 

@@ -1,0 +1,121 @@
+"""`compd simulate`: a machine that does not exist, on real ports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+    from rich.text import Text
+
+    from compd.configuration import Configuration
+    from compd.simulation.server import Simulation
+
+LOOK_EVERY_S = 0.25
+
+
+def simulate(
+    config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
+    directory: Annotated[
+        Path | None, typer.Option(help="Where ports, sockets and the daemon's configuration go; a new one if left out.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Weather, joints and points follow from it.")] = 1,
+    speedup: Annotated[
+        float, typer.Option(min=0.001, max=100_000, help="Weather and warm-up run this many times faster.")
+    ] = 1.0,
+    zero_hold: Annotated[
+        float, typer.Option(min=0, help="Seconds at machine zero, before switch-on, to take machine zero in.")
+    ] = 60.0,
+    seconds: Annotated[float | None, typer.Option(min=0, help="Stop after so many seconds.")] = None,
+) -> None:
+    """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol."""
+    import signal
+    import tempfile
+    import threading
+
+    from rich.console import Console
+    from rich.live import Live
+
+    from compd.clock import MonotonicClock
+    from compd.configuration import load
+    from compd.simulation.server import Simulation
+    from compd.simulation.world import World
+
+    configuration = load(config)
+    world = World(configuration.geometry, configuration.wiring, seed, speedup, zero_hold)
+    directory = (directory or Path(tempfile.mkdtemp(prefix="compd-"))).resolve()
+    directory.mkdir(parents=True, exist_ok=True)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+
+    clock = MonotonicClock()
+    console = Console()
+    simulation = Simulation(configuration, world, directory, clock)
+    try:
+        daemon = simulation.start()
+        console.print(_lines(simulation))
+        console.print(_next_commands(daemon, directory), highlight=False, soft_wrap=True)
+        end_s = None if seconds is None else clock.monotonic() + seconds
+        with Live(console=console, auto_refresh=False, transient=True) as live:
+            while not clock.wait(stop, LOOK_EVERY_S) and (end_s is None or clock.monotonic() < end_s):
+                if console.is_terminal:
+                    live.update(_status(simulation), refresh=True)
+    finally:
+        simulation.stop()
+
+
+def _lines(simulation: Simulation) -> Table:
+    """What is served where."""
+    from rich.table import Table
+
+    configuration = simulation.configuration
+    table = Table(title=f"{configuration.machine}, simulated", title_justify="left")
+    for column in ("line", "kind", "port", "baud", "gauges"):
+        table.add_column(column, overflow="fold")
+    for name, settings in configuration.lines.items():
+        port = simulation.ports[name]
+        gauges = [
+            f"{gauge} ({options.driver})" for gauge, options in configuration.gauges.items() if options.line == name
+        ]
+        table.add_row(
+            name,
+            settings.kind,
+            port if isinstance(port, str) else f"{port[0]}:{port[1]}",
+            str(getattr(settings, "baud", "")),
+            ", ".join(gauges),
+        )
+    return table
+
+
+def _next_commands(daemon: Configuration, directory: Path) -> str:
+    return (
+        f"The daemon cannot tell it from the real machine:\n    compd run {daemon.path}\n"
+        f"Truth, commands and faults: {directory / 'control.sock'}. Ctrl-C ends."
+    )
+
+
+def _status(simulation: Simulation) -> Text:
+    """One line: what it does, where its tip is, how warm it is, how far its frame has moved."""
+    from rich.text import Text
+
+    from compd.simulation.frame import DISTANCES
+
+    truth, sense = simulation.truth(), simulation.world.sense
+    doing = {
+        "zero": f"at machine zero, {truth['zero_hold_s']:.0f} s more",
+        "tour": f"{truth['phase']}, point {truth['point']}",
+        "commanded": f"commanded, {truth['phase']}",
+        "blocked": "blocked: the links cannot meet there",
+    }[truth["mode"]]
+    tip = " ".join(f"{value:9.4f}" for value in truth["tip_mm"])
+    frame_um = max((sense(f"frame_{name}") for name in DISTANCES), key=abs) * 1e3
+    return Text(
+        f"{truth['time_s']:8.1f} s  {doing:<28} tip in {{{truth['tip_frame']}}} {tip} mm  "
+        f"room {sense('temperature_room_degC'):.2f}, link 1 {sense('temperature_link_1_degC'):.2f} degC  "
+        f"frame {frame_um:+.1f} um at most",
+        no_wrap=True,
+    )

@@ -1,0 +1,149 @@
+"""The simulated machine at work: its world, its gauges on their lines, its control socket."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compd.clock import Clock
+from compd.configuration import Configuration
+from compd.plugins import SIMULATED_GAUGES, load
+from compd.simulation.control import Answer, ControlSocket, Handler
+from compd.simulation.daemon_configuration import Port, daemon_configuration
+from compd.simulation.sensing import Sensing
+from compd.simulation.wire import SimulatedLine
+from compd.simulation.world import World
+
+# The world moves on this often: far below the 25 ms in which the fastest scale display answers.
+STEP_S = 0.02
+CONTROL_SOCKET = "control.sock"
+
+
+class Simulation:
+    """A configured machine that does not exist, on real ports. The world belongs to whoever holds the lock."""
+
+    def __init__(self, configuration: Configuration, world: World, directory: Path, clock: Clock) -> None:
+        """`directory`: an existing directory for ports, sockets, state and the daemon's configuration.
+
+        Raises PluginError for a driver that nobody offers a simulated device for.
+        """
+        self.configuration = configuration
+        self.world = world
+        self.directory = directory
+        self.ports: Mapping[str, Port] = {}
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="world", daemon=True)
+        sensing = Sensing(configuration, world)
+        self.lines: Mapping[str, SimulatedLine] = {
+            name: SimulatedLine(
+                name,
+                settings,
+                [
+                    self._device(gauge, sensing)
+                    for gauge in configuration.gauges
+                    if configuration.gauges[gauge].line == name
+                ],
+                directory,
+            )
+            for name, settings in configuration.lines.items()
+        }
+        self._handlers: Mapping[str, Handler] = {
+            "TRUTH": lambda _: self.truth(),
+            "DRIVE": self._drive,
+            "TOUR": self._tour,
+            "TIP_FOR": self._tip_for,
+            "LOAD": self._load,
+            "FAULT": self._fault,
+        }
+        self._running = ExitStack()
+
+    def start(self) -> Configuration:
+        """Open every port; the configuration, written to `directory`, with which the daemon finds them."""
+        ports = {}
+        for name, line in self.lines.items():
+            ports[name] = line.start()
+            self._running.callback(line.stop)
+        self.ports = ports
+        daemon = daemon_configuration(self.configuration, ports, self.directory)
+        self._thread.start()
+        self._running.callback(self._thread.join)
+        self._running.callback(self._stop.set)
+        # last, for whoever waits for this socket to appear
+        control = ControlSocket(self.directory / CONTROL_SOCKET, self._handlers)
+        self._running.callback(control.stop)
+        return daemon
+
+    def stop(self) -> None:
+        """Close every port and socket that `start` has opened."""
+        self._running.close()
+
+    def _run(self) -> None:
+        last_s = self._clock.monotonic()
+        while not self._clock.wait(self._stop, STEP_S):
+            now_s = self._clock.monotonic()
+            with self._lock:
+                self.world.advance(now_s - last_s)
+            last_s = now_s
+
+    def _device(self, gauge: str, sensing: Sensing) -> Any:
+        driver = self.configuration.gauges[gauge].driver
+        where = f"{self.configuration.path} gauges.{gauge}.driver"
+        return load(SIMULATED_GAUGES, driver, where)(self.configuration.gauges[gauge], sensing.of(gauge))
+
+    # --- what the control socket asks for -------------------------------------------------------------
+
+    def truth(self) -> Answer:
+        """Where the tip truly is and what the machine does: the TRUTH message."""
+        with self._lock:
+            world = self.world
+            tip_mm = world.tip_M_mm() if world.tip_frame == "M" else world.tip_P_mm()
+            return {
+                "class": "TRUTH",
+                "time_s": round(world.time_s, 6),
+                "weather_time_s": round(world.weather_time_s, 6),
+                "mode": world.mode,
+                "phase": world.phase,
+                "moving": world.phase == "moving",
+                "point": world.point,
+                "zero_hold_s": round(world.zero_hold_s, 3),
+                "tip_frame": world.tip_frame,
+                "tip_mm": tip_mm.tolist(),
+                "scale_mm": world.scale_mm.tolist(),
+            }
+
+    def _drive(self, message: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.command(message["scale_mm"])
+        return self.truth()
+
+    def _tour(self, _: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.tour()
+        return self.truth()
+
+    def _tip_for(self, message: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            tip_mm = self.world.tip_for(message["scale_mm"])
+        return {"class": "TIP", "tip_frame": self.world.tip_frame, "tip_mm": tip_mm.tolist()}
+
+    def _load(self, message: Mapping[str, Any]) -> Answer:
+        force_M_N = np.array(message["force_M_N"], dtype=float)
+        if force_M_N.shape != (3,) or not np.all(np.isfinite(force_M_N)):
+            raise ValueError("force_M_N: three finite numbers, N")
+        with self._lock:
+            self.world.force_M_N = force_M_N
+        return self.truth()
+
+    def _fault(self, message: Mapping[str, Any]) -> Answer:
+        name = message["line"]
+        if name not in self.lines:
+            raise ValueError(f"no line {name!r}; there are " + ", ".join(self.lines))
+        self.lines[name].fault = message["fault"]
+        return self.truth()
