@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import socket
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,3 +51,22 @@ def hexapod() -> Geometry:
 
 def wiring(path: Path = TRIPOD) -> Wiring:
     return Wiring.model_validate(section(path, "wiring"))
+
+
+@contextmanager
+def run_directory() -> Iterator[Path]:
+    """A short path: a Unix socket's may have 100 characters."""
+    with tempfile.TemporaryDirectory(prefix="compd-") as directory:
+        yield Path(directory)
+
+
+def ask(connection: socket.socket, message: str | Mapping[str, Any]) -> dict[str, Any]:
+    """One request on a control socket, one answer."""
+    line = message if isinstance(message, str) else json.dumps(message)
+    connection.sendall(line.encode() + b"\n")
+    answer = b""
+    while not answer.endswith(b"\n"):
+        piece = connection.recv(4096)
+        assert piece, "the connection was closed"
+        answer += piece
+    return dict(json.loads(answer))
