@@ -41,6 +41,7 @@ class Simulation:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="world", daemon=True)
         sensing = Sensing(configuration, world)
+        self._ports_directory = directory / "ports"
         self.lines: Mapping[str, SimulatedLine] = {
             name: SimulatedLine(
                 name,
@@ -50,7 +51,7 @@ class Simulation:
                     for gauge in configuration.gauges
                     if configuration.gauges[gauge].line == name
                 ],
-                directory,
+                self._ports_directory,
             )
             for name, settings in configuration.lines.items()
         }
@@ -66,6 +67,7 @@ class Simulation:
 
     def start(self) -> Configuration:
         """Open every port; the configuration, written to `directory`, with which the daemon finds them."""
+        self._ports_directory.mkdir(exist_ok=True)
         ports = {}
         for name, line in self.lines.items():
             ports[name] = line.start()
