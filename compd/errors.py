@@ -60,5 +60,9 @@ class StateError(CompdError):
     """What is on disk (machine zero, model file) does not fit this machine."""
 
 
+class RecordingError(CompdError):
+    """A recording, its sidecar or an instrument's export that cannot be used; every problem is listed."""
+
+
 class DaemonError(CompdError):
     """The daemon cannot be reached, or refused a request."""
