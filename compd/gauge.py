@@ -33,6 +33,7 @@ class Quality(StrEnum):
     NOT_FINITE = "not_finite"
     SILENT = "silent"  # silent by design (in its menu), not lost
     LINE_LOST = "line_lost"  # the port is gone; the line is backing off
+    DRIVER_ERROR = "driver_error"  # the driver itself failed: a defect in it, to be reported
     STALE = "stale"  # was good, is too old now
 
 

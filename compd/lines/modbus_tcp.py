@@ -31,6 +31,7 @@ class ModbusTcp:
     def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:
         """Connect within `timeout_s`; LineFault(LINE_LOST) if the device cannot be reached."""
         self._where = f"{host}:{port}"
+        self._timeout_s = timeout_s
         self._clock = clock
         self._client = ModbusTcpClient(host, port=port, timeout=timeout_s, retries=0)
         self._connect()
@@ -49,7 +50,7 @@ class ModbusTcp:
         except ConnectionException as error:
             raise self._fault(Quality.LINE_LOST, str(error)) from error
         except ModbusIOException as error:
-            raise self._fault(Quality.TIMEOUT, str(error)) from error
+            raise self._fault(Quality.TIMEOUT, f"no answer to this request within {self._timeout_s:g} s") from error
         except (ModbusException, struct.error, IndexError, ValueError) as error:
             raise self._fault(Quality.MISMATCH, f"not to be decoded: {error}") from error
         except OSError as error:

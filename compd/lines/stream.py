@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
 from compd.lines.port import Port
@@ -9,6 +11,8 @@ from compd.lines.port import Port
 SHOWN_BYTES = 40  # of a broken reply, for a person
 # A line that babbles is drained for at most so many timeouts.
 MOST_DRAIN_TIMEOUTS = 10
+# A rest that takes longer than this on the wire is slept through, not taken byte by byte.
+WORTH_SLEEPING_S = 1e-3
 
 
 def shown(data: bytes) -> str:
@@ -30,6 +34,7 @@ class StreamLine:
         self._timeout_s = timeout_s
         self._gap_s = gap_s
         self._clock = clock
+        self._never = threading.Event()
         self._waiting = bytearray()
         self._last_byte_s = clock.monotonic()
 
@@ -47,7 +52,7 @@ class StreamLine:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
         deadline_s = self._first_byte(timeout_s) + count * self._port.character_s
         while len(self._waiting) < count:
-            self._more(deadline_s)
+            self._more(count, deadline_s)
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
@@ -62,7 +67,7 @@ class StreamLine:
             if len(self._waiting) >= limit:
                 raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._waiting))}")
             searched = max(0, len(self._waiting) - len(terminator) + 1)
-            self._more(deadline_s)
+            self._more(limit, deadline_s)
 
     def drain(self) -> bytes:
         """After a fault: wait until nothing has come for the line's timeout; what came (its first bytes)."""
@@ -97,7 +102,11 @@ class StreamLine:
             self._arrived(data)
         return self._last_byte_s + self._timeout_s
 
-    def _more(self, deadline_s: float) -> None:
+    def _more(self, count: int, deadline_s: float) -> None:
+        """More of a reply of at most `count` bytes."""
+        on_the_wire_s = (count - len(self._waiting)) * self._port.character_s
+        if on_the_wire_s > WORTH_SLEEPING_S:
+            self._clock.wait(self._never, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
             raise LineFault(Quality.INCOMPLETE, f"only {len(self._waiting)} bytes: {shown(bytes(self._waiting))}")

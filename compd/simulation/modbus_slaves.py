@@ -39,14 +39,15 @@ class Slaves:
             replies += self._answer(request)
         return replies
 
-    def forget(self) -> None:
-        """The wire was cut: what had been heard of a request is lost."""
-        self._heard = b""
-
     def _next(self) -> bytes:
         """The next whole request, taken from what was heard; b"" if there is none yet."""
         if self._over_tcp:
-            length = MBAP.size + MBAP.unpack_from(self._heard)[2] if len(self._heard) >= MBAP.size else MBAP.size
+            length = MBAP.size
+            if len(self._heard) >= length:
+                _, protocol, rest = MBAP.unpack_from(self._heard)
+                if protocol != 0:  # no Modbus: a device drops what it cannot read
+                    self._heard = b""
+                length += rest
         else:
             length = RTU_REQUEST
             while len(self._heard) >= length and not _whole(self._heard[:length]):

@@ -1,0 +1,85 @@
+"""The ends that a simulated line holds: a pty's master side, or a listening TCP socket."""
+
+from __future__ import annotations
+
+import os
+import socket
+import tty
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+LOOPBACK = "127.0.0.1"
+MOST_BYTES = 4096  # of one read
+
+
+class End(Protocol):
+    """What can be selected, read and written."""
+
+    def fds(self) -> list[int]: ...
+    def read(self, fd: int) -> bytes: ...
+    def write(self, fd: int, data: bytes) -> None: ...
+    def close(self) -> None: ...
+
+
+class PtyEnd:
+    """A pty with a symbolic link to the daemon's side; closing it is pulling the plug."""
+
+    def __init__(self, link: Path) -> None:
+        self._link = link
+        # The daemon's side stays open here, so that the daemon may come and go.
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        link.unlink(missing_ok=True)
+        link.symlink_to(os.ttyname(self._slave))
+
+    def fds(self) -> list[int]:
+        return [self._master]
+
+    def read(self, fd: int) -> bytes:
+        return os.read(fd, MOST_BYTES)
+
+    def write(self, fd: int, data: bytes) -> None:
+        os.write(fd, data)
+
+    def close(self) -> None:
+        self._link.unlink(missing_ok=True)
+        os.close(self._slave)
+        os.close(self._master)
+
+
+class TcpEnd:
+    """A listening socket; one reply goes to the connection that asked."""
+
+    def __init__(self, port: int) -> None:
+        self._connections: dict[int, socket.socket] = {}
+        self._listener = socket.create_server((LOOPBACK, port))
+        self.port: int = self._listener.getsockname()[1]
+
+    def fds(self) -> list[int]:
+        return [self._listener.fileno(), *self._connections]
+
+    def read(self, fd: int) -> bytes:
+        """What a client sent; a new client, and one that leaves, has sent nothing."""
+        if fd == self._listener.fileno():
+            connection, _ = self._listener.accept()
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._connections[connection.fileno()] = connection
+            return b""
+        try:
+            data = self._connections[fd].recv(MOST_BYTES)
+        except OSError:
+            data = b""
+        if not data:
+            self._connections.pop(fd).close()
+        return data
+
+    def write(self, fd: int, data: bytes) -> None:
+        with suppress(OSError):  # who has gone needs no answer
+            if fd in self._connections:
+                self._connections[fd].sendall(data)
+
+    def close(self) -> None:
+        for connection in (self._listener, *self._connections.values()):
+            connection.close()
+        self._connections.clear()
