@@ -32,6 +32,8 @@ def simulate(
     seconds: Annotated[float | None, typer.Option(min=0, help="Stop after so many seconds.")] = None,
 ) -> None:
     """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol."""
+    import contextlib
+    import math
     import signal
     import tempfile
     import threading
@@ -46,26 +48,25 @@ def simulate(
 
     configuration = load(config)
     world = World(configuration.geometry, configuration.wiring, seed, speedup, zero_hold)
-    directory = (directory or Path(tempfile.mkdtemp(prefix="compd-"))).resolve()
-    directory.mkdir(parents=True, exist_ok=True)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-
     clock = MonotonicClock()
     console = Console()
-    simulation = Simulation(configuration, world, directory, clock)
-    try:
+    with contextlib.ExitStack() as stack:
+        if directory is None:
+            directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="compd-")))
+        directory.mkdir(parents=True, exist_ok=True)
+        simulation = Simulation(configuration, world, directory.resolve(), clock)
+        stack.callback(simulation.stop)
         daemon = simulation.start()
         console.print(_lines(simulation))
-        console.print(_next_commands(daemon, directory), highlight=False, soft_wrap=True)
-        end_s = None if seconds is None else clock.monotonic() + seconds
+        console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
+        end_s = math.inf if seconds is None else clock.monotonic() + seconds
         with Live(console=console, auto_refresh=False, transient=True) as live:
-            while not clock.wait(stop, LOOK_EVERY_S) and (end_s is None or clock.monotonic() < end_s):
+            while not clock.wait(stop, LOOK_EVERY_S) and clock.monotonic() < end_s:
                 if console.is_terminal:
                     live.update(_status(simulation), refresh=True)
-    finally:
-        simulation.stop()
 
 
 def _lines(simulation: Simulation) -> Table:
@@ -73,7 +74,7 @@ def _lines(simulation: Simulation) -> Table:
     from rich.table import Table
 
     configuration = simulation.configuration
-    table = Table(title=f"{configuration.machine}, simulated", title_justify="left")
+    table = Table(title=f"{configuration.machine}, simulated in {simulation.directory}", title_justify="left")
     for column in ("line", "kind", "port", "baud", "gauges"):
         table.add_column(column, overflow="fold")
     for name, settings in configuration.lines.items():
@@ -84,17 +85,21 @@ def _lines(simulation: Simulation) -> Table:
         table.add_row(
             name,
             settings.kind,
-            port if isinstance(port, str) else f"{port[0]}:{port[1]}",
+            port.removeprefix(f"{simulation.directory}/") if isinstance(port, str) else f"{port[0]}:{port[1]}",
             str(getattr(settings, "baud", "")),
             ", ".join(gauges),
         )
     return table
 
 
-def _next_commands(daemon: Configuration, directory: Path) -> str:
+def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
+    hold_s = simulation.world.zero_hold_s
     return (
-        f"The daemon cannot tell it from the real machine:\n    compd run {daemon.path}\n"
-        f"Truth, commands and faults: {directory / 'control.sock'}. Ctrl-C ends."
+        "The daemon cannot tell it from the real machine. In other terminals:\n"
+        f"    compd run {daemon.path}\n"
+        f"    compd zero {daemon.sockets.unix.path}    (it stands at machine zero for the next {hold_s:.0f} s)\n"
+        f"    compd watch {daemon.sockets.unix.path}\n"
+        f"Truth, commands and faults: {simulation.directory / 'control.sock'}. Ctrl-C ends."
     )
 
 

@@ -17,18 +17,24 @@ Port = str | tuple[str, int]
 LOOPBACK = "127.0.0.1"
 
 
-def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port], directory: Path) -> Configuration:
-    """Write `directory`/<the same file name>: everything as in the original but where things are.
-
-    `ports`: by line, a device path or (host, port). Unix socket and state move into `directory`; TCP and
-    UDP stay on this computer, so that no real controller hears of a machine that does not exist.
-    """
+def daemon_path(configuration: Configuration, directory: Path) -> Path:
+    """Where the daemon's configuration goes; ConfigurationError where that is the machine's own."""
     path = directory / configuration.path.name
     if path.resolve() == configuration.path.resolve():
         raise ConfigurationError(
             Problem("--directory", "would overwrite the machine's own configuration", str(path),
                     next_step="choose another directory")
         )  # fmt: skip
+    return path
+
+
+def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port], directory: Path) -> Configuration:
+    """Write `directory`/<the same file name>: everything as in the original but where things are.
+
+    `ports`: by line, a device path or (host, port). Unix socket and state move into `directory`; TCP and
+    UDP stay on this computer, so that no real controller hears of a machine that does not exist.
+    """
+    path = daemon_path(configuration, directory)
     data = read(configuration.path).data
     for name, port in ports.items():
         line = data["lines"][name]

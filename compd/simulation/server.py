@@ -14,7 +14,7 @@ from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.control import Answer, ControlSocket, Handler
-from compd.simulation.daemon_configuration import Port, daemon_configuration
+from compd.simulation.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.sensing import Sensing
 from compd.simulation.wire import SimulatedLine
 from compd.simulation.world import World
@@ -30,8 +30,10 @@ class Simulation:
     def __init__(self, configuration: Configuration, world: World, directory: Path, clock: Clock) -> None:
         """`directory`: an existing directory for ports, sockets, state and the daemon's configuration.
 
-        Raises PluginError for a driver that nobody offers a simulated device for.
+        Raises PluginError for a driver that nobody offers a simulated device for, ConfigurationError where
+        `directory` holds the machine's own configuration.
         """
+        daemon_path(configuration, directory)
         self.configuration = configuration
         self.world = world
         self.directory = directory
