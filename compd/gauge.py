@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
@@ -148,10 +148,18 @@ class Gauge(ABC, Generic[LineT]):
     """One device on a line: `class MyGauge(Gauge[ByteLine])` or `Gauge[RegisterLine]`.
 
     Subclasses set the class variables, take their `Options` in `__init__`, and implement two members.
+
+    integrity : "checksum" where the driver itself checks one (a Modbus line does it for its drivers);
+        "format" where only the shape of a reply tells damage.
+    sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver.
+    sample_range : what the gauge can show with these options, in its channels' unit.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
     line_kind: ClassVar[Literal["bytes", "registers"]] = "bytes"
+    integrity: ClassVar[Literal["checksum", "format"]] = "format"
+    sample_options: ClassVar[Mapping[str, Any] | None] = None
+    sample_range: ClassVar[tuple[float, float] | None] = None
 
     def __init__(self, options: Any) -> None:
         """`options` is an instance of this class's `Options`."""
@@ -168,3 +176,10 @@ class Gauge(ABC, Generic[LineT]):
 
         Raises LineFault where the poll as a whole failed.
         """
+
+    def traffic(self) -> Sequence[tuple[int, int]] | None:
+        """(bytes sent, bytes received) of every exchange that one `read` makes, for planning; None = unknown.
+
+        For a driver on registers: as on an RTU line, with address and checksum.
+        """
+        return None
