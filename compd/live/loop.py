@@ -93,6 +93,7 @@ class Loop:
             self.turn()
         finally:
             self._collector.stop()
+            realtime.restore_switch_interval()
 
     def _prepare(self) -> None:
         """Ask for what real time needs; what is not permitted is said, and the loop runs without."""

@@ -19,14 +19,13 @@ class PacketSender:
     def __init__(self, target: UdpTarget, config_hash: str) -> None:
         """Raises DaemonError for a host that has no address."""
         try:
-            family, kind, protocol, _, self._address = socket.getaddrinfo(
-                target.host, target.port, type=socket.SOCK_DGRAM
-            )[0]
+            family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
             raise DaemonError(
                 Problem("sockets.udp.host", f"has no address: {error.strerror}", target.host,
                         next_step="write the controller's IP address")
             ) from error  # fmt: skip
+        self._address: Any = address
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
         self._config_hash = bytes.fromhex(config_hash)[:8]

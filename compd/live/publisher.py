@@ -57,12 +57,16 @@ class Publisher:
     def start(self, requests: Requests) -> None:
         """Listen and serve. Raises DaemonError where an address cannot be had."""
         self._requests = requests
-        if self._sockets.tcp is not None:
-            listener = _listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
-            self.tcp_port = listener.getsockname()[1]
-            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
-        listener = _listen_unix(Path(self._sockets.unix.path))
-        self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
+        try:
+            if self._sockets.tcp is not None:
+                listener = _listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
+                self.tcp_port = listener.getsockname()[1]
+                self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
+            listener = _listen_unix(Path(self._sockets.unix.path))
+            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
+        except DaemonError:
+            self._close()
+            raise
         self._selector.register(self._wake, selectors.EVENT_READ, self._woken)
         self._thread.start()
 
@@ -70,9 +74,16 @@ class Publisher:
         """Close every connection; returns when the thread has ended."""
         self._stop.set()
         os.eventfd_write(self._wake, 1)
-        if self._thread.ident is not None:
-            self._thread.join()
-            Path(self._sockets.unix.path).unlink(missing_ok=True)
+        self._thread.join()
+        Path(self._sockets.unix.path).unlink(missing_ok=True)
+        self._close()
+
+    def _close(self) -> None:
+        for key in list(self._selector.get_map().values()):
+            if isinstance(key.fileobj, socket.socket):
+                key.fileobj.close()
+        self._selector.close()
+        os.close(self._wake)
 
     @property
     def alive(self) -> bool:
@@ -105,15 +116,9 @@ class Publisher:
         }
 
     def _run(self) -> None:
-        try:
-            while not self._stop.is_set():
-                for key, events in self._selector.select():
-                    key.data(events)
-        finally:
-            for key in list(self._selector.get_map().values()):
-                if not isinstance(key.fileobj, int) and hasattr(key.fileobj, "close"):
-                    key.fileobj.close()
-            self._selector.close()
+        while not self._stop.is_set():
+            for key, events in self._selector.select():
+                key.data(events)
 
     def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
         try:
@@ -137,9 +142,11 @@ class Publisher:
             session.flush()
         if events & selectors.EVENT_READ:
             for received in session.receive():
-                self._send(session, self._reply(session, received))
+                reply = self._reply(session, received)
+                self._schedule()  # before the answer: the next setpoint already counts
+                self._send(session, reply)
         self._tidy(session)
-        self._next_due_s = min((s.due_s for s in self._sessions), default=math.inf)
+        self._schedule()
 
     def _reply(self, session: Session, received: bytes | ProtocolError) -> bytes:
         if isinstance(received, ProtocolError):
@@ -167,6 +174,10 @@ class Publisher:
                 if session.takes(setpoint.time_s, self._half_period_s):
                     encoded = encoded or setpoint.to_json()
                     self._send(session, encoded)
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Tell the loop when somebody wants the next setpoint."""
         self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
 
     def _send(self, session: Session, data: bytes) -> None:

@@ -17,6 +17,7 @@ _EINTR = 4
 # How long a driver thread may keep the interpreter once the loop wants it; Python's own 5 ms is a whole
 # period at 200 Hz.
 SWITCH_INTERVAL_S = 50e-6
+_PYTHON_SWITCH_INTERVAL_S = 5e-3
 # Drivers' exceptions leave cycles of a few kB each; collected this often they stay a few MB.
 _COLLECT_EVERY_S = 5.0
 
@@ -69,6 +70,11 @@ def shorten_switch_interval() -> Permission:
     """Let the loop have the interpreter soon after it asks."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     return Permission(True, f"{SWITCH_INTERVAL_S * 1e6:g} us")
+
+
+def restore_switch_interval() -> None:
+    """Python's own again, once the loop has ended."""
+    sys.setswitchinterval(_PYTHON_SWITCH_INTERVAL_S)
 
 
 class QuietCollector:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from compd.clock import Clock
 from compd.live.loop import Orders
 from compd.live.protocol import (
     ErrorCode,
@@ -33,7 +32,6 @@ class Requests:
         orders: Orders,
         status: Callable[[], Mapping[str, Any]],
         take_zero: TakeZero,
-        clock: Clock,
     ) -> None:
         """`version`: the VERSION message; `status`: makes the STATUS message."""
         self.version = line(version)
@@ -41,7 +39,6 @@ class Requests:
         self._orders = orders
         self._status = status
         self._take_zero = take_zero
-        self._clock = clock
         self._controller: Session | None = None
 
     def answer(self, session: Session, data: bytes, later: Callable[[bytes], None]) -> bytes:
@@ -53,7 +50,7 @@ class Requests:
         match message["class"]:
             case "WATCH":
                 rate_hz = parse_watch(message)
-                session.watch(rate_hz, self._clock.monotonic())
+                session.watch(rate_hz)
                 return line({key: message[key] for key in ("class", "rate_hz") if key in message})
             case "TARGET":
                 target = parse_target(message, self._target_keys)

@@ -11,6 +11,7 @@ from compd.live.protocol import MAX_LINE_BYTES, ErrorCode, ProtocolError
 # About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind reads the past.
 MAX_BEHIND_BYTES = 128 * 1024
 _RECEIVE_BYTES = 4096
+_LONGEST_INTERVAL_S = 1e6
 
 
 class Session:
@@ -29,16 +30,18 @@ class Session:
         self._skipping = False
         self._waiting = bytearray()
 
-    def watch(self, rate_hz: float, now_s: float) -> None:
+    def watch(self, rate_hz: float) -> None:
         """From now on `rate_hz` setpoints per second: inf for every one, 0 for none."""
-        self._interval_s = 1.0 / rate_hz if rate_hz else math.inf
-        self.due_s = now_s if rate_hz else math.inf
+        self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
+        self.due_s = -math.inf if rate_hz else math.inf
 
     def takes(self, time_s: float, half_period_s: float) -> bool:
         """Whether the setpoint of `time_s` is this client's next one."""
         if time_s < self.due_s - half_period_s:
             return False
-        self.due_s = max(self.due_s, time_s - self._interval_s) + self._interval_s
+        self.due_s += self._interval_s
+        if self.due_s < time_s:  # the first one, or an interval was missed: count from here
+            self.due_s = time_s + self._interval_s
         return True
 
     def receive(self) -> Iterator[bytes | ProtocolError]:

@@ -31,7 +31,7 @@ class Histogram:
         for i, count in enumerate(self._counts):
             seen += count
             if count and seen >= wanted:
-                return min((i + 1) * _BIN_US, self.largest_us)
+                return self.largest_us if i == _BINS else min((i + 1) * _BIN_US, self.largest_us)
         return math.nan
 
     def summary(self) -> dict[str, float]:

@@ -123,6 +123,11 @@ class MachineWires:
         """Scales, joint and frame comparators."""
         return (*self.scale.wires, *self.comparators.wires)
 
+    @property
+    def all_wires(self) -> tuple[Wire, ...]:
+        """Length gauges, then quantities."""
+        return (*self.length_wires, *self._quantities.values())
+
     def lost(self, snapshot: Snapshot) -> str:
         """ "" when every length gauge can be used; otherwise which cannot, and why."""
         return ", ".join(filter(None, (self.scale.lost(snapshot), self.comparators.lost(snapshot))))
@@ -136,8 +141,3 @@ class MachineWires:
             good = quality is Quality.OK and now_s - time_s <= wire.stale_after_s
             found[name] = np.float64(value if good else math.nan)  # type: ignore[assignment]
         return found
-
-    def meanings(self) -> Mapping[str, str]:
-        """What each wired channel measures, by channel: for STATUS."""
-        wires = (*self.length_wires, *self._quantities.values())
-        return {wire.channel: wire.meaning for wire in wires}
