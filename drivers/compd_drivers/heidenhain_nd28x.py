@@ -8,7 +8,8 @@ the displayed value, the reply is 17 bytes:
 unit: blank = mm, " = inch, ? = fault. sort: < > = ? compare with the display's limits and do not touch the
 value. series: S, G and D are read as smallest, greatest and difference of a series of measurements (P, plausible
 only), which is not where the scale is: they are refused. The display's other commands (ESC A0200: C, read in
-public code) are not used. The frame has no checksum: parity is its only guard, so leave the line at 7E2.
+public code) are not used. The frame has no checksum: parity guards it, so leave the line at 7E2, and a
+position that jumps is asked for twice.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Literal
 from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd_drivers.continuity import Continuity
 
 STX = b"\x02"
 REPLY_LENGTH = 17
@@ -35,6 +37,10 @@ class HeidenhainNd28xOptions(GaugeOptions):
     unit: Literal["mm", "inch"] = Field(
         default="mm", description="what the display shows; the other one is refused, so that nobody switches it unseen"
     )
+    fastest_mm_per_s: float = Field(
+        default=200.0, gt=0, allow_inf_nan=False,
+        description="the fastest that the link ever moves; a position that moved faster is asked for again",
+    )  # fmt: skip
 
 
 class HeidenhainNd28x(Gauge[ByteLine]):
@@ -47,6 +53,7 @@ class HeidenhainNd28x(Gauge[ByteLine]):
         super().__init__(options)
         self._unit = _UNITS[options.unit]
         self._mm = MM_PER_INCH if options.unit == "inch" else 1.0
+        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -54,6 +61,9 @@ class HeidenhainNd28x(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: MISMATCH for anything but a whole reply in the configured unit."""
+        return self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(STX)
         reply = line.receive(REPLY_LENGTH)
         match = _REPLY.fullmatch(reply)

@@ -3,7 +3,7 @@
 Source: manual of the DL-RS1A (M) and public code (C): 9600 8N1, 2400 to 38400 baud; `M0` CR LF is answered by
 `M0` and one field `,+ddd.dddd` in mm per head; `MS` puts a two-digit status before each value; an error is
 `ER,command,nn`. A value that is not a number, or of 199.999 mm and more, means that the head has none.
-The protocol has no checksum. Set a parity in the unit and in the line's format if the unit offers it.
+The protocol has no checksum: a value that jumps is asked for twice.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Literal
 from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd_drivers.continuity import Continuity
 
 MOST_HEADS = 15
 NO_VALUE_MM = 199.999  # from here on the number is a code, not a length
@@ -34,6 +35,10 @@ class KeyenceGt2DlRs1aOptions(GaugeOptions):
     request: Literal["M0", "MS"] = Field(
         default="M0", description="M0: values; MS: values with each head's status, for units that want it"
     )
+    fastest_mm_per_s: float = Field(
+        default=0.5, gt=0, allow_inf_nan=False,
+        description="the fastest that a head's target ever moves; a value that moved faster is asked for again",
+    )  # fmt: skip
 
 
 class KeyenceGt2DlRs1a(Gauge[ByteLine]):
@@ -48,6 +53,7 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
         self._with_status = options.request == "MS"
         self._limit = 4 + options.heads * (_FIELD_LENGTH + _STATUS_LENGTH * self._with_status)
         self._channels = tuple(Channel(str(head + 1)) for head in range(options.heads))
+        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -55,6 +61,9 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but one field per head."""
+        return self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._name + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         name, *fields = reply.split(b",")
