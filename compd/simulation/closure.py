@@ -22,6 +22,8 @@ Posture = NDArray[np.float64]
 # Far below every physical cause (nm), far above rounding at 1 m (1e-13 mm).
 CLOSED_MM = 1e-11
 MOST_ITERATIONS = 25
+# Newton that has gone this far will not come back.
+LOST_MM = 1e5
 # An axis error at the platform's radius counts as the millimetres that it displaces there.
 PLATFORM_RADIUS_MM = 100.0
 _FIRST, _SECOND = np.triu_indices(3)
@@ -121,7 +123,10 @@ def _newton(
         error, gradient = equations(posture)
         departure, rigid = _rigidity(posture)
         residual = np.concatenate([error, departure])
-        if np.abs(residual).max() < CLOSED_MM:
+        largest_mm = np.abs(residual).max()
+        if largest_mm > LOST_MM:
+            break
+        if largest_mm < CLOSED_MM:
             if np.linalg.det(posture[1:]) < 0:
                 break  # a mirror image: no rigid platform can get there
             return posture
