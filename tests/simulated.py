@@ -33,6 +33,7 @@ def tripod(turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Geometry:
     base, tool = data["base"], data["tool"]
     base["origin_B0_in_M_mm"] = turn.apply(base["origin_B0_in_M_mm"]).tolist()
     base["rotation_B0_in_M_rad"] = turn.as_rotvec().tolist()
+    data["plate_points_M_mm"] = turn.apply(data["plate_points_M_mm"]).tolist()
     tool["zero_tip_M_mm"] = turn.apply(tool["zero_tip_M_mm"]).tolist()
     return Geometry.model_validate(data)
 
