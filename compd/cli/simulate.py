@@ -123,4 +123,5 @@ def _status(simulation: Simulation) -> Text:
         f"room {sense('temperature_room_degC'):.2f}, link 1 {sense('temperature_link_1_degC'):.2f} degC  "
         f"frame {frame_um:+.1f} um at most",
         no_wrap=True,
+        overflow="ellipsis",
     )
