@@ -114,7 +114,7 @@ class RtuMaster:
         frame = self._stream.receive(SHORTEST_FRAME)
         refused = bool(frame[1] & 0x80)
         if not refused:
-            frame += self._stream.receive(frame[2])
+            frame += self._rest(frame)
         if crc16(frame):
             raise LineFault(Quality.CRC, shown(frame))
         if frame[0] != unit:
@@ -126,3 +126,11 @@ class RtuMaster:
         if frame[2] != 2 * count:
             raise LineFault(Quality.MISMATCH, f"asked {2 * count} bytes, got {frame[2]}: an answer to another request")
         return time_s, 0, struct.unpack_from(f">{count}H", frame, 3)
+
+    def _rest(self, head: bytes) -> bytes:
+        try:
+            return self._stream.receive(head[2])
+        except LineFault as fault:
+            if fault.quality is not Quality.TIMEOUT:
+                raise
+            raise LineFault(Quality.INCOMPLETE, f"only {len(head)} bytes: {shown(head)}") from fault
