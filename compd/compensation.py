@@ -1,0 +1,232 @@
+"""From gauge values and a model to a compensated tip and a scale setpoint: pure, shared by daemon and replay.
+
+Both modes mean the same by a correction: what is added to the command. The command is what a controller that knows
+nothing of joints and frame would send to bring the tip to its target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compd.errors import KinematicsError, Problem
+from compd.model.arrangement import Contact
+from compd.model.frame import Frame, solve_frame
+from compd.model.jit import Floats, Ints
+from compd.model.kinematics import Pose, forward_kinematics, inverse_kinematics
+from compd.model.links import joint_shortening, link_length_mm, scale_for_length_mm
+from compd.model.machine import MachineModel
+from compd.model.rotation import compose, rotation_matrix
+from compd.model.transform import to_inner
+
+Sources: TypeAlias = Mapping[str, Floats]
+
+
+class GaugeValues(NamedTuple):
+    """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
+
+    scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6.
+    quantities : anything else by its name with unit (temperatures, forces), each (...); may be empty.
+    """
+
+    scale_mm: Floats
+    joint_mm: Floats
+    frame_mm: Floats
+    quantities: Mapping[str, Floats]
+
+
+class WarmStart(NamedTuple):
+    """Where the last cycle ended and the next one's Newton starts; rows that failed keep what they came with.
+
+    supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
+    """
+
+    supports_M_mm: Floats
+    origin_M_mm: Floats
+    rotation_M_P: Floats
+
+    @classmethod
+    def at_zero(cls, model: MachineModel) -> WarmStart:
+        """Machine zero: the first start, and the one that depends on no history."""
+        zero = model.zero
+        return cls(model.frame.zero_supports_M_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
+
+
+class Compensation(NamedTuple):
+    """What one cycle computes; where reason is not OK every number is nan (frame has a reason of its own).
+
+    tip_M_mm, tip_B0_mm : (..., 3), the tip in {M}, and in {B0} by equation (9). In CMM mode where it is now, in
+        machine-tool mode where it will be when the setpoint is reached.
+    tip_P_mm : (..., 3), the same place in {P}: with the tool on the plate, the place on the work that it touches.
+    rotation_M_P : (..., 3, 3), attitude of the moving platform.
+    frame : the machine frame now, with its displacement since machine zero.
+    link_length_mm : (..., n): in CMM mode those measured, equation (1); in machine-tool mode those needed.
+    target_B_mm : (..., 3), the target in today's {B}, equation (8).
+    nominal_scale_mm : (..., n), the command without compensation.
+    scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
+    correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
+    sources : the correction by cause, (..., n) each; their sum is correction_mm but for rounding.
+    reason : (...), a Reason, of the step that failed first.
+    """
+
+    tip_M_mm: Floats
+    tip_B0_mm: Floats
+    tip_P_mm: Floats
+    rotation_M_P: Floats
+    frame: Frame
+    link_length_mm: Floats
+    target_B_mm: Floats
+    nominal_scale_mm: Floats
+    scale_setpoint_mm: Floats
+    correction_mm: Floats
+    sources: Sources
+    reason: Ints
+
+
+def compensate_machine_tool(
+    model: MachineModel,
+    target_mm: ArrayLike,
+    target_rotation_B0_rad: ArrayLike | None,
+    values: GaugeValues,
+    warm: WarmStart,
+) -> tuple[Compensation, WarmStart]:
+    """Equation (8), inverse kinematics with the base joints as they are now, and (1) solved for gL.
+
+    target_mm : (..., 3), in {B0}; with the tool on the plate the place on the work, in {P}.
+    target_rotation_B0_rad : (..., 3), hexapod only, rotation vector of the attitude wanted for {P} in {B0}; None
+        for machine zero's attitude.
+    values : the scales are not used and may be nan.
+    A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
+    Raises KinematicsError for an attitude asked of a tripod.
+    """
+    attitude = _attitude(model, target_rotation_B0_rad, warm)
+    wanted = model.arrangement.wanted(model.frame, target_mm)
+    frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
+    nominal = inverse_kinematics(model.mechanism(model.zero.base_joints_M_mm), *wanted, attitude)
+    needed = inverse_kinematics(model.mechanism(frame.base_joints_M_mm), *wanted, attitude)
+    shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
+    nominal_scale_mm = nominal.link_length_mm - model.zero.link_length_mm
+    command = _command(model, nominal, nominal_scale_mm, needed, shortening_mm)
+    reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, needed.reason))
+    return _result(model, frame, needed, wanted, wanted, command, reason, warm)
+
+
+def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) -> tuple[Compensation, WarmStart]:
+    """Equations (1) and (3), forward kinematics with the base joints as they are now, and (9).
+
+    The correction is that of the command which the scales show now: its target is where uncompensated kinematics
+    takes the tip to be.
+    A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
+    """
+    zero_mm = model.zero.link_length_mm
+    shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
+    frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
+    now = model.mechanism(frame.base_joints_M_mm)
+    length_mm = link_length_mm(zero_mm, values.scale_mm, shortening_mm)
+    pose = forward_kinematics(now, length_mm, warm.origin_M_mm, warm.rotation_M_P)
+    nominal = forward_kinematics(
+        model.mechanism(model.zero.base_joints_M_mm), zero_mm + values.scale_mm, warm.origin_M_mm, warm.rotation_M_P
+    )
+    wanted = model.arrangement.made(nominal)
+    needed = inverse_kinematics(now, *wanted, nominal.rotation_M_P)
+    command = _command(model, nominal, values.scale_mm, needed, shortening_mm)
+    reason = np.maximum(
+        np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, needed.reason))
+    )
+    return _result(model, frame, pose, model.arrangement.made(pose), wanted, command, reason, warm)
+
+
+class _Command(NamedTuple):
+    """What the scales are to show, without compensation and with it; (..., n) mm each."""
+
+    nominal_scale_mm: Floats
+    scale_setpoint_mm: Floats
+    correction_mm: Floats
+    sources: Sources
+
+
+def _command(
+    model: MachineModel, nominal: Pose, nominal_scale_mm: Floats, needed: Pose, joint_shortening_mm: Floats
+) -> _Command:
+    """The joints' share is what they take from the links; the frame's is what its moving makes of the lengths."""
+    setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, needed.link_length_mm, joint_shortening_mm)
+    sources = {"joints": joint_shortening_mm, "frame": needed.link_length_mm - nominal.link_length_mm}
+    return _Command(nominal_scale_mm, setpoint_mm, setpoint_mm - nominal_scale_mm, sources)
+
+
+def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> Floats:
+    """The attitude wanted of a hexapod in {M}; for a tripod the guess to start from."""
+    if not model.attitude_is_free:
+        if target_rotation_B0_rad is not None:
+            raise KinematicsError(
+                Problem("target", "a tripod's attitude follows from its tip", str(target_rotation_B0_rad),
+                        "a position alone", "leave the attitude out")
+            )  # fmt: skip
+        return warm.rotation_M_P
+    if target_rotation_B0_rad is None:
+        return model.zero.rotation_M_P
+    return np.asarray(compose(model.frame.zero_rotation_M_B, rotation_matrix(target_rotation_B0_rad)))
+
+
+def _result(
+    model: MachineModel,
+    frame: Frame,
+    pose: Pose,
+    made: Contact,
+    wanted: Contact,
+    command: _Command,
+    reason: Ints,
+    warm: WarmStart,
+) -> tuple[Compensation, WarmStart]:
+    """Everything together; where a row failed, all its numbers nan and its warm start as it was."""
+    result = Compensation(
+        tip_M_mm=made.tip_M_mm,
+        tip_B0_mm=to_inner(model.frame.zero_rotation_M_B, model.frame.zero_origin_M_mm, made.tip_M_mm),
+        tip_P_mm=made.tip_P_mm,
+        rotation_M_P=pose.rotation_M_P,
+        frame=frame,
+        link_length_mm=pose.link_length_mm,
+        target_B_mm=to_inner(frame.rotation_M_B, frame.origin_M_mm, wanted.tip_M_mm),
+        nominal_scale_mm=command.nominal_scale_mm,
+        scale_setpoint_mm=command.scale_setpoint_mm,
+        correction_mm=command.correction_mm,
+        sources=command.sources,
+        reason=reason,
+    )
+    after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P)
+    if not reason.any():
+        return result, after
+    kept = WarmStart(
+        _where(reason, warm.supports_M_mm, after.supports_M_mm, 2),
+        _where(reason, warm.origin_M_mm, after.origin_M_mm, 1),
+        _where(reason, warm.rotation_M_P, after.rotation_M_P, 2),
+    )
+    return _blanked(result), kept
+
+
+def _blanked(result: Compensation) -> Compensation:
+    """nan for every number in the rows that failed; the frame has a reason of its own."""
+
+    def blank(vector: Floats) -> Floats:
+        return _where(result.reason, np.nan, vector, 1)
+
+    return result._replace(
+        tip_M_mm=blank(result.tip_M_mm),
+        tip_B0_mm=blank(result.tip_B0_mm),
+        tip_P_mm=blank(result.tip_P_mm),
+        rotation_M_P=_where(result.reason, np.nan, result.rotation_M_P, 2),
+        link_length_mm=blank(result.link_length_mm),
+        target_B_mm=blank(result.target_B_mm),
+        nominal_scale_mm=blank(result.nominal_scale_mm),
+        scale_setpoint_mm=blank(result.scale_setpoint_mm),
+        correction_mm=blank(result.correction_mm),
+        sources={name: blank(share) for name, share in result.sources.items()},
+    )
+
+
+def _where(failed: Ints, instead: Floats | float, values: Floats, core: int) -> Floats:
+    """`instead` in the rows that failed; each row of `values` has `core` axes."""
+    return np.where(np.reshape(failed, np.shape(failed) + (1,) * core) != 0, instead, values)

@@ -1,0 +1,120 @@
+"""The machine frame: the pose of {B} in {M} from nine distances, and what it does to targets and tips."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compd.model.jit import MATRIX, VECTOR, Floats, Ints, kernel
+from compd.model.octahedron import edges, octahedron, place_base
+from compd.model.transform import to_inner, to_outer
+
+
+class FrameGeometry(NamedTuple):
+    """What the frame is made of; every array may have leading axes.
+
+    plate_points_M_mm : (..., 3, 3), m1..m3.
+    joint_offsets_B_mm : (..., n, 3), base joint minus its support, in {B} axes: these it keeps.
+    support_of_joint : (n,), the support that carries joint i, counted from 0.
+    zero_supports_M_mm : (..., 3, 3), b1..b3 at machine zero.
+    zero_origin_M_mm : (..., 3), zero_rotation_M_B : (..., 3, 3): {B0} in {M}.
+    """
+
+    plate_points_M_mm: Floats
+    joint_offsets_B_mm: Floats
+    support_of_joint: Ints
+    zero_supports_M_mm: Floats
+    zero_origin_M_mm: Floats
+    zero_rotation_M_B: Floats
+
+
+class Frame(NamedTuple):
+    """The frame now.
+
+    supports_M_mm : (..., 3, 3), b1..b3, equation (2).
+    origin_M_mm : (..., 3), rotation_M_B : (..., 3, 3): {B} in {M}.
+    base_joints_M_mm : (..., n, 3).
+    displacement_M_mm : (..., 3), of the origin of {B} since machine zero.
+    rotation_M_rad : (..., 3), rotation vector of {B} since machine zero, about {M}'s axes.
+    iterations, residual_mm, reason : (...); where reason is not OK every number is nan.
+    """
+
+    supports_M_mm: Floats
+    origin_M_mm: Floats
+    rotation_M_B: Floats
+    base_joints_M_mm: Floats
+    displacement_M_mm: Floats
+    rotation_M_rad: Floats
+    iterations: Ints
+    residual_mm: Floats
+    reason: Ints
+
+
+def solve_frame(
+    geometry: FrameGeometry, distances_mm: ArrayLike, guess_supports_M_mm: ArrayLike | None = None
+) -> Frame:
+    """The frame from its nine distances, exactly: equations (2) and (3) solved by Newton's method.
+
+    distances_mm : (..., 9), t1..t3, u1..u6, by equations (6) and (7).
+    guess_supports_M_mm : (..., 3, 3), the last cycle's supports; machine zero's if None.
+    A row fails as NOT_FINITE; UNREACHABLE (a distance is not positive, a triangle does not close); NO_CONVERGENCE;
+    NEAR_SINGULAR (amplification above AMPLIFICATION_LIMIT, as when supports and plate points come to lie in one
+    plane); OTHER_ASSEMBLY (a singular octahedron lies between guess and solution, as for its mirror image).
+    Raises ValueError for arrays of a wrong shape.
+    """
+    plate, offsets, support_of_joint, supports, origin, rotation = geometry
+    guess = supports if guess_supports_M_mm is None else guess_supports_M_mm
+    return Frame(*octahedron(distances_mm, plate, guess, offsets, support_of_joint, origin, rotation))
+
+
+@kernel([MATRIX, VECTOR, MATRIX], "(d,d)->(d),(d,d)")
+def base_pose(supports_M: Floats, origin_M: Floats, R: Floats) -> None:
+    """Supports b1..b3 (..., 3, 3) -> origin (..., 3) and axes (..., 3, 3) of {B} in {M}.
+
+    Origin in the centroid, z_B along (b2-b1) x (b3-b1), y_B from the origin to b1, x_B = y_B x z_B.
+    Supports on one line have no axes: nan.
+    """
+    if not place_base(supports_M, R, origin_M):
+        R[:, :] = math.nan
+
+
+def distances_mm(supports_M_mm: ArrayLike, plate_points_M_mm: ArrayLike) -> tuple[Floats, Floats]:
+    """The nine distances between reference points, equation (3), and their derivatives.
+
+    supports_M_mm, plate_points_M_mm : (..., 3, 3), b1..b3 and m1..m3 in {M}.
+    Returns t1..t3, u1..u6 (..., 9), and d distance / d (b1, b2, b3), (..., 9, 9), a pure number.
+    Points that coincide give nan.
+    """
+    supports = np.asarray(supports_M_mm, dtype=np.float64)
+    nine = np.zeros((*supports.shape[:-2], 9))
+    lengths, J = _distances(supports, plate_points_M_mm, nine)
+    return lengths, J
+
+
+@kernel([MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], "(s,d),(s,d),(l)->(l),(l,l)")
+def _distances(supports_M: Floats, plate_points_M: Floats, nine: Floats, lengths_mm: Floats, J: Floats) -> None:
+    """`nine` says nothing but how long the result is: a gufunc takes its sizes from what goes in."""
+    if not edges(supports_M, plate_points_M, lengths_mm, J):
+        lengths_mm[:] = math.nan
+        J[:, :] = math.nan
+
+
+def target_now(geometry: FrameGeometry, frame: Frame, target_B0_mm: ArrayLike) -> Floats:
+    """Equation (8): the target (..., 3) of {B0} in today's {B}, in mm; it keeps its place on the surface plate.
+
+    target_B = T_M_B^-1 T_M_B0 target_B0; nan where the frame is.
+    """
+    target_M_mm = to_outer(geometry.zero_rotation_M_B, geometry.zero_origin_M_mm, target_B0_mm)
+    return np.asarray(to_inner(frame.rotation_M_B, frame.origin_M_mm, target_M_mm))
+
+
+def tip_at_zero(geometry: FrameGeometry, frame: Frame, tip_B_mm: ArrayLike) -> Floats:
+    """Equation (9): the tip (..., 3) of today's {B} in {B0}, in mm; nan where the frame is.
+
+    tip_B0 = T_M_B0^-1 T_M_B tip_B.
+    """
+    tip_M_mm = to_outer(frame.rotation_M_B, frame.origin_M_mm, tip_B_mm)
+    return np.asarray(to_inner(geometry.zero_rotation_M_B, geometry.zero_origin_M_mm, tip_M_mm))

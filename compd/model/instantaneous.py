@@ -1,0 +1,99 @@
+"""The frame by instantaneous kinematics, equations (4) and (5): one constant matrix, exact to first order.
+
+The exact solution costs five microseconds, so the daemon uses that; this is the paper's other way, kept to compare.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compd.errors import KinematicsError, Problem
+from compd.model.frame import Frame, FrameGeometry, distances_mm
+from compd.model.jit import Floats
+from compd.model.reason import AMPLIFICATION_LIMIT
+
+
+class InstantaneousFrame(NamedTuple):
+    """The frame to first order in the changes of its distances.
+
+    supports_M_mm : (..., 3, 3).  displacement_M_mm : (..., 3), of the origin of {B} since machine zero.
+    rotation_M_rad : (..., 3), of {B} since machine zero, about {M}'s axes.
+    """
+
+    supports_M_mm: Floats
+    displacement_M_mm: Floats
+    rotation_M_rad: Floats
+
+
+class FrameDifference(NamedTuple):
+    """How far the instantaneous frame is from the exact one: the length of each difference.
+
+    supports_mm : (...), of the support that differs most.  origin_mm, rotation_rad : (...).
+    """
+
+    supports_mm: Floats
+    origin_mm: Floats
+    rotation_rad: Floats
+
+
+def inverse_frame_jacobian(geometry: FrameGeometry) -> Floats:
+    """J^-1 of equation (5) at machine zero, (9, 9): d (b1, b2, b3) / d (t1..t3, u1..u6), pure numbers.
+
+    The paper's J has six columns, for a base platform that is rigid; with nine the shape may change as well.
+    Raises KinematicsError where the frame at machine zero is near-singular.
+    """
+    _, J = distances_mm(geometry.zero_supports_M_mm, geometry.plate_points_M_mm)
+    smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
+    if not smallest * AMPLIFICATION_LIMIT > 1.0:
+        raise KinematicsError(
+            Problem("frame at machine zero", "the nine distances do not fix the supports",
+                    f"smallest singular value {smallest:.3g}", f"more than {1.0 / AMPLIFICATION_LIMIT:g}",
+                    "check supports and plate points")
+        )  # fmt: skip
+    return np.asarray(np.linalg.inv(J), dtype=np.float64)
+
+
+def base_pose_jacobian(geometry: FrameGeometry) -> Floats:
+    """d (displacement, rotation vector) / d (b1, b2, b3) of {B} at machine zero, (6, 9); rows 3..5 in rad/mm."""
+    b1, b2, b3 = geometry.zero_supports_M_mm
+    axes = geometry.zero_rotation_M_B
+    x_B, z_B = axes[:, 0], axes[:, 2]
+    thirds = np.tile(np.eye(3) / 3.0, 3)
+    arm_mm = float(np.linalg.norm(b1 - geometry.zero_origin_M_mm))
+    to_b1 = (np.hstack([np.eye(3), np.zeros((3, 6))]) - thirds) / arm_mm
+    normal = np.cross(b2 - b1, b3 - b1)
+    area_mm2 = float(np.linalg.norm(normal))
+    # rows of x . d(normal): (b2-b1) x (b3-b1), each support moved in turn
+    normal_along_x = np.concatenate([np.cross(b2 - b3, x_B), np.cross(b3 - b1, x_B), np.cross(x_B, b2 - b1)]) / area_mm2
+    # d y_B = w x y_B and d z_B = w x z_B for a rotation w, written in {B} axes
+    turn_B = np.vstack([z_B @ to_b1, normal_along_x, -x_B @ to_b1])
+    return np.vstack([thirds, axes @ turn_B])
+
+
+def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> InstantaneousFrame:
+    """Equations (4) and (5): X = J^-1 U with the constant J of machine zero.
+
+    changes_mm : (..., 9), of t1..t3, u1..u6 since machine zero. nan in, nan out.
+    Raises KinematicsError where the frame at machine zero is near-singular.
+    """
+    changes = np.asarray(changes_mm, dtype=np.float64)
+    moved_mm = changes @ inverse_frame_jacobian(geometry).T
+    pose = moved_mm @ base_pose_jacobian(geometry).T
+    supports = geometry.zero_supports_M_mm + moved_mm.reshape(*changes.shape[:-1], 3, 3)
+    return InstantaneousFrame(supports, pose[..., :3], pose[..., 3:])
+
+
+def difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
+    """How far the two ways of the paper differ, row by row; nan where the exact one failed."""
+
+    def length(vector: Floats) -> Floats:
+        return np.asarray(np.sqrt((vector * vector).sum(-1)))
+
+    return FrameDifference(
+        length(exact.supports_M_mm - instantaneous.supports_M_mm).max(-1),
+        length(exact.displacement_M_mm - instantaneous.displacement_M_mm),
+        length(exact.rotation_M_rad - instantaneous.rotation_M_rad),
+    )

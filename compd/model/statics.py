@@ -1,0 +1,110 @@
+"""Forces in the links, for a load and the platform's weight."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compd.model.closure import close, known, platform_radius
+from compd.model.jit import INTEGERS, MATRIX, VECTOR, Floats, Ints, kernel
+from compd.model.kinematics import Mechanism, checked
+from compd.model.linear import all_finite, factor, inverse_norm, solve
+from compd.model.reason import AMPLIFICATION_LIMIT, Reason
+
+OK = int(Reason.OK)
+NOT_FINITE = int(Reason.NOT_FINITE)
+NEAR_SINGULAR = int(Reason.NEAR_SINGULAR)
+
+
+class LinkForces(NamedTuple):
+    """What the links carry.
+
+    axial_N : (..., n), positive in tension.
+    lateral_N : (..., k), along the revolute axis of link i, on the platform; empty for a hexapod.
+    reason : (...), a Reason; where it is not OK the forces are nan.
+    """
+
+    axial_N: Floats
+    lateral_N: Floats
+    reason: Ints
+
+
+@kernel(
+    [MATRIX, MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(d),(d,d),(d),(d),(),(d)->(n),(k),()",
+)
+def _forces(
+    base_joints_M: Floats,
+    platform_joints_P: Floats,
+    revolute_axes_P: Floats,
+    origin_M: Floats,
+    R: Floats,
+    force_M: Floats,
+    at_M: Floats,
+    weight_N: Floats,
+    weight_at_P: Floats,
+    axial_N: Floats,
+    lateral_N: Floats,
+    reason: Ints,
+) -> None:
+    n = axial_N.shape[0]
+    axial_N[:] = math.nan
+    lateral_N[:] = math.nan
+    radius_mm = platform_radius(platform_joints_P)
+    load = all_finite(force_M) and all_finite(at_M) and all_finite(weight_N) and all_finite(weight_at_P)
+    if not (load and known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
+        reason[0] = NOT_FINITE
+        return
+    J = np.empty((6, 6))
+    x = np.empty(6)
+    pivot = np.empty(6, np.int64)
+    reason[0] = NEAR_SINGULAR
+    if not radius_mm > 0.0:
+        return
+    if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+        return
+    for i in range(6):
+        for j in range(i):
+            J[i, j], J[j, i] = J[j, i], J[i, j]
+    if factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+        return
+    rx, ry, rz = at_M[0] - origin_M[0], at_M[1] - origin_M[1], at_M[2] - origin_M[2]
+    wx = R[0, 0] * weight_at_P[0] + R[0, 1] * weight_at_P[1] + R[0, 2] * weight_at_P[2]
+    wy = R[1, 0] * weight_at_P[0] + R[1, 1] * weight_at_P[1] + R[1, 2] * weight_at_P[2]
+    x[0], x[1], x[2] = force_M[0], force_M[1], force_M[2] - weight_N[0]
+    x[3] = (ry * force_M[2] - rz * force_M[1] - wy * weight_N[0]) / radius_mm
+    x[4] = (rz * force_M[0] - rx * force_M[2] + wx * weight_N[0]) / radius_mm
+    x[5] = (rx * force_M[1] - ry * force_M[0]) / radius_mm
+    solve(J, pivot, x)
+    for i in range(n):
+        axial_N[i] = x[i]
+    for i in range(n, 6):
+        lateral_N[i - n] = -x[i]
+    reason[0] = OK
+
+
+def link_forces(
+    mechanism: Mechanism,
+    origin_M_mm: ArrayLike,
+    rotation_M_P: ArrayLike,
+    force_M_N: ArrayLike,
+    at_M_mm: ArrayLike,
+    weight_N: ArrayLike,
+    weight_at_P_mm: ArrayLike,
+) -> LinkForces:
+    """Equilibrium of the moving platform: J^T axial = load. Links weigh nothing; weight pulls along -z of {M}.
+
+    A link's force passes through its base joint, a sphere, in the plane of the link and its revolute axis: so it has
+    an axial part and, on the tripod, one lateral part along the revolute axis, which is square to the link.
+
+    origin_M_mm (..., 3), rotation_M_P (..., 3, 3): the pose.  force_M_N (..., 3): the external force on whatever the
+    platform carries, acting at at_M_mm (..., 3).  weight_N (...): the platform's, at weight_at_P_mm (..., 3).
+    A row fails as NOT_FINITE, or NEAR_SINGULAR where links without bound would be needed to hold the load.
+    Raises ValueError for arrays of a wrong shape.
+    """
+    return LinkForces(
+        *_forces(*checked(mechanism), origin_M_mm, rotation_M_P, force_M_N, at_M_mm, weight_N, weight_at_P_mm)
+    )
