@@ -3,18 +3,177 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.configuration.operation import Limits, Loop
 from compd.errors import StateError
 from compd.live.limits import limited
 from compd.live.loop import Orders
 from compd.live.protocol import Target
 from compd.live.setpoint import Array, Mode, Numbers, Setpoint, State
-from compd.live.stale import Comparators, usable
-from compd.live.wiring import MachineWires
+from compd.live.stale import Comparators, Usable, usable
+from compd.live.wiring import Lengths, MachineWires
 from compd.live.zero import MachineZero
 from compd.model.machine import MachineModel
+from compd.model.reason import MEANING, Reason
 from compd.readings import Snapshot
+
+
+class _ZeroVectors(NamedTuple):
+    """Raw readings at machine zero, in the wiring's order."""
+
+    scale_mm: Array
+    comparators_mm: Array
+
+
+class _Invalid(Exception):
+    """No setpoint can be had this time; the state and the reason that clients are told."""
+
+    def __init__(self, state: State, reason: str) -> None:
+        super().__init__(reason)
+        self.state = state
+        self.reason = reason
+
+
+class Cycle:
+    """Computes setpoints one after another; keeps what one cycle hands to the next. Only the loop's thread runs it.
+
+    What it keeps: the warm start, the last good set of comparators, and the correction that stands. An invalid
+    setpoint leaves the correction standing, so that the next valid one slews from it.
+    """
+
+    def __init__(
+        self, model: MachineModel, wires: MachineWires, loop: Loop, limits: Limits, valid_for_s: float
+    ) -> None:
+        self._model = model
+        self._wires = wires
+        self._loop = loop
+        self._limits = limits
+        self._valid_for_s = valid_for_s
+        self._period_s = 1.0 / loop.rate_hz
+        self._no_scales = np.full(model.links, math.nan)
+        self._no_comparators = GaugeValues(
+            self._no_scales, np.zeros(wires.joints), np.zeros(len(wires.comparators.wires) - wires.joints), {}
+        )
+        self._warm = WarmStart.at_zero(model)
+        self._correction_mm: Array = np.zeros(model.links)
+        self._zero: MachineZero | None = None
+        self._zero_vectors: _ZeroVectors | None = None
+        self._last_good: Comparators | None = None
+        self._scales_seen = False
+
+    def run(self, tick: int, snapshot: Snapshot, orders: Orders) -> Setpoint:
+        """The setpoint of one tick; an invalid one says why."""
+        mode = Mode.CMM if orders.target is None else Mode.MACHINE_TOOL
+        try:
+            return self._compute(tick, snapshot, orders.zero, orders.target, mode)
+        except _Invalid as why:
+            now_s = snapshot.time_s
+            return Setpoint(tick, now_s, now_s, math.nan, why.state, why.reason, mode, None)
+
+    def _compute(
+        self, tick: int, snapshot: Snapshot, zero: MachineZero | StateError, target: Target | None, mode: Mode
+    ) -> Setpoint:
+        vectors = self._adopted(zero)
+        set_ = self._comparators(snapshot, vectors)
+        assert set_.comparators is not None
+        oldest_s = set_.comparators.oldest_s
+        scale_mm = self._no_scales
+        if target is None:
+            scales = self._scales(snapshot, vectors)
+            scale_mm, oldest_s = scales.change_mm, min(oldest_s, scales.oldest_s)
+        change_mm, joints = set_.comparators.change_mm, self._wires.joints
+        values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], self._wires.quantities(snapshot))
+        found = self._compensation(values, target)
+        kept = limited(found.correction_mm, self._correction_mm, self._period_s, self._limits)
+        if kept.state is State.REFUSED:
+            raise _Invalid(State.REFUSED, kept.reason)
+        self._correction_mm = kept.applied_mm
+        state, reason = _worse(set_, kept.state, kept.reason)
+        if kept.state is State.CLAMPED and target is None:
+            found = self._held_back(found, scale_mm, kept.applied_mm)
+        now_s = snapshot.time_s
+        valid_until_s = min(now_s + self._valid_for_s, set_.expires_s)
+        numbers = self._numbers(found, kept.applied_mm)
+        return Setpoint(tick, now_s, valid_until_s, now_s - oldest_s, state, reason, mode, numbers)
+
+    def _adopted(self, zero: MachineZero | StateError) -> _ZeroVectors:
+        """The zero of this tick; with a new one nothing that was measured from the old one is kept."""
+        if not isinstance(zero, MachineZero):
+            problem = zero.problems[0]
+            raise _Invalid(State.NO_ZERO, f"{problem.what}; {problem.next_step}" if problem.next_step else problem.what)
+        if zero is not self._zero or self._zero_vectors is None:
+            self._zero = zero
+            self._zero_vectors = _ZeroVectors(
+                self._wires.scale.zero_vector(zero), self._wires.comparators.zero_vector(zero)
+            )
+            self._last_good = None
+            self._warm = WarmStart.at_zero(self._model)
+        return self._zero_vectors
+
+    def _comparators(self, snapshot: Snapshot, zero: _ZeroVectors) -> Usable:
+        """Joint and frame comparators as a set: the live one, or what `on_stale` makes of the last."""
+        read = self._wires.comparators.read(snapshot, zero.comparators_mm)
+        live = None if read.lost else Comparators(read.change_mm, snapshot.time_s, read.oldest_s)
+        set_ = usable(live, self._last_good, read.lost, snapshot.time_s, self._loop)
+        if live is not None:
+            self._last_good = live
+        if set_.comparators is None:
+            raise _Invalid(set_.state, set_.reason)
+        return set_
+
+    def _scales(self, snapshot: Snapshot, zero: _ZeroVectors) -> Lengths:
+        """Live or not at all: without its scales nobody knows where the tip is."""
+        scales = self._wires.scale.read(snapshot, zero.scale_mm)
+        if scales.lost:
+            raise _Invalid(State.STOP if self._scales_seen else State.STARTING, f"the tip is not known: {scales.lost}")
+        self._scales_seen = True
+        return scales
+
+    def _compensation(self, values: GaugeValues, target: Target | None) -> Compensation:
+        if target is None:
+            found, warm = compensate_cmm(self._model, values, self._warm)
+        else:
+            found, warm = compensate_machine_tool(
+                self._model, np.array(target.tip_mm), target.rotation_B0_rad, values, self._warm
+            )
+        code = int(found.reason)
+        if code:
+            # the next cycle starts from machine zero: a start that failed once may fail for ever
+            self._warm = WarmStart.at_zero(self._model)
+            what = "this pose" if target is None else "this target"
+            raise _Invalid(State.REFUSED, f"{what} cannot be computed: {MEANING[Reason(code)]}")
+        self._warm = warm
+        return found
+
+    def _held_back(self, found: Compensation, scale_mm: Array, applied_mm: Array) -> Compensation:
+        """CMM mode at the limit: the tip moves with what is applied, not with what the comparators ask for.
+
+        The scales less the correction, by uncompensated kinematics: the tip to second order in the correction.
+        """
+        believed = self._no_comparators._replace(scale_mm=scale_mm - applied_mm)
+        tip, _ = compensate_cmm(self._model, believed, self._warm)
+        if int(tip.reason):
+            raise _Invalid(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(int(tip.reason))]}")
+        return found._replace(
+            tip_M_mm=tip.tip_M_mm, tip_B0_mm=tip.tip_B0_mm, tip_P_mm=tip.tip_P_mm, link_length_mm=tip.link_length_mm
+        )
+
+    def _numbers(self, found: Compensation, applied_mm: Array) -> Numbers:
+        frame = found.frame
+        return Numbers(
+            found.tip_M_mm, found.tip_B0_mm, found.tip_P_mm if self._wires.tool_on_plate else None,
+            frame.origin_M_mm, frame.displacement_M_mm, frame.rotation_M_rad, found.link_length_mm,
+            found.nominal_scale_mm + applied_mm, applied_mm, found.sources,
+        )  # fmt: skip
+
+
+def _worse(set_: Usable, state: State, reason: str) -> tuple[State, str]:
+    """One state for the stale policy and the limits: a clamp is told first, then hold or fade, then slewing."""
+    if set_.state is State.OK:
+        return state, reason
+    told = state if state is State.CLAMPED else set_.state
+    return told, f"{set_.reason}; {reason}" if reason else set_.reason

@@ -111,6 +111,7 @@ class MachineWires:
             ]
         )
         self.joints = len(wiring.joint)
+        self.tool_on_plate = configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
 
     @property
