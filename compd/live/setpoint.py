@@ -56,6 +56,8 @@ _FLAG_VALID = 1
 _FLAG_TOOL_ON_PLATE = 2  # the tip's three numbers are then tip_P
 PACKET_SIZE = _PACKET.size + 4
 _LINKS = 6
+# One encoder for all: json.dumps() makes a new one for every call that is not plain.
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 _NO_NUMBERS = (math.nan,) * (9 + 3 * _LINKS)
 
 
@@ -120,7 +122,7 @@ class Setpoint(NamedTuple):
             message["age_s"] = round(self.age_s, _DECIMALS_S)
         if self.numbers is not None:
             message |= _plain(self.numbers)
-        return json.dumps(message, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+        return _encode(message).encode() + b"\n"
 
     def to_packet(self, config_hash: bytes) -> bytes:
         """`PACKET_SIZE` bytes, little-endian; the links a machine does not have are nan.
