@@ -1,0 +1,1 @@
+"""Every driver against every fault that a wire can have: `compd driver test`."""
