@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from compd.client import Client
+from compd.client import connect
 from compd.configuration import Configuration
 from compd.configuration.geometry import ToolOnPlatform
 from compd.errors import DaemonError, Problem
@@ -24,6 +24,10 @@ KINDS = ("none", "joints", "full")
 SETPOINT_RATE_HZ = 50.0
 # At rest for as long as the slowest gauge needs to be read anew, and a little more.
 DWELL_S = 0.5
+# The links follow the setpoint's last micrometres all the time; nearer than this they are there.
+ARRIVED_MM = 0.005
+# Taking machine zero looks at the gauges for a second.
+ANSWER_TIMEOUT_S = 15.0
 # The targets: a box around machine zero that every shipped machine reaches.
 REACH_MM = (60.0, 60.0, 40.0)
 
@@ -90,19 +94,22 @@ def run_session(
     tool_moves = isinstance(configuration.geometry.tool, ToolOnPlatform)
     with (
         MachineController(directory / "control.sock") as machine,
-        Client.unix(directory / "compd.sock") as zeroing,
-        Client.unix(directory / "compd.sock") as daemon,
+        connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer,
+        connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon,
     ):
-        zeroing.zero()
-        start_s = time.monotonic()
         setpoints = daemon.watch(SETPOINT_RATE_HZ)
+        for _ in setpoints:
+            if all(gauge["quality"] == "ok" for gauge in observer.status()["gauges"]):
+                break
+        observer.zero()
+        start_s = time.monotonic()
         while (elapsed_s := time.monotonic() - start_s) < seconds:
             target_mm = _next_target(configuration, random)
             if tool_moves:
                 daemon.target(tip_B0_mm=_in_B0(configuration, target_mm).tolist())
             else:
                 daemon.target(tip_P_mm=target_mm.tolist())
-            at_rest_since_s = math.inf
+            arrived_s = math.inf
             for setpoint in setpoints:
                 session.setpoints.append(setpoint)
                 elapsed_s = time.monotonic() - start_s
@@ -112,15 +119,15 @@ def run_session(
                 if not setpoint["valid"] or setpoint["mode"] != "machine_tool":
                     continue
                 truth = machine.ask("DRIVE", scale_mm=setpoint["scale_setpoint_mm"])
-                now_s = time.monotonic()
-                if truth["moving"]:
-                    at_rest_since_s = math.inf
-                elif at_rest_since_s == math.inf:
-                    at_rest_since_s = now_s
-                elif now_s - at_rest_since_s >= DWELL_S:
+                left_mm = np.abs(np.subtract(truth["scale_mm"], setpoint["scale_setpoint_mm"])).max()
+                if left_mm > ARRIVED_MM:
+                    arrived_s = math.inf
+                elif arrived_s == math.inf:
+                    arrived_s = elapsed_s
+                elif elapsed_s - arrived_s >= DWELL_S:
                     session.visits.append(_visit(machine, elapsed_s, target_mm, setpoint))
                     break
-        session.status = zeroing.status()
+        session.status = observer.status()
     return session
 
 
