@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from compd.cli.background import Command, running
-from compd.cli.demo_session import MachineController
+from compd.cli.demo_session import MachineController, wait_for_gauges
 from compd.client import Client, connect
 
 ROOT = Path(__file__).parents[1]
@@ -79,6 +79,7 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
         machine.ask("DRIVE", scale_mm=[0.0, 0.0, 0.0])
         chain.until("at zero", lambda _: not machine.ask("TRUTH")["moving"])
         with connect(directory / "compd.sock", PATIENCE_S) as operator:
+            wait_for_gauges(operator, chain.setpoints)
             operator.zero()
         chain.until("valid after zero", lambda s: s["state"] == "ok")
         yield chain

@@ -34,21 +34,33 @@ def error_rows(session: Session) -> list[list[str]]:
     return rows
 
 
+LOOP_ROWS = {
+    "rate_hz": "loop rate, Hz",
+    "cycles": "cycles",
+    "missed_cycles": "missed cycles",
+    "period_mean_ms": "period, mean, ms",
+    "period_deviation_ms": "period, standard deviation, ms",
+    "lateness_median_us": "wake-up lateness, median, us",
+    "lateness_p99_us": "wake-up lateness, 99 %, us",
+    "cycle_median_us": "time per cycle, median, us",
+}
+
+
 def timing_rows(session: Session) -> list[list[str]]:
     """The loop's period and the gauges' ages, as the daemon and its setpoints tell them."""
     loop = session.status.get("loop", {})
+    rows = [[label, f"{loop[key]:.4g}"] for key, label in LOOP_ROWS.items() if key in loop]
     ages = [message["age_s"] * 1e3 for message in session.setpoints if "age_s" in message]
-    rows = [[key.replace("_", " "), f"{value:.6g}"] for key, value in loop.items() if isinstance(value, int | float)]
     if ages:
-        rows.append(["age of the oldest gauge used, median / largest",
-                     f"{np.median(ages):.1f} / {max(ages):.1f} ms"])  # fmt: skip
+        rows.append(["age of the oldest gauge, median, ms", f"{np.median(ages):.1f}"])
+        rows.append(["age of the oldest gauge, largest, ms", f"{max(ages):.1f}"])
     return rows
 
 
 def progress(session: Session, elapsed_s: float, seconds: float, setpoint: dict[str, Any]) -> RenderableType:
     """The live table: the newest points, and the setpoint in force."""
-    table = TerminalTable("s", "target, mm", *(f"{LABELS[kind]}, um" for kind in KINDS),
-                          title=f"distance of the true tip from its target; {len(session.visits)} points")  # fmt: skip
+    table = TerminalTable("s", "target, mm", *LABELS.values(),
+                          title=f"distance of the true tip from its target, um; {len(session.visits)} points")  # fmt: skip
     for visit in session.visits[-10:]:
         table.add_row(f"{visit.time_s:.1f}", " ".join(f"{x:7.2f}" for x in visit.target_mm),
                       *(f"{visit.error_um[kind]:.2f}" for kind in KINDS))  # fmt: skip
@@ -57,16 +69,16 @@ def progress(session: Session, elapsed_s: float, seconds: float, setpoint: dict[
     return Group(table, line, ProgressBar(total=seconds, completed=min(elapsed_s, seconds), width=60))
 
 
-def summarise(session: Session) -> TerminalTable:
-    """The table at the end of the demo."""
-    table = TerminalTable("tip error against the truth", "rms", "95 %", "largest",
-                          title=f"{session.machine}: {len(session.visits)} points measured at rest")  # fmt: skip
+def summarise(session: Session) -> RenderableType:
+    """The tables at the end of the demo."""
+    errors = TerminalTable("tip error against the truth", "rms", "95 %", "largest",
+                           title=f"{session.machine}: {len(session.visits)} points measured at rest")  # fmt: skip
     for row in error_rows(session):
-        table.add_row(*row)
-    table.add_section()
-    for name, value in timing_rows(session):
-        table.add_row(name, value, "", "")
-    return table
+        errors.add_row(*row)
+    timing = TerminalTable("loop and gauges", "")
+    for row in timing_rows(session):
+        timing.add_row(*row)
+    return Group(errors, timing)
 
 
 def verdict(session: Session) -> str:
@@ -144,5 +156,5 @@ def _spread(session: Session) -> Figure:
     for kind in KINDS:
         figure.add_trace(Box(y=[visit.error_um[kind] for visit in session.visits], name=LABELS[kind], boxpoints="all",
                              marker_color=KIND_COLOURS[kind], showlegend=False))  # fmt: skip
-    figure.update_yaxes(type="log")
+    figure.update_yaxes(type="log", dtick=1)
     return styled(figure, "", "tip error, um")

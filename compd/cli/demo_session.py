@@ -6,7 +6,7 @@ import json
 import math
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from compd.client import connect
+from compd.client import Client, connect
 from compd.configuration import Configuration
 from compd.configuration.geometry import ToolOnPlatform
 from compd.errors import DaemonError, Problem
@@ -98,9 +98,7 @@ def run_session(
         connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon,
     ):
         setpoints = daemon.watch(SETPOINT_RATE_HZ)
-        for _ in setpoints:
-            if all(gauge["quality"] == "ok" for gauge in observer.status()["gauges"]):
-                break
+        wait_for_gauges(observer, setpoints)
         observer.zero()
         start_s = time.monotonic()
         while (elapsed_s := time.monotonic() - start_s) < seconds:
@@ -129,6 +127,13 @@ def run_session(
                     break
         session.status = observer.status()
     return session
+
+
+def wait_for_gauges(observer: Client, setpoints: Iterator[dict[str, Any]]) -> None:
+    """Return once every gauge reads well; `setpoints` gives the pace."""
+    for _ in setpoints:
+        if all(gauge["quality"] == "ok" for gauge in observer.status()["gauges"]):
+            return
 
 
 def _visit(machine: MachineController, elapsed_s: float, target_mm: NDArray[Any], setpoint: dict[str, Any]) -> Visit:

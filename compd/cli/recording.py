@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from compd.configuration import Configuration
+    from compd.errors import Problem
     from compd.workbench.recording import Recording
 
 recording = typer.Typer(no_args_is_help=True, help="Recordings: readings of the machine beside a reference.")
@@ -28,30 +30,98 @@ def check(
     ] = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
-    from compd.workbench.reader import read_recording
-
-    found = read_recording(path, _configuration(path, machine), needs_reference=False)
+    found, _ = read_with_machine(path, machine, needs_reference=False)
     for warning in found.warnings:
         typer.echo(f"warning: {warning}")
     for line in _summary(found):
         typer.echo(line)
 
 
-def _configuration(path: Path, machine: Path | None) -> Configuration | None:
-    """The configuration given, or the shipped one that the sidecar names; None for an external model."""
+def read_with_machine(
+    path: Path, machine: Path | None, needs_reference: bool = True
+) -> tuple[Recording, Configuration | None]:
+    """The recording, and the configuration of its machine: the one given, else the shipped one of its name.
+
+    None for an external model. Raises RecordingError with the problems of both files and of the machine together.
+    """
+    from compd.errors import RecordingError
+    from compd.workbench.reader import read_recording
+
+    problems: list[Problem] = []
+    configuration = _configuration(path.with_suffix(".yaml"), machine, problems)
+    try:
+        found = read_recording(path, configuration, needs_reference)
+    except RecordingError as error:
+        raise RecordingError([*problems, *error.problems]) from error
+    if problems:
+        raise RecordingError(problems)
+    return found, configuration
+
+
+def _configuration(sidecar_path: Path, machine: Path | None, problems: list[Problem]) -> Configuration | None:
     from compd.configuration import load
-    from compd.errors import Problem, RecordingError
-    from compd.shipped import shipped_machines
+    from compd.errors import CompdError, Problem
+    from compd.shipped import shipped_configuration
     from compd.workbench.sidecar import EXTERNAL, read_sidecar
 
     if machine is not None:
         return load(machine)
-    ignored: list[Problem] = []  # the reader reports them again, with everything else
-    sidecar = read_sidecar(path.with_suffix(".yaml"), ignored)
+    reported_by_the_reader: list[Problem] = []
+    sidecar = read_sidecar(sidecar_path, reported_by_the_reader)
     if sidecar is None or sidecar.machine in ("", EXTERNAL):
         return None
-    return None
+    try:
+        # a name, not a path: `..` or `/` would leave the place where configurations are
+        name = sidecar.machine if re.fullmatch(r"[\w-]+", sidecar.machine) else "-"
+        return load(shipped_configuration(f"{name}.yaml"))
+    except CompdError:
+        problems.append(
+            Problem(str(sidecar_path), "no configuration of this machine comes with compd", repr(sidecar.machine),
+                    next_step="give it with --machine PATH, or mend `machine:` in the sidecar")
+        )  # fmt: skip
+        return None
 
 
 def _summary(found: Recording) -> list[str]:
-    return [str(found.rows)]
+    """What a person wants to see before trusting a recording: sizes, reference, and every row that is not used."""
+    gauges = [
+        f"{values.shape[1]} {name}"
+        for name, values in (
+            ("scales", found.scale_mm),
+            ("joint comparators", found.joint_mm),
+            ("frame comparators", found.frame_mm),
+        )
+        if values is not None
+    ]
+    needed = (*found.gauge_columns, *found.reference_columns, *found.model_columns)
+    usable = found.usable(needed)
+    hours = (found.time_s[-1] - found.time_s[0]) / 3600.0
+    lines = [
+        f"{found.path}: {found.machine}, {found.rows} rows over {hours:.2f} h, {_sessions(found)}",
+        f"    gauges: {', '.join(gauges) or 'none'}; {len(found.quantities)} other quantities; "
+        f"approach {'recorded' if found.approach_measured else 'from the scales' if gauges else 'not known'}",
+        f"    reference: {_reference(found)}",
+        f"    {int(usable.mask.sum())} rows have all of these",
+    ]
+    lines += [f"    {count} rows left out: {why}" for why, count in {**found.left_out, **usable.left_out}.items()]
+    reasons = dict.fromkeys(found.sidecar.excluded.values())
+    lines += [f"    excluded: {reason}" for reason in reasons]
+    return [*lines, f"    sha256 {found.sha256}"]
+
+
+def _sessions(found: Recording) -> str:
+    if found.session is None:
+        return f"no sessions: {len(set(found.fold.tolist()))} blocks of time"
+    return f"{len(set(found.session.tolist()))} sessions"
+
+
+def _reference(found: Recording) -> str:
+    reference = found.reference
+    if reference is None:
+        return "none yet; put an instrument's export beside it with `compd join`"
+    parts = [reference.quantity, ", ".join(found.reference_columns)]
+    if reference.quantity != "link_length":
+        parts.append(f"in the {reference.frame}'s frame")
+    sigma = ", ".join(f"{value:g}" for value in reference.sigma_um)
+    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} um")
+    return "; ".join(parts)
