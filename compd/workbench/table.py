@@ -1,0 +1,215 @@
+"""A CSV file as columns of numbers with the rows that a spreadsheet shows; every wrong cell is reported.
+
+Tolerated, because it can mean one thing only: a byte order mark, Windows line ends, spaces around a cell, quotes,
+empty rows and columns at the end. Everything else that a spreadsheet may write is refused in words.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from compd.workbench.cells import AMBIGUOUS_COMMA, DECIMAL_COMMA, CellFault, fault_of
+from compd.workbench.faults import Faults, column_letters, rows_text, values_text
+from compd.workbench.grid import IsHeader, read_grid
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# A file of these alone can be parsed fast: nothing in it can be anything but numbers, commas and line ends.
+_PLAIN = b"0123456789eE+-.,\r\n"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one CSV file.
+
+    Attributes
+    ----------
+    path : the file.
+    content : its bytes, for a hash.
+    letters : column name -> the letters over it in a spreadsheet, in order.
+    columns : name -> (N,) float64, nan where the cell is empty (or was reported as wrong).
+    row : (N,) the row as a spreadsheet numbers it; the header is row 1.
+    labels : name -> the different texts of a column of ids, in the order of their codes in `columns`.
+    blank_rows : empty rows between others; they are not in `columns`.
+    """
+
+    path: Path
+    content: bytes
+    letters: Mapping[str, str]
+    columns: dict[str, FloatArray]
+    row: IntArray
+    labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    blank_rows: int = 0
+
+    def place(self, name: str) -> str:
+        """A column for a person: its name and the letters over it."""
+        return f"column {name} ({self.letters[name]})" if name in self.letters else f"column {name}"
+
+
+def read_table(path: Path, faults: Faults, is_header: IsHeader, id_columns: Collection[str] = ()) -> Table | None:
+    """Read `path`; what is wrong goes to `faults`, and reading goes on as far as it makes sense.
+
+    is_header : whether these cells are the header that is looked for.
+    id_columns : columns that may hold text; their cells become codes 0, 1, 2 ... in sorted order.
+
+    Returns None where there is no table at all.
+    """
+    content = _content(path, faults)
+    if content is None:
+        return None
+    head, _, body = content.removeprefix(b"\xef\xbb\xbf").partition(b"\n")
+    names = [name.strip() for name in head.decode("ascii", "replace").split(",")]
+    plain = not body.translate(None, _PLAIN) and b'"' not in head and is_header(names)
+    if plain and _names_are_sound(names):
+        lines = body.splitlines()
+        if all(line.count(b",") == len(names) - 1 or not line for line in lines):
+            table = _read_plain(path, content, names, body)
+            if table is not None:
+                return table
+    return _read_any(path, content, faults, is_header, id_columns)
+
+
+def _content(path: Path, faults: Faults) -> bytes | None:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        faults.add("", f"cannot be read: {error.strerror}", next_step="give the path of a CSV file")
+        return None
+    if content.startswith(b"PK\x03\x04"):
+        faults.add("", "is a spreadsheet's own file, not CSV", next_step="in the spreadsheet: save as CSV (UTF-8)")
+        return None
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        faults.add("", "is written in UTF-16", allowed="UTF-8", next_step="in the spreadsheet: save as CSV (UTF-8)")
+        return None
+    if not content.strip():
+        faults.add("", "is empty", allowed="a header and at least two rows")
+        return None
+    return content
+
+
+def _names_are_sound(names: Sequence[str]) -> bool:
+    return all(names) and len(set(names)) == len(names)
+
+
+def _read_plain(path: Path, content: bytes, names: list[str], body: bytes) -> Table | None:
+    """The fast way; None when a cell is no number after all, so that the slow way can say which."""
+    try:
+        frame = pd.read_csv(
+            io.BytesIO(body),
+            header=None,
+            names=names,
+            dtype="float64",
+            keep_default_na=False,
+            na_values=[""],
+            skip_blank_lines=False,
+            float_precision="round_trip",
+        )
+    except ValueError:
+        return None
+    values = frame.to_numpy(np.float64)
+    if np.isinf(values).any():
+        return None
+    filled = ~np.isnan(values).all(axis=1)
+    row = np.flatnonzero(filled) + 2
+    blank = int(row[-1] - 1 - len(row)) if len(row) else 0
+    columns = {name: np.ascontiguousarray(values[filled, i]) for i, name in enumerate(names)}
+    letters = {name: column_letters(i) for i, name in enumerate(names)}
+    return Table(path, content, letters, columns, row.astype(np.int64), blank_rows=blank)
+
+
+def _read_any(
+    path: Path, content: bytes, faults: Faults, is_header: IsHeader, id_columns: Collection[str]
+) -> Table | None:
+    """The careful way: every cell as text first."""
+    grid = read_grid(content, faults, is_header)
+    if grid is None:
+        return None
+    row = np.array([number for number, _ in grid.rows], dtype=np.int64)
+    columns: dict[str, FloatArray] = {}
+    labels: dict[str, tuple[str, ...]] = {}
+    commas = _Commas()
+    for name, index in grid.names.items():
+        cells = [cells[index] for _, cells in grid.rows]
+        values = _plain_numbers(cells)
+        if values is None and name in id_columns:
+            labels[name], values = _codes(cells)
+        if values is None:
+            place = f"column {name} ({column_letters(index)})"
+            values = _checked_numbers(place, cells, row, faults, commas)
+        columns[name] = values
+    commas.report(faults)
+    letters = {name: column_letters(index) for name, index in grid.names.items()}
+    return Table(path, content, letters, columns, row, labels, grid.blank_rows)
+
+
+def _plain_numbers(cells: Sequence[str]) -> FloatArray | None:
+    """The column as numbers; None when any cell is something else."""
+    if "".join(cells).translate(_NOTHING_BUT_NUMBERS):
+        return None
+    try:
+        values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
+    except ValueError:
+        return None
+    return None if np.isinf(values).any() else values
+
+
+_NOTHING_BUT_NUMBERS = str.maketrans("", "", "0123456789eE+-.")
+
+
+def _codes(cells: Sequence[str]) -> tuple[tuple[str, ...], FloatArray]:
+    labels = tuple(sorted({cell for cell in cells if cell}))
+    code = {label: float(i) for i, label in enumerate(labels)}
+    return labels, np.array([code.get(cell, np.nan) for cell in cells], dtype=np.float64)
+
+
+class _Commas:
+    """Cells with a comma, which come in every column at once: one problem for them all."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, None] = {}
+        self.rows: set[int] = set()
+        self.values: list[str] = []
+        self.fault = AMBIGUOUS_COMMA
+
+    def add(self, place: str, fault: CellFault, rows: IntArray, values: Sequence[str]) -> None:
+        """One decimal comma for certain decides what the ambiguous ones are."""
+        self.places[place] = None
+        self.rows.update(rows.tolist())
+        self.values += values
+        if fault is DECIMAL_COMMA:
+            self.fault = fault
+
+    def report(self, faults: Faults) -> None:
+        if self.places:
+            faults.add(f"{', '.join(self.places)}, {rows_text(sorted(self.rows))}", self.fault.what,
+                       values_text(self.values), self.fault.allowed, self.fault.next_step)  # fmt: skip
+
+
+def _checked_numbers(place: str, cells: Sequence[str], row: IntArray, faults: Faults, commas: _Commas) -> FloatArray:
+    """The column's numbers, nan where a cell is wrong; one problem for each kind of wrong cell."""
+    values = np.full(len(cells), np.nan)
+    wrong: dict[CellFault, list[int]] = {}
+    for i, cell in enumerate(cells):
+        if not cell:
+            continue
+        fault = fault_of(cell)
+        if fault is None:
+            values[i] = float(cell)
+        else:
+            wrong.setdefault(fault, []).append(i)
+    for fault, indices in wrong.items():
+        found = [cells[i] for i in indices]
+        if fault in (DECIMAL_COMMA, AMBIGUOUS_COMMA):
+            commas.add(place, fault, row[indices], found)
+        else:
+            faults.add(f"{place}, {rows_text(row[indices].tolist())}", fault.what, values_text(found),
+                       fault.allowed, fault.next_step)  # fmt: skip
+    return values

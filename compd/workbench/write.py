@@ -1,0 +1,102 @@
+"""Writing a recording: both files whole, or neither."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+from numpy.typing import ArrayLike
+
+from compd.errors import Problem, RecordingError
+from compd.workbench.columns import is_covariate, known
+from compd.workbench.table import FloatArray
+from compd.workbench.units import unit_of
+
+# Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
+# that a conversion from mm to um leaves no digits of its own behind. Other units are written in full.
+DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
+
+
+def write_recording(
+    path: Path, columns: Mapping[str, ArrayLike], sidecar: Mapping[str, Any], overwrite: bool = False
+) -> None:
+    """Write NAME.csv (`path`) and NAME.yaml beside it.
+
+    columns : name with unit -> (N,) numbers in that unit, nan (an empty cell) where nothing was measured.
+    sidecar : what the YAML file is to hold.
+
+    Both are written beside their place, flushed to the disk and then renamed, the sidecar first: a reader never
+    sees half a file, and a failure leaves what was there. Raises RecordingError for names that are not the
+    format's, unequal lengths, infinite numbers, a time_s that is missing or does not rise, an existing file
+    without `overwrite`, and a disk that does not take the files.
+    """
+    arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
+    if problems := _problems(path, arrays, overwrite):
+        raise RecordingError(problems)
+    frame = pd.DataFrame({name: _cells(name, values) for name, values in arrays.items()})
+    csv_text = frame.to_csv(index=False, lineterminator="\n")
+    yaml_text = yaml.safe_dump(dict(sidecar), sort_keys=False, allow_unicode=True)
+    _write_all({path.with_suffix(".yaml"): yaml_text, path: csv_text})
+
+
+def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
+    problems = []
+    for target in (path, path.with_suffix(".yaml")):
+        if target.exists() and not overwrite:
+            problems.append(Problem(str(target), "is there already", next_step="choose another name, or remove it"))
+    if path.suffix != ".csv":
+        problems.append(Problem(str(path), "a recording is NAME.csv", path.suffix, ".csv"))
+    for name, values in arrays.items():
+        where = f"{path}: column {name}"
+        if known(name) is None and not is_covariate(name):
+            problems.append(Problem(where, "no column of the format", name, "see the format, or <name>_<unit>"))
+        if values.ndim != 1 or len(values) != len(next(iter(arrays.values()))):
+            problems.append(Problem(where, "not as long as the others", str(values.shape)))
+        if np.isinf(values).any():
+            problems.append(Problem(where, "holds an infinite number", allowed="a number, or nan for an empty cell"))
+    time_s = arrays.get("time_s")
+    if time_s is None or np.isnan(time_s).any() or (np.diff(_rounded("time_s", time_s)) <= 0).any():
+        problems.append(Problem(f"{path}: column time_s", "is missing, or does not rise by a microsecond every row"))
+    return problems
+
+
+def _rounded(name: str, values: FloatArray) -> FloatArray:
+    """Values with the decimals of their unit."""
+    column = known(name)
+    unit = column.unit if column else unit_of(name)
+    return np.round(values, DECIMALS[unit]) if unit in DECIMALS else values
+
+
+def _cells(name: str, values: FloatArray) -> pd.Series[Any]:
+    """A column as it is written: ids and directions as whole numbers, the rest with a point."""
+    column = known(name)
+    whole = column is not None and not column.unit
+    return pd.Series(_rounded(name, values)).astype("Int64") if whole else pd.Series(_rounded(name, values))
+
+
+def _write_all(texts: Mapping[Path, str]) -> None:
+    """Every text to its file, or none: temporary files beside them, flushed, then renamed."""
+    written: list[tuple[str, Path]] = []
+    try:
+        for target, text in texts.items():
+            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            written.append((temporary, target))
+            with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+        for temporary, target in written:
+            # a temporary file is for its owner alone; a recording is read like any other file
+            Path(temporary).chmod(0o644)
+            Path(temporary).replace(target)
+    except OSError as error:
+        for temporary, _ in written:
+            Path(temporary).unlink(missing_ok=True)
+        first = next(iter(texts))
+        raise RecordingError(Problem(str(first.parent), f"cannot be written to: {error.strerror}")) from error
