@@ -59,8 +59,10 @@ def timing_rows(session: Session) -> list[list[str]]:
 
 def progress(session: Session, elapsed_s: float, seconds: float, setpoint: dict[str, Any]) -> RenderableType:
     """The live table: the newest points, and the setpoint in force."""
-    table = TerminalTable("s", "target, mm", *LABELS.values(),
-                          title=f"distance of the true tip from its target, um; {len(session.visits)} points")  # fmt: skip
+    title = f"distance of the true tip from its target, um; {len(session.visits)} points"
+    table = TerminalTable(title=title)
+    for head in ("s", "target, mm", *LABELS.values()):
+        table.add_column(head, justify="right", no_wrap=True)
     for visit in session.visits[-10:]:
         table.add_row(f"{visit.time_s:.1f}", " ".join(f"{x:7.2f}" for x in visit.target_mm),
                       *(f"{visit.error_um[kind]:.2f}" for kind in KINDS))  # fmt: skip
