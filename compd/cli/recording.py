@@ -70,16 +70,17 @@ def _configuration(sidecar_path: Path, machine: Path | None, problems: list[Prob
     sidecar = read_sidecar(sidecar_path, reported_by_the_reader)
     if sidecar is None or sidecar.machine in ("", EXTERNAL):
         return None
+    # a name, not a path: `..` or `/` would leave the place where configurations are
+    name = sidecar.machine if re.fullmatch(r"[\w-]+", sidecar.machine) else "-"
     try:
-        # a name, not a path: `..` or `/` would leave the place where configurations are
-        name = sidecar.machine if re.fullmatch(r"[\w-]+", sidecar.machine) else "-"
-        return load(shipped_configuration(f"{name}.yaml"))
+        shipped = shipped_configuration(f"{name}.yaml")
     except CompdError:
         problems.append(
             Problem(str(sidecar_path), "no configuration of this machine comes with compd", repr(sidecar.machine),
                     next_step="give it with --machine PATH, or mend `machine:` in the sidecar")
         )  # fmt: skip
         return None
+    return load(shipped)
 
 
 def _summary(found: Recording) -> list[str]:

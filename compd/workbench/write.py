@@ -46,10 +46,11 @@ def write_recording(
 
 
 def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
-    problems = []
-    for target in (path, path.with_suffix(".yaml")):
-        if target.exists() and not overwrite:
-            problems.append(Problem(str(target), "is there already", next_step="choose another name, or remove it"))
+    problems = [
+        Problem(str(target), "is there already", next_step="choose another name, or remove it")
+        for target in (path, path.with_suffix(".yaml"))
+        if target.exists() and not overwrite
+    ]
     if path.suffix != ".csv":
         problems.append(Problem(str(path), "a recording is NAME.csv", path.suffix, ".csv"))
     for name, values in arrays.items():
