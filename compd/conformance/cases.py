@@ -166,7 +166,7 @@ def _later(session: Session, subject: Subject) -> Result:
         session.settle()
         complaints += _complaints(session.recover()[1], GOOD)
     if complaints and not subject.registers:
-        return Result(case, "", f"not detectable on this wire, choose a long timeout: {complaints[0]}", "-")
+        return Result(case, "", f"a reply beyond timeout and rest is not told from the next: {complaints[0]}", "-")
     return _result(case, wanted, ", ".join(sorted(came)), complaints)
 
 

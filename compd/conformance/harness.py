@@ -130,6 +130,10 @@ class Session:
             now_s = self.wire.clock.monotonic()
             self._after(fault)
             return [bad(now_s, fault.quality, fault.detail)] * len(self.gauge.channels)
+        except Exception as error:  # noqa: BLE001  a driver is anybody's code: what it raises is a finding
+            self._after(LineFault(Quality.DRIVER_ERROR))
+            text = f"raised {type(error).__name__}: {error}"
+            return [bad(self.wire.clock.monotonic(), Quality.DRIVER_ERROR, text)] * len(self.gauge.channels)
 
     def _after(self, fault: LineFault) -> None:
         """As the line's thread does: drain, or close what is lost."""
