@@ -59,6 +59,9 @@ class HeidenhainNd28x(Gauge[ByteLine]):
     def channels(self) -> Sequence[Channel]:
         return (Channel("position"),)
 
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        return [(len(STX), REPLY_LENGTH)]
+
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: MISMATCH for anything but a whole reply in the configured unit."""
         return self._continuity.read(lambda: self._ask(line))

@@ -9,8 +9,8 @@ The protocol has no checksum: a value that jumps is asked for twice.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -46,6 +46,7 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
 
     Options = KeyenceGt2DlRs1aOptions
     line_kind = "bytes"
+    sample_options: ClassVar[Mapping[str, Any]] = {"heads": 9}
 
     def __init__(self, options: KeyenceGt2DlRs1aOptions) -> None:
         super().__init__(options)
@@ -58,6 +59,9 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        return [(len(self._name + END), self._limit)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but one field per head."""

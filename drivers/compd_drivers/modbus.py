@@ -13,8 +13,8 @@ public register map was found, so the map is yours, out of your module's manual;
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from typing import Annotated, Literal, NamedTuple, Self
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -107,6 +107,16 @@ class Modbus(Gauge[RegisterLine]):
 
     Options = ModbusOptions
     line_kind = "registers"
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "unit": 1,
+        "channels": [
+            {"name": "a", "function": 4, "address": 0, "type": "float32", "unit": "mm"},
+            {"name": "b", "function": 4, "address": 2, "type": "int16", "scale": 1e-4, "unit": "mm",
+             "lowest": -3.2, "highest": 3.2},
+            {"name": "c", "function": 3, "address": 8, "type": "int32", "word_order": "low_first", "scale": 1e-6,
+             "unit": "mm", "invalid": [2147483647]},
+        ],
+    }  # fmt: skip
 
     def __init__(self, options: ModbusOptions) -> None:
         super().__init__(options)
@@ -122,6 +132,9 @@ class Modbus(Gauge[RegisterLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        return [(8, 5 + 2 * block.length) for block in self.blocks]
 
     def read(self, line: RegisterLine) -> Sequence[Reading]:
         """Raises LineFault as the line does: a block that cannot be read leaves the whole gauge without values."""
