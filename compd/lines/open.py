@@ -15,6 +15,8 @@ Line = StreamLine | RtuMaster | ModbusTcp
 # Over TCP there are no character times; a second copy of a reply follows the first within this.
 TCP_GAP_S = 1e-3
 QUIET_CHARACTERS = 3.5  # before a request, on any serial line: as Modbus RTU asks
+# USB adapters hand over what has come once a millisecond; a second copy of a reply must be seen to begin.
+SERIAL_GAP_S = 2e-3
 
 
 class SerialSettings(Protocol):
@@ -59,7 +61,7 @@ def open_line(settings: SerialSettings | TcpSettings, clock: Clock) -> Line:
             TcpPort(settings.host, settings.port, settings.timeout_s), settings.timeout_s, TCP_GAP_S, clock
         )
     port = SerialPort(settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s)
-    quiet_s = max(QUIET_CHARACTERS * port.character_s, TCP_GAP_S)
+    quiet_s = max(QUIET_CHARACTERS * port.character_s, SERIAL_GAP_S)
     if settings.kind == "serial":
         return StreamLine(port, settings.timeout_s, quiet_s, clock)
     return RtuMaster(StreamLine(port, settings.timeout_s, max(quiet_s, gap_s(settings.baud)), clock))

@@ -23,7 +23,7 @@ from compd.simulation.modbus_slaves import Slaves
 from compd.simulation.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
 # Characters leave in pieces of this length: finer would only cost time of this computer.
-PIECE_S = 2e-3
+PIECE_S = 1e-3
 DAMAGED_BIT = 0x80
 
 # What is wrong with a line -> the reply as it then arrives, and how many line timeouts late.
