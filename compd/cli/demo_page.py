@@ -61,10 +61,10 @@ def progress(session: Session, elapsed_s: float, seconds: float, setpoint: dict[
     """The live table: the newest points, and the setpoint in force."""
     title = f"distance of the true tip from its target, um; {len(session.visits)} points"
     table = TerminalTable(title=title)
-    for head in ("s", "target, mm", *LABELS.values()):
+    for head in ("s", "target, mm", "without", "joints", "joints, frame"):
         table.add_column(head, justify="right", no_wrap=True)
     for visit in session.visits[-10:]:
-        table.add_row(f"{visit.time_s:.1f}", " ".join(f"{x:7.2f}" for x in visit.target_mm),
+        table.add_row(f"{visit.time_s:.1f}", " ".join(f"{x:6.1f}" for x in visit.target_mm),
                       *(f"{visit.error_um[kind]:.2f}" for kind in KINDS))  # fmt: skip
     correction = " ".join(f"{value * MM_TO_UM:+.2f}" for value in setpoint.get("correction_mm", []))
     line = f"setpoint {setpoint['seq']}: {setpoint['state']} {setpoint['reason']}  correction {correction} um"
