@@ -1,0 +1,64 @@
+"""The library: one file per port, one entry per physical cause. Anybody's effects are found the same way as drivers:
+by entry point (`compd.effects`), by path, or written as a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from compd.errors import PluginError, Problem
+from compd.model.effect import Effect
+from compd.model.effects import base_joint, frame, joint, link, platform_joint, reference, scale, tool
+from compd.model.written import formula_effect
+from compd.plugins import load, names
+
+ENTRY_POINTS = "compd.effects"
+
+# Along the way of the datum: readings, links, joints, tool, and what the reference instrument adds.
+BUNDLED: tuple[Effect, ...] = (
+    *scale.EFFECTS, *joint.EFFECTS, *frame.EFFECTS, *link.EFFECTS, *base_joint.EFFECTS, *platform_joint.EFFECTS,
+    *tool.EFFECTS, *reference.EFFECTS,
+)  # fmt: skip
+
+
+def library() -> dict[str, Effect]:
+    """Every effect that is installed, by id: the bundled ones, then those of other packages.
+
+    Raises PluginError where a package's effect cannot be loaded, is no Effect, or takes an id that is in use.
+    """
+    found = {effect.id: effect for effect in BUNDLED}
+    for name in names(ENTRY_POINTS):
+        where = f"entry point {name} in {ENTRY_POINTS}"
+        effect = _checked(load(ENTRY_POINTS, name, where), where)
+        if effect.id in found:
+            raise PluginError(
+                Problem(where, "this id is taken", effect.id, "an id of its own", "rename it, or remove the package")
+            )
+        found[effect.id] = effect
+    return found
+
+
+def find(declaration: str | Mapping[str, Any], where: str) -> Effect:
+    """An effect by its id, as /absolute/file.py:NAME, or written out as a formula.
+
+    where : the place in the person's file, for errors.  Raises PluginError, or ConfigurationError for a formula.
+    """
+    if not isinstance(declaration, str):
+        return formula_effect(declaration, where)
+    if ":" in declaration:
+        return _checked(load(ENTRY_POINTS, declaration, where), where)
+    known = library()
+    if declaration not in known:
+        raise PluginError(
+            Problem(where, "no such effect", declaration, ", ".join(known),
+                    "choose one of these, write /absolute/file.py:NAME, or write a formula")
+        )  # fmt: skip
+    return known[declaration]
+
+
+def _checked(thing: Any, where: str) -> Effect:
+    if not isinstance(thing, Effect):
+        raise PluginError(
+            Problem(where, "is not an effect", type(thing).__name__, "an object of compd.model.effect.Effect")
+        )
+    return thing

@@ -1,0 +1,228 @@
+"""What the effects make of the tip: the real forward model with something added at its ports, and its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.model.arrangement import ToolOnPlate
+from compd.model.effect import Deltas, Effect, Port, by_port, port_size, together
+from compd.model.frame import solve_frame
+from compd.model.jit import Floats, Ints
+from compd.model.kinematics import Mechanism, closure_at, forward_kinematics
+from compd.model.links import joint_shortening, link_length_mm
+from compd.model.machine import MachineModel
+from compd.model.rotation import compose, rotation_matrix
+from compd.model.rows import Rows
+from compd.model.transform import to_inner, to_outer
+
+# For derivatives of the frame: its curvature is 1 / 1 m, so that second differences vanish and rounding, 1e-13 mm,
+# stays below 1e-9.
+STEP_MM = 1e-3
+
+
+class Prediction(NamedTuple):
+    """What a perfect reference, or with deltas at `reference` a real one, shows.
+
+    tip_mm : (N, 3), the tip in {M}; with the tool on the plate the place on the work that it touches, in {P}.
+    rotation_M_P : (N, 3, 3).  link_length_mm : (N, n).
+    reason : (N,), a Reason; where it is not OK everything else is nan.
+    """
+
+    tip_mm: Floats
+    rotation_M_P: Floats
+    link_length_mm: Floats
+    reason: Ints
+
+
+class Sensitivity(NamedTuple):
+    """How a prediction changes with what is added at one port of `size` numbers.
+
+    tip : (N, 3, size), mm per mm (or per rad at the port `revolute_axis`).
+    rotation : (N, 3, size), rad per mm, about {M}'s axes.
+    link_length : (N, n, size).
+    """
+
+    tip: Floats
+    rotation: Floats
+    link_length: Floats
+
+
+def predict(model: MachineModel, rows: Rows, deltas: Deltas) -> Prediction:
+    """Equations (1), (3) and forward kinematics with `deltas` added at the machine's ports.
+
+    deltas : (N, size) per port, in mm (rad for directions); a port left out gets nothing.
+    A row fails as `solve_frame` and `forward_kinematics` do.
+    """
+    plate_points_M_mm = _points(model.frame.plate_points_M_mm, "plate", deltas)
+    geometry = model.frame._replace(plate_points_M_mm=plate_points_M_mm)
+    frame = solve_frame(geometry, model.zero.distances_mm + _added(rows.frame_mm, "frame", deltas))
+    shortening_mm, joint_reason = joint_shortening(model.joint_weights, _added(rows.joint_mm, "joint", deltas))
+    scale_mm = _added(rows.scale_mm, "scale", deltas)
+    length_mm = _added(link_length_mm(model.zero.link_length_mm, scale_mm, shortening_mm), "link", deltas)
+    mechanism = Mechanism(
+        _points(frame.base_joints_M_mm, "base_joint", deltas),
+        _points(model.platform_joints_P_mm, "platform_joint", deltas),
+        _points(model.revolute_axes_P, "revolute_axis", deltas),
+    )
+    pose = forward_kinematics(mechanism, length_mm, rows.origin_M_mm, rows.rotation_M_P)
+    # a tool on the platform has its vector in {P}; one that stands on the plate, in {M}
+    if isinstance(model.arrangement, ToolOnPlate):
+        tool_M_mm = _added(model.arrangement.tool_M_mm, "tool", deltas)
+        tip = to_inner(pose.rotation_M_P, pose.origin_M_mm, tool_M_mm)
+    else:
+        tool_P_mm = _added(model.arrangement.tool_P_mm, "tool", deltas)
+        tip = to_outer(pose.rotation_M_P, pose.origin_M_mm, tool_P_mm)
+    rotation = pose.rotation_M_P
+    if "reference" in deltas:
+        tip = tip + deltas["reference"][:, :3]
+        rotation = compose(rotation_matrix(deltas["reference"][:, 3:]), rotation)
+    reason = np.maximum(np.maximum(joint_reason, frame.reason), pose.reason)
+    return Prediction(tip, rotation, pose.link_length_mm, reason)
+
+
+def sensitivities(model: MachineModel, rows: Rows, ports: Collection[Port]) -> dict[Port, Sensitivity]:
+    """Derivatives of `predict` by what is added at each of `ports`, where nothing is added.
+
+    From the closure's derivatives; for the ports `frame` and `plate` by central differences through the octahedron.
+    Rows without a pose are nan.
+    """
+    count, n = len(rows), rows.links
+    mechanism = model.mechanism(rows.base_joints_M_mm)
+    close = closure_at(mechanism, rows.origin_M_mm, rows.rotation_M_P)
+    J = np.concatenate(
+        [
+            np.concatenate([close.length_by_displacement, close.length_by_rotation_mm], axis=2),
+            np.concatenate([close.offset_by_displacement, close.offset_by_rotation_mm], axis=2),
+        ],
+        axis=1,
+    )
+    good = np.isfinite(J).all(axis=(1, 2))
+    inverse = np.full_like(J, np.nan)
+    inverse[good] = np.linalg.inv(J[good])
+    pose_by_length, pose_by_offset = inverse[:, :, :n], inverse[:, :, n:]
+
+    lever_M = rows.tip_M_mm - rows.origin_M_mm
+    tip_by_pose = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), -_cross(lever_M)], axis=2)
+    tool_by_tip = np.broadcast_to(np.eye(3), (count, 3, 3))
+    tool = rows.rotation_M_P
+    if isinstance(model.arrangement, ToolOnPlate):
+        tip_by_pose = -rows.rotation_M_P.transpose(0, 2, 1) @ tip_by_pose
+        tool = rows.rotation_M_P.transpose(0, 2, 1)
+
+    def by_pose(pose: Floats) -> Sensitivity:
+        return Sensitivity(tip_by_pose @ pose, pose[:, 3:], np.zeros((count, n, pose.shape[2])))
+
+    axes_M = rows.revolute_axes_M
+    directions_P = rows.directions_M @ rows.rotation_M_P  # rows are R^T u
+    links_P = directions_P * rows.link_mm[:, :, None]
+    # a base joint shortens its link by u . a and turns the square angle by e . a; a platform joint the other way
+    base_joint = _each(pose_by_length, rows.directions_M) + _each(pose_by_offset, axes_M)
+    result: dict[Port, Sensitivity] = {}
+    for port in ports:
+        if port in ("scale", "link"):
+            result[port] = by_pose(pose_by_length)._replace(link_length=np.broadcast_to(np.eye(n), (count, n, n)))
+        elif port == "joint":
+            weights = -model.joint_weights
+            result[port] = by_pose(pose_by_length @ weights)._replace(
+                link_length=np.broadcast_to(weights, (count, *weights.shape))
+            )
+        elif port == "base_joint":
+            result[port] = by_pose(base_joint)
+        elif port in ("frame", "plate"):
+            result[port] = by_pose(base_joint @ _base_joints_by(model, rows, port))
+        elif port == "platform_joint":
+            axes_P = np.broadcast_to(model.revolute_axes_P, axes_M.shape)
+            result[port] = by_pose(-_each(pose_by_length, directions_P) - _each(pose_by_offset, axes_P))
+        elif port == "revolute_axis":
+            result[port] = by_pose(-_each(pose_by_offset, links_P[:, : axes_M.shape[1]]))
+        else:
+            size = port_size(port, rows)
+            tip = tool if port == "tool" else np.concatenate([tool_by_tip, np.zeros((count, 3, 3))], axis=2)
+            turned = np.zeros((count, 3, size))
+            if port == "reference":
+                turned[:, :, 3:] = np.eye(3)
+            result[port] = Sensitivity(tip, turned, np.zeros((count, n, size)))
+    return result
+
+
+def columns(effect: Effect, rows: Rows, basis: Floats, by: Mapping[Port, Sensitivity]) -> Sensitivity:
+    """The prediction's derivatives by an effect's fitted numbers: (N, 3, P), (N, 3, P), (N, n, P).
+
+    basis : (N, sum of port sizes, P), from `effect.basis`.  by : from `sensitivities`, for the effect's ports at least.
+    """
+    parts = [(by[port], values) for port, values in by_port(effect, rows, basis).items()]
+    tip, rotation, link_length = (
+        sum((sensitivity[i] @ values for sensitivity, values in parts), start=np.zeros(())) for i in range(3)
+    )
+    return Sensitivity(tip, rotation, link_length)
+
+
+def pull_back(link: Sensitivity, tip_residual_mm: Floats) -> Floats:
+    """The link lengths' errors (N, n), in mm, that would explain residuals (N, 3) at the tip.
+
+    link : the sensitivity of the port `link`. For a hexapod, whose attitude is free, the smallest such errors.
+    Rows without a pose are nan.
+    """
+    good = np.asarray(np.isfinite(link.tip).all(axis=(1, 2)))
+    found = np.full((len(good), link.tip.shape[2]), np.nan)
+    found[good] = (np.linalg.pinv(link.tip[good]) @ tip_residual_mm[good, :, None])[:, :, 0]
+    return found
+
+
+def shares(model: MachineModel, rows: Rows, deltas: Mapping[str, Deltas]) -> dict[str, Floats]:
+    """What each effect contributes to the prediction (N, 3), in mm: what it adds to those before it.
+
+    deltas : by effect id, in the model's order.  The shares add up to the whole but for rounding.
+    """
+    found: dict[str, Floats] = {}
+    names = list(deltas)
+    before = predict(model, rows, {}).tip_mm
+    for count, name in enumerate(names, start=1):
+        after = predict(model, rows, together([deltas[one] for one in names[:count]])).tip_mm
+        found[name] = after - before
+        before = after
+    return found
+
+
+def _added(value: Floats, port: Port, deltas: Deltas) -> Floats:
+    return value + deltas[port] if port in deltas else value
+
+
+def _points(points: Floats, port: Port, deltas: Deltas) -> Floats:
+    """Points (..., m, 3) and their deltas (N, 3 m)."""
+    return points + deltas[port].reshape(-1, *points.shape[-2:]) if port in deltas else points
+
+
+def _cross(vectors: Floats) -> Floats:
+    """(N, 3) -> (N, 3, 3) with M w = vector x w."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+
+
+def _each(by_scalar: Floats, directions: Floats) -> Floats:
+    """Derivatives (N, 6, m) by one number per joint, and each joint's direction (N, m, 3) -> (N, 6, 3 m)."""
+    count, _, m = by_scalar.shape
+    return np.asarray((by_scalar[:, :, :, None] * directions[:, None]).reshape(count, 6, 3 * m))
+
+
+def _base_joints_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
+    """Derivatives (N, 3 n, 9) of the base joints by the frame's distances or the plate's points."""
+    distances_mm = model.zero.distances_mm + rows.frame_mm
+    found = np.empty((len(rows), 3 * rows.links, 9))
+    for i in range(9):
+        step = np.zeros(9)
+        step[i] = STEP_MM
+        ends = []
+        for signed in (step, -step):
+            if port == "frame":
+                frame = solve_frame(model.frame, distances_mm + signed)
+            else:
+                plate = model.frame.plate_points_M_mm + signed.reshape(3, 3)
+                frame = solve_frame(model.frame._replace(plate_points_M_mm=plate), distances_mm)
+            ends.append(frame.base_joints_M_mm.reshape(len(rows), -1))
+        found[:, :, i] = (ends[0] - ends[1]) / (2 * STEP_MM)
+    return found

@@ -1,0 +1,115 @@
+"""What follows slowly: temperatures behind their surroundings in time, friction behind its scale in distance.
+
+Both take their state and give it back, so that N rows at once and row after row are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compd.model.jit import SCALAR, VECTOR, Floats, kernel
+
+State: TypeAlias = tuple[Floats, ...]
+Flags: TypeAlias = NDArray[Any]
+
+
+@kernel(
+    [VECTOR, VECTOR, VECTOR, SCALAR, SCALAR, SCALAR, SCALAR, VECTOR, VECTOR, VECTOR, VECTOR],
+    "(m),(m),(m),(),(),(),()->(m),(),(),()",
+)
+def _lag(
+    time_s: Floats,
+    value: Floats,
+    start: Floats,
+    tau_s: float,
+    time_before_s: float,
+    value_before: float,
+    lagged_before: float,
+    lagged: Floats,
+    time_after_s: Floats,
+    value_after: Floats,
+    lagged_after: Floats,
+) -> None:
+    for k in range(time_s.shape[0]):
+        if math.isnan(value[k]):
+            lagged[k] = math.nan  # a missing value is not remembered: the next one bridges the gap
+            continue
+        steps = (time_s[k] - time_before_s) / tau_s
+        if start[k] != 0.0 or math.isnan(time_before_s):
+            lagged_before = value[k]
+        elif steps > 0.0:
+            left = math.exp(-steps)
+            # exact where the input runs straight from one row to the next
+            ramp = -math.expm1(-steps) / steps
+            lagged_before = value[k] + (lagged_before - value_before) * left - (value[k] - value_before) * ramp
+        time_before_s = time_s[k]
+        value_before = value[k]
+        lagged[k] = lagged_before
+    time_after_s[0] = time_before_s
+    value_after[0] = value_before
+    lagged_after[0] = lagged_before
+
+
+def lag(time_s: Floats, value: Floats, session_start: Flags, tau_s: float, state: State | None) -> tuple[Floats, State]:
+    """First-order lag, tau dy/dt = x - y, solved exactly between rows for an input that runs straight there.
+
+    time_s (N,), value (N, n), session_start (N,): there y starts at x.
+    Returns y (N, n) and the state after; nan where the value is nan, which leaves no trace in the state.
+    """
+    if state is None:
+        state = (np.full(value.shape[1], np.nan),) * 3
+    lagged, *after = _lag(time_s, value.T, session_start.astype(float), tau_s, *state)
+    return lagged.T, tuple(after)
+
+
+@kernel(
+    [VECTOR, VECTOR, VECTOR, SCALAR, SCALAR, SCALAR, SCALAR, VECTOR, VECTOR, VECTOR],
+    "(m),(m),(m),(),(),(),()->(m),(),()",
+)
+def _stop(
+    position_mm: Floats,
+    direction: Floats,
+    start: Floats,
+    yield_mm: float,
+    least_mm: float,
+    position_before_mm: float,
+    strain_before: float,
+    strain: Floats,
+    position_after_mm: Floats,
+    strain_after: Floats,
+) -> None:
+    for k in range(position_mm.shape[0]):
+        if math.isnan(position_mm[k]):
+            strain[k] = math.nan
+            continue
+        if start[k] != 0.0 or math.isnan(position_before_mm):
+            strain_before = direction[k]
+        else:
+            move_mm = position_mm[k] - position_before_mm
+            if direction[k] != 0.0 and abs(move_mm) > least_mm:
+                move_mm = direction[k] * abs(move_mm)
+            strain_before = min(1.0, max(-1.0, strain_before + move_mm / yield_mm))
+        position_before_mm = position_mm[k]
+        strain[k] = strain_before
+    position_after_mm[0] = position_before_mm
+    strain_after[0] = strain_before
+
+
+def stop(
+    position_mm: Floats, direction: Floats, session_start: Flags, yield_mm: float, least_mm: float, state: State | None
+) -> tuple[Floats, State]:
+    """Stop operator (elastic up to `yield_mm` of travel, then sliding), -1..1; the play operator is the rest.
+
+    position_mm, direction (N, n): a session starts fully yielded in its direction, at 0 where that is unknown.
+    A move beyond least_mm counts in the direction of its end: approached from one side, a link may have
+    gone farther than the two rows tell.
+    Returns (N, n) and the state after. (Visintin, Differential Models of Hysteresis, 1994, chapter III.)
+    """
+    if state is None:
+        state = (np.full(position_mm.shape[1], np.nan),) * 2
+    strain, *after = _stop(position_mm.T, direction.T, session_start.astype(float), yield_mm, least_mm, *state)
+    return strain.T, tuple(after)
