@@ -62,7 +62,16 @@ class Chain:
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
     directory = tmp_path_factory.mktemp("chain")
-    simulate = ["simulate", str(ROOT / "config/tripod-cmm.yaml"), "--directory", str(directory), "--seed", "3"]
+    simulate = [
+        "simulate",
+        str(ROOT / "config/tripod-cmm.yaml"),
+        "--directory",
+        str(directory),
+        "--seed",
+        "3",
+        "--zero-hold",
+        "600",
+    ]
     commands = [
         Command(simulate, ready=directory / "control.sock"),
         Command(["run", str(directory / "tripod-cmm.yaml")], ready=directory / "compd.sock"),

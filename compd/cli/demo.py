@@ -41,7 +41,8 @@ def demo(
     )
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         directory = Path(temporary)
-        options = ["--directory", temporary, "--seed", str(seed), "--speedup", str(SPEEDUP)]
+        # it stands at machine zero until it is driven, however long the kernels take to compile
+        options = ["--directory", temporary, "--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", "600"]
         commands = [
             Command(["simulate", str(config), *options], ready=directory / "control.sock"),
             Command(["run", str(directory / config.name)], ready=directory / "compd.sock"),
