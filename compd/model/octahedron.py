@@ -32,6 +32,10 @@ OTHER_ASSEMBLY = int(Reason.OTHER_ASSEMBLY)
 # Equation (3): distance u_k runs from support k // 2 to this plate point.
 PLATE_POINT_OF_DISTANCE = (0, 2, 0, 1, 1, 2)
 
+# Frames deform by micrometres, the softest by millimetres. One found further from machine zero than this fraction of
+# its size, or this many radians, is another assembly: a mirror image, or legs crossed.
+FURTHEST = 0.1
+
 # Two reference points nearer than this coincide: the edge between them has no direction.
 SHORTEST_EDGE_MM = 1e-6
 
@@ -179,6 +183,19 @@ def _supports_from(
     return NO_CONVERGENCE if residual_mm[0] > RESIDUAL_TOLERANCE_MM else reason
 
 
+@helper
+def _compare(
+    origin_M: Floats, R: Floats, zero_origin_M: Floats, zero_R: Floats, displacement_M: Floats, rotation_M: Floats
+) -> None:
+    """Displacement and rotation vector of {B} since machine zero, in {M} axes."""
+    turned = np.empty((3, 3))
+    for i in range(3):
+        displacement_M[i] = origin_M[i] - zero_origin_M[i]
+        for j in range(3):
+            turned[i, j] = R[i, 0] * zero_R[j, 0] + R[i, 1] * zero_R[j, 1] + R[i, 2] * zero_R[j, 2]
+    vector_of(turned, rotation_M)
+
+
 @kernel(
     [VECTOR, MATRIX, MATRIX, MATRIX, INTEGERS, VECTOR, MATRIX,
      MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, INTEGERS, VECTOR, INTEGERS],
@@ -209,6 +226,12 @@ def octahedron(
     iterations[0] = 0
     residual_mm[0] = math.nan
     reason[0] = _supports_from(lengths_mm, plate_points_M, supports_M, iterations, residual_mm)
+    if reason[0] == OK and not place_base(supports_M, R, origin_M):
+        reason[0] = NEAR_SINGULAR
+    if reason[0] == OK:
+        _compare(origin_M, R, zero_origin_M, zero_R, displacement_M, rotation_M)
+        if max(largest(displacement_M) / np.min(lengths_mm), largest(rotation_M)) > FURTHEST:
+            reason[0] = OTHER_ASSEMBLY
     if reason[0] != OK:
         supports_M[:, :] = math.nan
         origin_M[:] = math.nan
@@ -217,15 +240,8 @@ def octahedron(
         displacement_M[:] = math.nan
         rotation_M[:] = math.nan
         return
-    place_base(supports_M, R, origin_M)
     for i in range(support_of_joint.shape[0]):
         s = support_of_joint[i]
         x, y, z = joint_offsets_B[i, 0], joint_offsets_B[i, 1], joint_offsets_B[i, 2]
         for j in range(3):
             base_joints_M[i, j] = supports_M[s, j] + (R[j, 0] * x + R[j, 1] * y + R[j, 2] * z)
-    turned = np.empty((3, 3))
-    for i in range(3):
-        displacement_M[i] = origin_M[i] - zero_origin_M[i]
-        for j in range(3):
-            turned[i, j] = R[i, 0] * zero_R[j, 0] + R[i, 1] * zero_R[j, 1] + R[i, 2] * zero_R[j, 2]
-    vector_of(turned, rotation_M)
