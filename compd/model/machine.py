@@ -103,15 +103,20 @@ def machine_model(
     origin, rotation = base_pose(supports)
     offsets = to_inner(rotation, np.zeros(3), base_joints - supports[carriers])
     frame = FrameGeometry(plate, _frozen(offsets), carriers, supports, _frozen(origin), _frozen(rotation))
-    require(solve_frame(frame, distances).reason, "frame at machine zero")
+    require(
+        solve_frame(frame, distances).reason, "frame at machine zero",
+        "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
+    )  # fmt: skip
     mechanism = Mechanism(base_joints, platform_joints, axes)
     attitude = _facing(base_joints, platform_joints) if zero_rotation_M_P is None else zero_rotation_M_P
     pose = inverse_kinematics(mechanism, *zero_contact, attitude)
-    require(pose.reason, "links at machine zero")
+    check = "check the tip and the attitude at machine zero, base joints, platform joints and revolute axes"
+    require(pose.reason, "links at machine zero", check)
     # the links must also lead back to machine zero, or the first warm start would
     require(
         forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P).reason,
         "links at machine zero",
+        check,
     )
     zero = AtZero(
         base_joints, _frozen(pose.origin_M_mm), _frozen(pose.rotation_M_P), Contact(*map(_frozen, zero_contact)),

@@ -53,8 +53,11 @@ ITERATION_LIMIT = 30
 STEP_LIMIT = 0.5
 
 
-def require(reason: NDArray[np.int64] | np.int64 | int, what: str) -> None:
-    """Raise KinematicsError unless every row is OK; names the rows (the first ten) and their reasons."""
+def require(reason: NDArray[np.int64] | np.int64 | int, what: str, next_step: str = "") -> None:
+    """Raise KinematicsError unless every row is OK; names the rows (the first ten) and their reasons.
+
+    what : what was computed, as a person knows it.  next_step : what to do if it failed.
+    """
     codes = np.asarray(reason)
     if not codes.any():
         return
@@ -64,6 +67,7 @@ def require(reason: NDArray[np.int64] | np.int64 | int, what: str) -> None:
         Problem(
             what if single else f"{what}, row {', '.join(str(i) for i in index)}",
             f"{Reason(int(codes[index])).name}: {MEANING[Reason(int(codes[index]))]}",
+            next_step=next_step,
         )
         for index in failed[:10]
     ]
