@@ -1,0 +1,62 @@
+"""What a cycle costs, from the snapshot to the bytes on the socket: `python -m tests.benchmarks.bench_cycle`."""
+
+from __future__ import annotations
+
+import time
+
+from compd.gauge import good
+from compd.live.protocol import Target
+from tests.benchmarks.figures import median_and_p99, show
+from tests.live_machine import RAW_AT_ZERO_MM, Machine, machine
+
+CYCLES = 5000
+BUDGET_US = 150.0  # the whole cycle with 18 comparators
+ARRIVING_MM = 1e-4  # every gauge shows something new in every cycle
+
+
+def main() -> None:
+    rows = []
+    for name in ("tripod-cmm.yaml", "hexapod.yaml"):
+        for mode in ("cmm", "machine_tool"):
+            measured = machine(name)
+            measured.settle()
+            if mode == "machine_tool":
+                tip_B0_mm = measured.model.zero.contact.tip_M_mm - measured.model.frame.zero_origin_M_mm
+                measured.orders.target = Target(tuple(tip_B0_mm.tolist()))
+            rows += [
+                [f"{name.removesuffix('.yaml')}, {mode}: {part}", *_row(durations)]
+                for part, durations in _cycles(measured).items()
+            ]
+    show(f"Cycle cost over {CYCLES} cycles", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+
+
+def _row(durations_s: list[float]) -> list[str]:
+    median, p99 = (value * 1e6 for value in median_and_p99(durations_s))
+    return [f"{median:.1f}", f"{p99:.1f}", f"{median / BUDGET_US:.2f}"]
+
+
+def _cycles(measured: Machine) -> dict[str, list[float]]:
+    """Durations (s) of compute, JSON, packet, and of all three."""
+    found: dict[str, list[float]] = {"snapshot to setpoint": [], "JSON": [], "UDP packet": [], "snapshot to bytes": []}
+    config_hash = bytes(8)
+    for tick in range(CYCLES):
+        measured.now_s += 0.005
+        for channel, slot in measured.latest.index.items():
+            value = RAW_AT_ZERO_MM + (tick % 7) * ARRIVING_MM if channel in measured.change_mm else 20.0
+            measured.latest.put(slot, good(value, measured.now_s - 0.001))
+        begin = time.perf_counter()
+        setpoint = measured.cycle.run(tick, measured.latest.snapshot(measured.now_s), measured.orders)
+        computed = time.perf_counter()
+        setpoint.to_json()
+        encoded = time.perf_counter()
+        setpoint.to_packet(config_hash)
+        packed = time.perf_counter()
+        assert setpoint.valid, setpoint.reason
+        for durations, seconds in zip(found.values(), (computed - begin, encoded - computed, packed - encoded,
+                                                       encoded - begin), strict=True):  # fmt: skip
+            durations.append(seconds)
+    return found
+
+
+if __name__ == "__main__":
+    main()
