@@ -22,7 +22,7 @@ from compd.live.notify import Notifier
 from compd.live.protocol import TargetKeys
 from compd.live.publisher import Publisher
 from compd.live.requests import Requests
-from tests.benchmarks.figures import median_and_p99, show
+from tests.benchmarks.figures import median_and_p99, quiet, show
 from tests.live_machine import RAW_AT_ZERO_MM, machine
 
 RATES_HZ = (200, 1000)
@@ -83,6 +83,7 @@ def measure(rate_hz: float) -> list[tuple[float, ...]]:
 
 
 def main() -> None:
+    quiet()
     rows = []
     for rate_hz in RATES_HZ:
         parts = zip(*measure(rate_hz), strict=True)

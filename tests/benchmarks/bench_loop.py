@@ -22,7 +22,7 @@ from compd.live.loop import Loop
 from compd.live.notify import Notifier
 from compd.live.timing import Histogram
 from compd.readings import Latest
-from tests.benchmarks.figures import show
+from tests.benchmarks.figures import quiet, show
 from tests.live_machine import RAW_AT_ZERO_MM, machine
 
 SECONDS = 10
@@ -136,6 +136,7 @@ def run_loop(rate_hz: float) -> tuple[Loop, Histogram | None]:
 
 
 def main() -> None:
+    quiet()
     if shutil.which("cyclictest") is None:
         print("cyclictest is not installed (apt-get install rt-tests): the loop is measured alone")
     rows = []

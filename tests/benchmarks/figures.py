@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Sequence
 
+import structlog
 from rich.console import Console
 from rich.table import Table
 
@@ -13,6 +14,11 @@ def median_and_p99(values: Sequence[float]) -> tuple[float, float]:
     """Of at least one value."""
     ordered = sorted(values)
     return statistics.median(ordered), ordered[int(0.99 * (len(ordered) - 1))]
+
+
+def quiet() -> None:
+    """No log between the tables."""
+    structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
 
 
 def show(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
