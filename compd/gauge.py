@@ -100,6 +100,10 @@ class ByteLine(Protocol):
         """Discard what is waiting, write `request`; the monotonic time (s) at which it had left."""
         ...
 
+    def listen(self) -> float:
+        """Discard what is waiting, of a device that speaks unasked; the monotonic time (s) of it."""
+        ...
+
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes; `timeout_s` for the first byte, the line's own if None."""
         ...

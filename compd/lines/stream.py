@@ -48,6 +48,19 @@ class StreamLine:
         self._port.write(request)
         return started_s + len(request) * self._port.character_s
 
+    def listen(self) -> float:
+        """Throw away what has come so far, without waiting for quiet; the monotonic time (s) of it.
+
+        Raises LineFault: MISMATCH when there is no end of it, LINE_LOST.
+        """
+        self._waiting.clear()
+        give_up_s = self._clock.monotonic() + self._timeout_s
+        while data := self._port.read(0.0):
+            self._last_byte_s = self._clock.monotonic()
+            if self._last_byte_s > give_up_s:
+                raise LineFault(Quality.MISMATCH, f"more comes than can be read: {shown(data)}")
+        return self._clock.monotonic()
+
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
         deadline_s = self._first_byte(timeout_s) + count * self._port.character_s

@@ -8,6 +8,9 @@ public register map was found, so the map is yours, out of your module's manual;
     Moxa ioLogik E1240 (M)    function 4, address 8-23, float32, status {address: 60 ...}: 0 ok, 1 burn-out,
                               2 over, 3 under
     R4DCB08 (C)               function 3, address 0-7, int16, scale 0.1, unit degC, invalid [-32768]
+
+These four are presets too (icpdas_m7017c, adam_4017p, moxa_e1240, r4dcb08). A module that sends V or mA gets a
+`linearisation` per channel: `scale` and `offset` lead to V or mA, the linearisation from there to `unit`.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
+from compd_drivers.linearisation import Linearisation
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -53,10 +57,13 @@ class ModbusChannel(BaseModel):
         default="high_first", description="of a number in two registers"
     )
     byte_order: Literal["big", "little"] = Field(default="big", description="inside a register; big is Modbus's own")
-    scale: Number = Field(default=1.0, description="unit per count; negative turns the sign")
+    scale: Number = Field(default=1.0, description="unit (or V, mA) per count; negative turns the sign")
     offset: Number = Field(default=0.0, description="in the channel's unit")
-    unit: Unit = Field(description="of the value after scale and offset")
+    unit: Unit = Field(description="of the value after scale, offset and linearisation")
     invalid: tuple[Number, ...] = Field(default=(), description="raw values that mean: no sensor, broken wire")
+    over_range: tuple[Number, ...] = Field(default=(), description="raw values that mean: at or above full scale")
+    under_range: tuple[Number, ...] = Field(default=(), description="raw values that mean: at or below zero scale")
+    linearisation: Linearisation | None = Field(default=None, description="from V or mA, after scale, to `unit`")
     lowest: Number | None = Field(default=None, description="smallest value that the sensor can deliver, in its unit")
     highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
     status: Status | None = Field(default=None, description="register that says whether the value counts")
@@ -105,7 +112,7 @@ class _Place(NamedTuple):
 class Modbus(Gauge[RegisterLine]):
     """One slave; as few reads as its map allows, each channel with the time of its own read."""
 
-    Options = ModbusOptions
+    Options: ClassVar[type[GaugeOptions]] = ModbusOptions
     line_kind = "registers"
     sample_options: ClassVar[Mapping[str, Any]] = {
         "unit": 1,
@@ -175,12 +182,17 @@ def _reading(channel: ModbusChannel, registers: tuple[int, ...], said: int | Non
     raw = decode(channel, registers)
     if raw in channel.invalid:
         return bad(time_s, Quality.SENSOR_FAULT, f"raw value {raw:g}")
+    if raw in channel.over_range:
+        return bad(time_s, Quality.OVER_RANGE, f"raw value {raw:g}")
+    if raw in channel.under_range:
+        return bad(time_s, Quality.UNDER_RANGE, f"raw value {raw:g}")
     value = raw * channel.scale + channel.offset
-    if channel.highest is not None and value > channel.highest:
-        return bad(time_s, Quality.OVER_RANGE, f"{value:g} {channel.unit}")
-    if channel.lowest is not None and value < channel.lowest:
-        return bad(time_s, Quality.UNDER_RANGE, f"{value:g} {channel.unit}")
-    return good(value, time_s)
+    reading = channel.linearisation.reading(value, time_s) if channel.linearisation else good(value, time_s)
+    if channel.highest is not None and reading.value > channel.highest:
+        return bad(time_s, Quality.OVER_RANGE, f"{reading.value:g} {channel.unit}")
+    if channel.lowest is not None and reading.value < channel.lowest:
+        return bad(time_s, Quality.UNDER_RANGE, f"{reading.value:g} {channel.unit}")
+    return reading
 
 
 def _status_quality(status: Status, said: int) -> Quality:

@@ -1,0 +1,68 @@
+"""A request's reply on a line of bytes: two timeouts, and nothing behind the reply."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from compd.gauge import ByteLine, GaugeOptions, LineFault, Quality
+
+Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class ExchangeOptions(GaugeOptions):
+    """Options of every described gauge on a line of bytes (StreamDevice's names and meanings)."""
+
+    reply_timeout_s: Seconds | None = Field(default=None, description="to the first byte; the line's own if left out")
+    gap_timeout_s: Seconds | None = Field(
+        default=None, description="between two bytes of a reply; the line's own, for the whole reply, if left out"
+    )
+    extra_input: Literal["error", "ignore"] = Field(
+        default="error", description="bytes behind a reply: a fault, or nothing to do with it"
+    )
+
+
+def receive(line: ByteLine, options: ExchangeOptions, count: int) -> bytes:
+    """Exactly `count` bytes, the first of a reply. Raises LineFault as the line does."""
+    if options.gap_timeout_s is None:
+        return line.receive(count, options.reply_timeout_s)
+    data = line.receive(1, options.reply_timeout_s)
+    while len(data) < count:
+        data += following(line, options, 1, data)
+    return data
+
+
+def receive_line(line: ByteLine, options: ExchangeOptions, terminator: bytes, limit: int) -> bytes:
+    """Bytes up to `terminator`, without it. Raises LineFault as the line does, MISMATCH beyond `limit` bytes."""
+    if options.gap_timeout_s is None:
+        return line.receive_until(terminator, limit, options.reply_timeout_s)[: -len(terminator)]
+    data = line.receive(1, options.reply_timeout_s)
+    while not data.endswith(terminator):
+        if len(data) >= limit:
+            raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {data!r}")
+        data += following(line, options, 1, data)
+    return data[: -len(terminator)]
+
+
+def following(line: ByteLine, options: ExchangeOptions, count: int, so_far: bytes) -> bytes:
+    """The next `count` bytes of a reply; INCOMPLETE if they do not come."""
+    try:
+        return line.receive(count, options.gap_timeout_s)
+    except LineFault as fault:
+        if fault.quality is Quality.TIMEOUT:
+            raise LineFault(Quality.INCOMPLETE, f"only {so_far!r}") from fault
+        raise
+
+
+def nothing_behind(line: ByteLine, options: ExchangeOptions, reply: bytes) -> None:
+    """Raises LineFault(MISMATCH) when more has come than the reply, unless the options allow it."""
+    if options.extra_input == "ignore":
+        return
+    try:
+        extra = line.receive(1, 0.0)
+    except LineFault as fault:
+        if fault.quality is not Quality.TIMEOUT:
+            raise
+    else:
+        raise LineFault(Quality.MISMATCH, f"bytes behind the reply: {reply!r} + {extra!r}")

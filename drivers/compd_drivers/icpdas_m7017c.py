@@ -1,0 +1,78 @@
+"""ICP DAS M-7017C: eight analogue inputs on Modbus RTU.
+
+Source: I-7017(F)C, M-7017C quick start guide, Modbus table (M, read in a manual): 1200 to 115200 baud, 8N1 and
+others; input values at 30001 to 30008 (function 4, address 0 to 7); coil 00269 (also bit of the data format)
+0 = hexadecimal, 1 = engineering. Over and under range of the 4-20 and 0-20 mA ranges are discrete inputs 10129 to
+10136, which a register line does not read: both ends of the scale are taken as beyond it instead, in every range.
+Hexadecimal data, from the module family's type codes (C, read in public code): two's complement, 7FFF = +full scale
+and 8000 = -full scale, for the ranges with both signs; 0000 to FFFF for 0-20 mA and 4-20 mA. One count is
+full scale / 32768; a module that divides by 32767 reads 31 ppm less, below its accuracy of 0.1 %.
+Engineering data is refused: its steps are not in that manual, and a wrong one would look like a measurement.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from compd_drivers.analogue import SPANS, AnalogueInput, ModuleOptions, check_inputs, check_span, register_map
+from compd_drivers.modbus import Modbus
+
+FIRST_ADDRESS = 0
+HALF_SCALE = 32768
+FULL_SCALE = 65535
+
+
+class M7017cInput(AnalogueInput):
+    """One input of an M-7017C."""
+
+    range: Literal["+-10V", "+-5V", "+-1V", "+-500mV", "+-150mV", "+-20mA", "0-20mA", "4-20mA"] = Field(
+        description="what the input is set to in the module"
+    )
+
+    @model_validator(mode="after")
+    def _signal_fits(self) -> Self:
+        check_span(self, self.range)
+        return self
+
+
+class IcpdasM7017cOptions(ModuleOptions):
+    """Options of an M-7017C."""
+
+    data_format: Literal["hexadecimal"] = Field(description="what the module is set to; see to it that it is so")
+    channels: tuple[M7017cInput, ...] = Field(min_length=1, description="the inputs that are wired")
+
+    @model_validator(mode="after")
+    def _once(self) -> Self:
+        check_inputs(self.channels)
+        return self
+
+
+class IcpdasM7017c(Modbus):
+    """One module; all its inputs in one read."""
+
+    Options = IcpdasM7017cOptions
+
+    def __init__(self, options: IcpdasM7017cOptions) -> None:
+        super().__init__(register_map(options, [_channel(one) for one in options.channels]))
+        self.options = options
+
+
+def _channel(one: M7017cInput) -> dict[str, Any]:
+    span = SPANS[one.range]
+    signed = span.low < 0
+    return {
+        "name": one.name,
+        "function": 4,
+        "address": FIRST_ADDRESS + one.input,
+        "type": "int16" if signed else "uint16",
+        "scale": span.high / HALF_SCALE if signed else (span.high - span.low) / FULL_SCALE,
+        "offset": 0.0 if signed else span.low,
+        "over_range": [HALF_SCALE - 1 if signed else FULL_SCALE],
+        "under_range": [-HALF_SCALE if signed else 0],
+        "linearisation": one.linearisation,
+        "unit": one.unit,
+        "lowest": one.lowest,
+        "highest": one.highest,
+    }

@@ -1,0 +1,104 @@
+r"""Mahr Millimar C1202: a column amplifier with up to three features (inductive probes).
+
+Source: Millimar C1202 operating instructions, page 82 (M, read in a manual): duplex interface, 9600 baud, 7E2,
+everything ends with CR. `?` asks for all features:
+
+    1 +-XXX.XX unit;2 ERR6;3 +-XXX.XX unit =
+
+unit = mm um inch deg rad dms, digits as displayed with leading zeros; behind it, where tolerances are active, one
+judgement of < = > and, where warning limits are active, a second one: neither touches the value. ERR6 stands for a
+feature that is off. `M1?` asks for one feature. The unit on the wire is compared with the configured one.
+Not in the manual: other errors; `ERRn` is read as an error of that feature.
+
+While somebody is in its menu the C1202 does not answer. If it had answered on this connection before, that is
+`silent`; if it never had, `timeout`. A cable pulled off at the instrument looks the same as the menu.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+
+CR = b"\r"
+LONGEST_REPLY = 80  # three features of at most 26 characters
+FEATURES = (1, 2, 3)
+MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "inch": 25.4}
+_ERROR = re.compile(rb"([123]) ERR(\d)")
+FEATURE_OFF = b"6"
+
+
+class MahrC1202Options(GaugeOptions):
+    """Options of a C1202."""
+
+    features: Annotated[tuple[Literal[1, 2, 3], ...], Field(min_length=1)] = Field(
+        description="which features are read; channels are named 1, 2, 3"
+    )
+    unit: Literal["mm", "um", "inch"] = Field(description="what it is set to; any other one on the wire is refused")
+    digits: int = Field(ge=1, le=6, description="digits before the point, leading zeros included")
+    decimals: int = Field(ge=1, le=6, description="digits behind the point")
+
+
+class MahrC1202(Gauge[ByteLine]):
+    """The configured features: channels `1`, `2`, `3` in mm."""
+
+    Options = MahrC1202Options
+    line_kind = "bytes"
+
+    def __init__(self, options: MahrC1202Options) -> None:
+        super().__init__(options)
+        self._features = tuple(sorted(set(options.features)))
+        self._channels = tuple(Channel(str(feature)) for feature in self._features)
+        self._asked = self._features if len(self._features) == 1 else FEATURES
+        self._request = (f"M{self._features[0]}?" if len(self._features) == 1 else "?").encode() + CR
+        self._value = re.compile(
+            rb"([123]) ([+-]\d{%d}\.\d{%d}) (mm|um|inch)(?: [<=>]){0,2}" % (options.digits, options.decimals)
+        )
+        self._answered_on: ByteLine | None = None
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH for anything but the features that were asked."""
+        time_s = line.send(self._request)
+        try:
+            reply = line.receive_until(CR, LONGEST_REPLY)[:-1]
+            readings = self._readings(reply, time_s)
+        except LineFault as fault:
+            if fault.quality is Quality.TIMEOUT and self._answered_on is line:
+                line.drain()
+                raise LineFault(Quality.SILENT, f"{fault.detail}: in its menu, or its cable is off") from fault
+            self._answered_on = None
+            raise
+        self._answered_on = line
+        return readings
+
+    def _readings(self, reply: bytes, time_s: float) -> list[Reading]:
+        parts = [part.strip(b" ") for part in reply.split(b";")]
+        if len(parts) != len(self._asked):
+            raise LineFault(Quality.MISMATCH, f"{len(parts)} features answered, {len(self._asked)} asked: {reply!r}")
+        readings = []
+        for feature, part in zip(self._asked, parts, strict=True):
+            if part[:1] != str(feature).encode():
+                raise LineFault(Quality.MISMATCH, f"asked feature {feature}: {reply!r}")
+            if feature in self._features:
+                readings.append(self._reading(part, time_s, reply))
+        return readings
+
+    def _reading(self, part: bytes, time_s: float, reply: bytes) -> Reading:
+        if error := _ERROR.fullmatch(part):
+            why = ": the feature is off" if error[2] == FEATURE_OFF else ""
+            return bad(time_s, Quality.DEVICE_ERROR, part.decode() + why)
+        match = self._value.fullmatch(part)
+        if match is None:
+            raise LineFault(Quality.MISMATCH, f"not a value of {self.options.digits} and {self.options.decimals} "
+                            f"digits: {reply!r}")  # fmt: skip
+        if match[3] != self.options.unit.encode():
+            raise LineFault(Quality.MISMATCH, f"it is set to {match[3].decode()}, not {self.options.unit}")
+        return good(float(match[2]) * MM_PER_UNIT[self.options.unit], time_s)

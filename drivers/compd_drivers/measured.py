@@ -1,0 +1,103 @@
+"""What every described channel has: a name, the unit on the wire, and when its number counts.
+
+One key `unit` says what the device sends; the channel delivers mm, degC, N, hPa, pct or 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from compd.gauge import Channel, Quality, Reading, Unit, bad, good
+from compd_drivers.linearisation import Linearisation
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+WireUnit = Literal[
+    "mm", "um", "nm", "inch", "mil", "degC", "degF", "K", "N", "kN", "hPa", "mbar", "kPa", "Pa", "pct", "1", "V", "mA"
+]
+# What a device may say in place of a number.
+SaidQuality = Literal["sensor_fault", "device_error", "over_range", "under_range", "silent"]
+
+
+class _Conversion(NamedTuple):
+    """value = wire x factor + offset, in `unit`."""
+
+    unit: Unit
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+# Exact by definition: 1 inch = 25.4 mm, 0 degC = 273.15 K = 32 degF, 1 mbar = 1 hPa.
+CONVERSIONS: Mapping[str, _Conversion] = {
+    "mm": _Conversion("mm"),
+    "um": _Conversion("mm", 1e-3),
+    "nm": _Conversion("mm", 1e-6),
+    "inch": _Conversion("mm", 25.4),
+    "mil": _Conversion("mm", 0.0254),
+    "degC": _Conversion("degC"),
+    "degF": _Conversion("degC", 5 / 9, -160 / 9),
+    "K": _Conversion("degC", 1.0, -273.15),
+    "N": _Conversion("N"),
+    "kN": _Conversion("N", 1e3),
+    "hPa": _Conversion("hPa"),
+    "mbar": _Conversion("hPa"),
+    "kPa": _Conversion("hPa", 10.0),
+    "Pa": _Conversion("hPa", 1e-2),
+    "pct": _Conversion("pct"),
+    "1": _Conversion("1"),
+}
+SIGNALS = ("V", "mA")
+
+
+class MeasuredChannel(BaseModel):
+    """One number that a device sends."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
+    unit: WireUnit = Field(description="of the number on the wire, after `scale`; V and mA need a linearisation")
+    scale: Finite = Field(default=1.0, description="unit per number on the wire; negative turns the sign")
+    range: tuple[Finite, Finite] | None = Field(
+        default=None, description="[lowest, highest] value that the sensor can deliver, in the channel's unit (mm ...)"
+    )
+    linearisation: Linearisation | None = Field(default=None, description="from V or mA to `measures`")
+    measures: Unit = Field(default="mm", description="unit behind the linearisation")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.scale == 0:
+            raise ValueError("`scale` must not be 0")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise ValueError("`range` is [lowest, highest]")
+        if (self.unit in SIGNALS) != (self.linearisation is not None):
+            raise ValueError("units V and mA need a `linearisation`, and only they have one")
+        if self.linearisation is not None and self.linearisation.signal != self.unit:
+            raise ValueError(f"the linearisation begins with {self.linearisation.signal}, the device sends {self.unit}")
+        return self
+
+    @property
+    def channel(self) -> Channel:
+        """What the gauge delivers."""
+        return Channel(self.name, self.measures if self.linearisation else CONVERSIONS[self.unit].unit)
+
+    def reading(self, number: float, time_s: float) -> Reading:
+        """The reading for a number as it stood on the wire."""
+        scaled = number * self.scale
+        if self.linearisation is not None:
+            reading = self.linearisation.reading(scaled, time_s)
+        else:
+            conversion = CONVERSIONS[self.unit]
+            reading = good(scaled * conversion.factor + conversion.offset, time_s)
+        if reading.ok and self.range is not None:
+            if reading.value < self.range[0]:
+                return bad(time_s, Quality.UNDER_RANGE, f"{reading.value:g} {self.channel.unit}")
+            if reading.value > self.range[1]:
+                return bad(time_s, Quality.OVER_RANGE, f"{reading.value:g} {self.channel.unit}")
+        return reading
+
+
+def twice(names: list[str]) -> str:
+    """The names that stand more than once, for an error; "" if none does."""
+    return ", ".join(sorted({name for name in names if names.count(name) > 1}))

@@ -1,0 +1,244 @@
+r"""What a reply must look like: text with converters, in the manner of StreamDevice and printf.
+
+Everything is literal but a backslash and a percent sign:
+
+    \r \n \t \\ \x02      bytes by their code (in YAML write such text in quotes)
+    %%                    a percent sign
+    %f                    number with a decimal point:   +12.345   -.5   "   1.0"
+    %+09.4f               exactly as printf prints it: 9 characters, 4 of them decimals, sign always
+    %d   %+06d            whole number, without or with its exact width
+    %e                    number with an exponent:  +1.2345E-03
+    %x   %4x              hexadecimal number, without sign
+    %(name)f              the number of channel `name`; the name may be left out where there is one channel
+    %*5c   %*s            skip five characters; skip what is not blank
+    %*[<>=]   %*2[0-9]    skip one or more (or exactly two) characters out of a set
+    %*?[<>= ]             skip any number of them, also none
+    %<sum8>   %0<xor8>    checksum of all before it, as bytes, or as hexadecimal digits;
+    %1<sum8>   %01<xor8>  leaving out the first byte
+
+Give width and decimals wherever the manual shows them: a digit lost on the wire is then found.
+A width counts characters, blanks and sign included; leading zeros may come as blanks. Flag + : the sign is always
+there; flag blank: a sign or a blank is always there. What is skipped never takes a digit of a number beside it.
+Sources: StreamDevice (format converters, checksums), C printf.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Literal, cast
+
+from compd_drivers.checksums import CHECKSUMS, ChecksumKind
+
+_ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|(.))", re.DOTALL)
+_ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
+_CONVERTER = re.compile(
+    r"%(?:(?P<percent>%)"
+    r"|(?P<hex>0?)(?P<skip>\d*)<(?P<checksum>\w+)>"
+    r"|(?P<star>\*)?(?P<optional>\?)?(?:\((?P<name>\w+)\))?(?P<flags>[+ 0]*)(?P<width>\d+)?(?:\.(?P<decimals>\d+))?"
+    r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]))",
+)
+_SIGNS = {"+": r" *[+-] *", " ": r"(?: *[+-]| ) *", "": r" *[+-]? *"}
+_CHARACTERS = {"f": r"[+\- 0-9.]", "d": r"[+\- 0-9]", "e": r"[+\- 0-9.Ee]", "x": r"[0-9A-Fa-f]"}
+
+
+def unescape(text: str) -> bytes:
+    r"""Bytes for text with \r \n \t \\ \xHH. ValueError for another escape, or a character beyond \xff."""
+
+    def byte(match: re.Match[str]) -> str:
+        if match[1]:
+            return chr(int(match[1], 16))
+        if match[2] not in _ESCAPES:
+            raise ValueError(f"unknown escape \\{match[2]}; there are \\r \\n \\t \\\\ and \\xHH")
+        return _ESCAPES[match[2]]
+
+    if text.endswith("\\") and not text.endswith("\\\\"):
+        raise ValueError("a single backslash at the end; write \\\\")
+    try:
+        return _ESCAPE.sub(byte, text).encode("latin-1")
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{text[error.start]!r} is not a single byte; write its code as \\xHH") from error
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number in the reply: its channel ("" if not named), and how its text must read."""
+
+    channel: str
+    kind: str
+    text: re.Pattern[bytes]
+
+
+@dataclass(frozen=True)
+class _Check:
+    """A checksum in the reply: of the bytes from `start` up to its group `group`."""
+
+    group: str
+    kind: ChecksumKind
+    start: int
+    hexadecimal: bool
+
+
+class ReplyFormat:
+    """A format, ready to match replies.
+
+    channels : names of its numbers, in order; "" for one that is not named.
+    length : bytes of the reply where the format fixes it, else None.
+    """
+
+    def __init__(self, text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> None:
+        """`instead`: by channel, what may stand in place of its number. ValueError says what is wrong."""
+        self._instead = instead or {}
+        self._numbers: list[_Number] = []
+        self._checks: list[_Check] = []
+        self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before, where its end is open
+        self.length: int | None = 0
+        self.literal = b""  # all that is literal, for counting terminators
+        source = unescape(text).decode("latin-1")
+        pattern = ""
+        at = 0
+        for match in _CONVERTER.finditer(source):
+            pattern += self._literally(source[at : match.start()])
+            pattern += self._converter(match)
+            at = match.end()
+        self._pattern = re.compile((pattern + self._literally(source[at:])).encode("latin-1"), re.DOTALL)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        return tuple(number.channel for number in self._numbers)
+
+    def match(self, reply: bytes) -> tuple[float | bytes, ...] | None:
+        """Per number its value, or the bytes that stand in its place; None if the reply is anything else.
+
+        A reply whose checksum does not fit is no match either: see `checksum_fits`.
+        """
+        found = self._pattern.fullmatch(reply)
+        if found is None or not self._fits(found, reply):
+            return None
+        values: list[float | bytes] = []
+        for k, number in enumerate(self._numbers):
+            text = found[f"n{k}"]
+            if text in self._instead.get(number.channel, ()):
+                values.append(text)
+            elif number.text.fullmatch(text):
+                values.append(_value(number.kind, text))
+            else:
+                return None
+        return tuple(values)
+
+    def checksum_fails(self, reply: bytes) -> bool:
+        """Whether the reply has the right form and a wrong checksum."""
+        found = self._pattern.fullmatch(reply)
+        return found is not None and not self._fits(found, reply)
+
+    def _fits(self, found: re.Match[bytes], reply: bytes) -> bool:
+        for check in self._checks:
+            expected = CHECKSUMS[check.kind].of(reply[check.start : found.start(check.group)])
+            said = found[check.group]
+            if check.hexadecimal:
+                expected, said = expected[::-1].hex().upper().encode(), said.upper()
+            if said != expected:
+                return False
+        return True
+
+    def _literally(self, text: str) -> str:
+        if "%" in text:
+            raise ValueError(f"not a converter: {text[text.index('%') :]!r}; a percent sign is %%")
+        return self._fixed(text)
+
+    def _fixed(self, text: str) -> str:
+        if text:
+            self._before = "fixed"
+        self._longer(len(text))
+        self.literal += text.encode("latin-1")
+        return re.escape(text)
+
+    def _longer(self, by: int | None) -> None:
+        self.length = None if self.length is None or by is None else self.length + by
+
+    def _converter(self, match: re.Match[str]) -> str:
+        if match["percent"]:
+            return self._fixed("%")
+        if match["checksum"]:
+            return self._checksum(match)
+        if match["kind"] in tuple("fdex") and not match["star"]:
+            return self._number(match)
+        if not match["star"]:
+            raise ValueError(f"{match[0]}: only numbers are read; write %*... to skip this")
+        if match["flags"] or match["decimals"] or match["name"]:
+            raise ValueError(f"{match[0]}: only a width belongs to what is skipped")
+        return self._skipped(match)
+
+    def _skipped(self, match: re.Match[str]) -> str:
+        width = int(match["width"]) if match["width"] else None
+        kind = match["kind"]
+        if kind == "c":
+            width = width or 1
+        characters = "." if kind == "c" else _CHARACTERS.get(kind, r"[^ \t\r\n]") if kind else _set(match["set"])
+        # what is skipped must not take digits of the number before it
+        whole = r"(?![0-9.])" if self._before == "number" else ""
+        if match["optional"]:
+            self._longer(None)
+            self._before = "skipped"
+            return f"{whole}{characters}*" if width is None else f"{whole}{characters}{{0,{width}}}"
+        self._longer(width)
+        self._before = "skipped" if width is None else "fixed"
+        return f"{whole}{characters}+" if width is None else f"{whole}{characters}{{{width}}}"
+
+    def _number(self, match: re.Match[str]) -> str:
+        kind, flags = match["kind"], match["flags"] or ""
+        width = int(match["width"]) if match["width"] else None
+        decimals = int(match["decimals"]) if match["decimals"] else None
+        if match["optional"]:
+            raise ValueError(f"{match[0]}: a number cannot be optional")
+        if decimals is not None and (kind in "dx" or decimals == 0):
+            raise ValueError(f"{match[0]}: decimals belong to %f and %e, and there is at least one")
+        sign = _SIGNS["+" if "+" in flags else " " if " " in flags else ""]
+        places = "+" if decimals is None else f"{{{decimals}}}"
+        body = {
+            "f": rf"{sign}[0-9]*\.[0-9]{places}",
+            "e": rf"{sign}[0-9]+\.[0-9]{places}[Ee][+-]?[0-9]+",
+            "d": rf"{sign}[0-9]+",
+            "x": "[0-9A-Fa-f]+",
+        }[kind]
+        name = match["name"] or ""
+        if name in self.channels:
+            raise ValueError(f"{match[0]}: channel {name!r} stands twice in the reply")
+        group = f"n{len(self._numbers)}"
+        self._numbers.append(_Number(name, kind, re.compile(body.encode())))
+        words = [re.escape(word.decode("latin-1")) for word in sorted(self._instead.get(name, ()), key=len)]
+        lengths = {len(word) for word in self._instead.get(name, ())} | {width}
+        self._longer(width if len(lengths) == 1 else None)
+        exact = body if width is None else f"{_CHARACTERS[kind]}{{{width}}}"
+        # nor may it take digits of this one; and a number of open width ends with its last digit
+        begins = r"(?<![0-9.+\-])" if self._before == "skipped" else ""
+        ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if kind == "x" else r"(?![0-9.])"
+        self._before = "number"
+        return f"{begins}(?P<{group}>{'|'.join([*words, exact])}){ends}"
+
+    def _checksum(self, match: re.Match[str]) -> str:
+        if match["checksum"] not in CHECKSUMS:
+            raise ValueError(f"{match[0]}: no such checksum; there are {', '.join(CHECKSUMS)}")
+        length = CHECKSUMS[cast(ChecksumKind, match["checksum"])].length
+        self._before = "fixed"
+        group = f"c{len(self._checks)}"
+        self._checks.append(
+            _Check(group, cast(ChecksumKind, match["checksum"]), int(match["skip"] or 0), bool(match["hex"]))
+        )
+        self._longer(2 * length if match["hex"] else length)
+        return f"(?P<{group}>[0-9A-Fa-f]{{{2 * length}}})" if match["hex"] else f"(?P<{group}>.{{{length}}})"
+
+
+def _set(text: str) -> str:
+    """A StreamDevice set as a regular expression: a leading ^ turns it round, a-z is a range."""
+    turned, members = ("^", text[1:]) if text.startswith("^") else ("", text)
+    if not members:
+        raise ValueError("%*[]: a set without members")
+    members = re.sub(r"([\[\]\\^&~|])", r"\\\1", members)
+    return f"[{turned}{members}]"
+
+
+def _value(kind: str, text: bytes) -> float:
+    digits = text.replace(b" ", b"")
+    return float(int(digits, 16)) if kind == "x" else float(digits)

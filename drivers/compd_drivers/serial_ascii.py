@@ -1,0 +1,283 @@
+r"""Generic ASCII gauge: a description in the configuration, in the manner of StreamDevice's protocol files.
+
+`out` is what is sent, `in` what the reply must look like (converters: `compd_drivers.reply_format`). Three examples
+from manuals' pages:
+
+Magnescale MG80-SC1, page 39: header of two bytes and a space-separated value per channel, "Error" for an alarm
+    mg:
+      driver: serial_ascii
+      line: mg
+      out: "R"
+      out_terminator: "\r\n"
+      in: "00%(a)+08.4f 01%(b)+08.4f"
+      in_terminator: "\r\n"
+      channels:
+        - {name: a, unit: mm, instead: {"  Error ": sensor_fault}}
+        - {name: b, unit: mm, instead: {"  Error ": sensor_fault}}
+
+Sylvac OPTO-RS, page 12: sign, digits, point, digits, CR; ERR0 sensor, ERR1 command, ERR2 parity, ERR3 range
+    sylvac:
+      driver: serial_ascii
+      line: sylvac
+      out: "?"
+      out_terminator: "\r"
+      in: "% .3f"
+      in_terminator: "\r"
+      channels: [{name: value, unit: mm, range: [-12.5, 12.5]}]
+      errors:
+        - {in: "ERR0", quality: sensor_fault}
+        - {in: "ERR3", quality: over_range}
+        - {in: "ERR%*c", quality: device_error}
+
+Vetek DGT, page 47 (force): an address in the reply is checked by being literal; ERRnn
+    force:
+      driver: serial_ascii
+      line: force
+      out: "00READ"
+      out_terminator: "\r\n"
+      in: "00ST,GS,%10.1f,kg"
+      in_terminator: "\r\n"
+      channels: [{name: weight, unit: N, scale: 9.80665}]
+      errors: [{in: "00OL,%*s", quality: over_range}, {in: "ERR%*2c", quality: device_error}]
+
+A device that speaks unasked has no `out`: its newest whole line counts, never a half one. `echo` is a second request
+whose reply looks different: asked before every `every`-th poll, it finds a device whose replies are one behind.
+Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a first whole reply on a
+connection, no byte at all is `silent` instead of `timeout`. A cable that comes off afterwards looks the same, and
+the detail says so; both are without a value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd_drivers.exchange import ExchangeOptions, nothing_behind, receive, receive_line
+from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+from compd_drivers.reply_format import ReplyFormat, unescape
+
+LONGEST_REPLY = 250  # bytes, where the description does not fix it
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AsciiChannel(MeasuredChannel):
+    """One number in the reply."""
+
+    decimals: int = Field(default=0, ge=0, le=12, description="of a whole number (%d): 12345 with 4 is 1.2345")
+    instead: dict[str, SaidQuality] = Field(
+        default={}, description='what may stand in the number\'s place, and what it means: {"ERR6": device_error}'
+    )
+
+
+class ErrorReply(_Section):
+    """A reply that stands for the whole poll."""
+
+    in_: str = Field(alias="in", description="what it looks like")
+    quality: SaidQuality = Field(description="what it means")
+    says: str = Field(default="", description="in words, for the status")
+
+
+class Exchange(_Section):
+    """One request and its reply, without a value in it."""
+
+    out: str = Field(min_length=1)
+    in_: str = Field(alias="in")
+
+
+class Echo(Exchange):
+    """A request whose reply cannot be mistaken for a measurement."""
+
+    every: int = Field(default=1, ge=1, description="before every so many polls; 1 finds every reply that is behind")
+
+
+class SerialAsciiOptions(ExchangeOptions):
+    """Options of a described ASCII gauge."""
+
+    out: str = Field(default="", description="the request; left out: the device speaks unasked")
+    out_terminator: str = Field(default="", description="what ends every request")
+    in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
+    in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
+    channels: tuple[AsciiChannel, ...] = Field(min_length=1)
+    errors: tuple[ErrorReply, ...] = Field(default=(), description="the first that fits counts")
+    init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
+    echo: Echo | None = Field(default=None, description="finds a reply that is one behind")
+    silent_in_menu: bool = Field(default=False, description="the device does not answer while in its menu")
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        names = [channel.name for channel in self.channels]
+        if doubled := twice(names):
+            raise ValueError(f"channel named twice: {doubled}")
+        description = Description.of(self)
+        numbers = description.reply.channels
+        if numbers != ("",) or len(names) > 1:
+            if missing := [name for name in names if name not in numbers]:
+                raise ValueError(f"`in` has no %({missing[0]})f")
+            if unknown := [number for number in numbers if number not in names]:
+                raise ValueError(f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}")
+        if not self.in_terminator and None in description.lengths:
+            raise ValueError("without `in_terminator` every reply must have a fixed length: give every width")
+        if not self.in_terminator and len(set(description.lengths)) > 1:
+            raise ValueError("without `in_terminator` all replies, errors too, must have the same length")
+        if not self.out and (self.init or self.echo or self.silent_in_menu):
+            raise ValueError("a device that speaks unasked has no init, echo or silent_in_menu")
+        if not self.out and not self.in_terminator:
+            raise ValueError("a device that speaks unasked needs an `in_terminator`")
+        return self
+
+
+class Description(NamedTuple):
+    """The options' texts, ready for use."""
+
+    reply: ReplyFormat
+    errors: tuple[tuple[ReplyFormat, ErrorReply], ...]
+    request: bytes
+    terminator: bytes
+
+    @classmethod
+    def of(cls, options: SerialAsciiOptions) -> Self:
+        """ValueError for a text that cannot be read."""
+        single = len(options.channels) == 1
+        instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
+        if single:
+            instead[""] = instead[options.channels[0].name]
+        return cls(
+            ReplyFormat(options.in_, instead),
+            tuple((ReplyFormat(error.in_), error) for error in options.errors),
+            unescape(options.out) + unescape(options.out_terminator),
+            unescape(options.in_terminator),
+        )
+
+    @property
+    def lengths(self) -> tuple[int | None, ...]:
+        """Of every reply the device may give."""
+        return (self.reply.length, *(form.length for form, _ in self.errors))
+
+
+class SerialAscii(Gauge[ByteLine]):
+    """One described device."""
+
+    Options: ClassVar[type[GaugeOptions]] = SerialAsciiOptions
+    line_kind = "bytes"
+
+    def __init__(self, options: SerialAsciiOptions) -> None:
+        super().__init__(options)
+        self._description = Description.of(options)
+        self._measured = options.channels
+        self._said = options
+        self._channels = tuple(channel.channel for channel in options.channels)
+        order = self._description.reply.channels
+        self._order = [order.index(c.name) if c.name in order else 0 for c in options.channels]
+        self._instead = [{unescape(word): quality for word, quality in c.instead.items()} for c in options.channels]
+        terminator = unescape(options.out_terminator)
+        exchanges = [*options.init, *([options.echo] if options.echo else [])]
+        self._exchanges = [(unescape(one.out) + terminator, ReplyFormat(one.in_)) for one in exchanges]
+        lengths = [length or LONGEST_REPLY for length in self._description.lengths]
+        lengths += [form.length or LONGEST_REPLY for _, form in self._exchanges]
+        self._limit = max(lengths) + len(self._description.terminator)
+        self._ready_on: ByteLine | None = None  # the connection on which `init` was said and a reply came
+        self._until_echo = 0
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        """Raises LineFault: as the line does, MISMATCH for a reply of another form, CRC for a wrong checksum,
+        DEVICE_ERROR and others for the described error replies, SILENT."""
+        known = self._ready_on is line
+        try:
+            if not known:
+                for request, form in self._exchanges[: len(self._said.init)]:
+                    self._exchange(line, request, form)
+                self._until_echo = 0
+            self._check_echo(line)
+            reply, time_s = self._poll(line)
+            values = self._description.reply.match(reply)
+            if values is None:
+                error = self._refused(reply, self._description.reply)
+                self._ready_on = None if error.quality == "device_error" else line
+                return [bad(time_s, Quality(error.quality), _shown(reply, error))] * len(self._channels)
+        except LineFault as fault:
+            self._ready_on = None
+            if fault.quality is Quality.TIMEOUT and known and self._said.silent_in_menu:
+                line.drain()
+                self._ready_on = line  # it is still the device that had answered
+                raise LineFault(Quality.SILENT, f"{fault.detail}: in its menu, or its cable is off") from fault
+            raise
+        self._ready_on = line
+        return [self._reading(k, values[place], time_s) for k, place in enumerate(self._order)]
+
+    def _poll(self, line: ByteLine) -> tuple[bytes, float]:
+        """The reply without its terminator, and the time of asking (s)."""
+        form = self._description.reply
+        if not self._said.out:
+            time_s = line.listen()
+            self._line(line)  # what is left of the line that was under way
+            return self._receive(line, form), time_s
+        time_s = line.send(self._description.request)
+        return self._whole(line, form), time_s
+
+    def _exchange(self, line: ByteLine, request: bytes, form: ReplyFormat) -> None:
+        """One exchange without a value; an error reply to it is a fault of the whole poll."""
+        line.send(request)
+        reply = self._whole(line, form)
+        if form.match(reply) is None:
+            error = self._refused(reply, form)
+            raise LineFault(Quality(error.quality), _shown(reply, error))
+
+    def _check_echo(self, line: ByteLine) -> None:
+        if self._said.echo is None:
+            return
+        if self._until_echo == 0:
+            self._exchange(line, *self._exchanges[-1])
+            self._until_echo = self._said.echo.every
+        self._until_echo -= 1
+
+    def _whole(self, line: ByteLine, form: ReplyFormat) -> bytes:
+        """A reply without its last terminator, and nothing behind it."""
+        reply = self._receive(line, form)
+        nothing_behind(line, self._said, reply)
+        return reply
+
+    def _receive(self, line: ByteLine, form: ReplyFormat) -> bytes:
+        terminator = self._description.terminator
+        if not terminator:
+            return receive(line, self._said, self._limit)
+        reply = self._line(line)
+        for _ in range(form.literal.count(terminator)):
+            if self._error(reply) is not None:
+                break
+            reply += terminator + self._line(line)
+        return reply
+
+    def _line(self, line: ByteLine) -> bytes:
+        return receive_line(line, self._said, self._description.terminator, self._limit)
+
+    def _error(self, reply: bytes) -> ErrorReply | None:
+        return next((error for form, error in self._description.errors if form.match(reply) is not None), None)
+
+    def _refused(self, reply: bytes, form: ReplyFormat) -> ErrorReply:
+        """The described error that a reply of another form is; LineFault if it is none."""
+        if error := self._error(reply):
+            return error
+        if form.checksum_fails(reply):
+            raise LineFault(Quality.CRC, repr(reply))
+        raise LineFault(Quality.MISMATCH, f"{reply!r} is not what was expected")
+
+    def _reading(self, k: int, value: float | bytes, time_s: float) -> Reading:
+        channel = self._measured[k]
+        if isinstance(value, bytes):
+            return bad(time_s, Quality(self._instead[k][value]), value.decode("ascii", "backslashreplace").strip())
+        return channel.reading(value / 10**channel.decimals, time_s)
+
+
+def _shown(reply: bytes, error: ErrorReply) -> str:
+    text = reply.decode("ascii", "backslashreplace")
+    return f"{text}: {error.says}" if error.says else text

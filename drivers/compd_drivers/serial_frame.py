@@ -1,0 +1,201 @@
+"""Generic binary gauge: a request, and a reply of fixed length with a checksum, described in the configuration.
+
+`frame` is the reply byte by byte, as a manual draws it: hexadecimal bytes that are always so, `..` for a byte that
+may be anything, `CS` for each byte of the checksum. `at` counts from 0. Micro-Epsilon MSC7401, appendix 4.4.4:
+
+    driver: serial_frame
+    line: rs485
+    out:   "10 7E 01 4C CB 16"
+    frame: "68 0B 0B 68 01 7E 08 .. .. .. .. .. .. .. .. CS 16"
+    checksum: {kind: sum8, first: 4}
+    channels:
+      - {name: gap, at: 11, type: float32, byte_order: little, unit: mm, invalid: {0: device_error}}
+
+A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise. `errors` are frames that
+stand for the whole poll; they may be shorter than the reply.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd_drivers.checksums import CHECKSUMS, ChecksumKind
+from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
+from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+
+NumberType = Literal[
+    "int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"
+]  # fmt: skip
+_TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
+_FLOATS: Mapping[str, str] = {"float32": "f", "float64": "d"}
+FEWEST_FIXED_BYTES = 2  # of a frame without a checksum
+
+
+class Frame(NamedTuple):
+    """A reply's bytes: None where any byte may stand, and where the checksum stands."""
+
+    fixed: tuple[int | None, ...]
+    checksum: slice
+
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """ValueError for anything but hexadecimal bytes, `..` and one run of `CS`."""
+        tokens = text.split()
+        for token in tokens:
+            if not _TOKEN.fullmatch(token):
+                raise ValueError(f"{token!r} is neither a hexadecimal byte, nor `..`, nor `CS`")
+        places = [k for k, token in enumerate(tokens) if token == "CS"]
+        if places and places != list(range(places[0], places[-1] + 1)):
+            raise ValueError("the checksum's bytes `CS` must stand together")
+        fixed = tuple(None if token in {"..", "CS"} else int(token, 16) for token in tokens)
+        return cls(fixed, slice(places[0], places[-1] + 1) if places else slice(0, 0))
+
+    def fits(self, data: bytes) -> bool:
+        """Whether `data` has this length and these fixed bytes."""
+        pairs = zip(self.fixed, data, strict=False)
+        return len(data) == len(self.fixed) and all(fixed in (None, byte) for fixed, byte in pairs)
+
+
+class FrameChecksum(BaseModel):
+    """How the checksum of a frame is made."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: ChecksumKind
+    first: Annotated[int, Field(ge=0)] = Field(default=0, description="first byte that it covers, from 0")
+    end: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="byte before which it ends; the checksum itself if left out"
+    )
+    byte_order: Literal["little", "big"] = Field(default="little", description="of a checksum of two bytes")
+
+    def fits(self, data: bytes, place: slice) -> bool:
+        """Whether the bytes at `place` are the checksum of what it covers."""
+        said = data[place]
+        made = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
+        return said == (made if self.byte_order == "little" else made[::-1])
+
+
+class FrameChannel(MeasuredChannel):
+    """One number in the frame."""
+
+    at: Annotated[int, Field(ge=0)] = Field(description="its first byte, from 0")
+    type: NumberType
+    byte_order: Literal["little", "big"] = Field(default="little", description="of a number in several bytes")
+    invalid: dict[float, SaidQuality] = Field(default={}, description="numbers that are none, and what they mean")
+
+    @property
+    def length(self) -> int:
+        """Bytes that the number takes."""
+        return int(re.sub(r"\D", "", self.type)) // 8
+
+    def number(self, data: bytes) -> float:
+        """The number in a whole frame, as sent."""
+        raw = data[self.at : self.at + self.length]
+        if code := _FLOATS.get(self.type):
+            (value,) = struct.unpack(f"{'<' if self.byte_order == 'little' else '>'}{code}", raw)
+            return float(value)
+        return float(int.from_bytes(raw, self.byte_order, signed=self.type.startswith("int")))
+
+
+class ErrorFrame(BaseModel):
+    """A reply that stands for the whole poll."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    frame: str = Field(description="its bytes, as in `frame`")
+    quality: SaidQuality = Field(description="what it means")
+    says: str = Field(default="", description="in words, for the status")
+
+
+class SerialFrameOptions(ExchangeOptions):
+    """Options of a described binary gauge."""
+
+    out: str = Field(min_length=2, description="the request in hexadecimal bytes, its checksum included")
+    frame: str = Field(min_length=2, description="the reply: hexadecimal bytes, `..` for any, `CS` for the checksum")
+    checksum: FrameChecksum | None = Field(default=None, description="how `CS` is made")
+    channels: tuple[FrameChannel, ...] = Field(min_length=1)
+    errors: tuple[ErrorFrame, ...] = Field(default=(), description="replies that are errors")
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if doubled := twice([channel.name for channel in self.channels]):
+            raise ValueError(f"channel named twice: {doubled}")
+        bytes.fromhex(self.out)
+        frame = Frame.of(self.frame)
+        place = frame.checksum
+        needed = CHECKSUMS[self.checksum.kind].length if self.checksum else 0
+        if place.stop - place.start != needed:
+            raise ValueError(f"`frame` has {place.stop - place.start} bytes CS, `checksum` makes {needed}")
+        if self.checksum and not self.checksum.first < (self.checksum.end or place.start) <= len(frame.fixed):
+            raise ValueError("`checksum` covers nothing: see `first` and `end`")
+        if not self.checksum and sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
+            raise ValueError(f"a frame without a checksum needs {FEWEST_FIXED_BYTES} fixed bytes to be known by")
+        for channel in self.channels:
+            if channel.at + channel.length > len(frame.fixed):
+                raise ValueError(f"channel {channel.name} ends beyond the frame's {len(frame.fixed)} bytes")
+        for error in self.errors:
+            short = Frame.of(error.frame).fixed
+            if len(short) > len(frame.fixed):
+                raise ValueError("an error's frame must not be longer than the reply")
+            if all(None in (a, b) or a == b for a, b in zip(short, frame.fixed, strict=False)):
+                raise ValueError(f"error {error.frame!r} could be the beginning of a reply")
+        return self
+
+
+class SerialFrame(Gauge[ByteLine]):
+    """One described device."""
+
+    Options: ClassVar[type[GaugeOptions]] = SerialFrameOptions
+    line_kind = "bytes"
+
+    def __init__(self, options: SerialFrameOptions) -> None:
+        super().__init__(options)
+        self._said = options
+        self._request = bytes.fromhex(options.out)
+        self._frame = Frame.of(options.frame)
+        self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
+        self._channels = tuple(channel.channel for channel in options.channels)
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        """Raises LineFault: as the line does, CRC for a wrong checksum, MISMATCH for other fixed bytes."""
+        time_s = line.send(self._request)
+        data, error = self._receive(line)
+        nothing_behind(line, self._said, data)
+        if error is not None:
+            detail = f"{data.hex(' ')}: {error.says}" if error.says else data.hex(" ")
+            return [bad(time_s, Quality(error.quality), detail)] * len(self._channels)
+        if self._said.checksum and not self._said.checksum.fits(data, self._frame.checksum):
+            raise LineFault(Quality.CRC, data.hex(" "))
+        if not self._frame.fits(data):
+            raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._said.frame}")
+        return [_reading(channel, data, time_s) for channel in self._said.channels]
+
+    def _receive(self, line: ByteLine) -> tuple[bytes, ErrorFrame | None]:
+        """The reply, and the error that it is, if it is one."""
+        data = b""
+        for length in sorted({len(frame.fixed) for frame in (self._frame, *(frame for frame, _ in self._errors))}):
+            if not data:
+                data = receive(line, self._said, length)
+            while len(data) < length:
+                data += following(line, self._said, length - len(data) if self._said.gap_timeout_s is None else 1, data)
+            for frame, error in self._errors:
+                if frame.fits(data):
+                    return data, error
+        return data, None
+
+
+def _reading(channel: FrameChannel, data: bytes, time_s: float) -> Reading:
+    number = channel.number(data)
+    if number in channel.invalid:
+        return bad(time_s, Quality(channel.invalid[number]), f"number {number:g}")
+    return channel.reading(number, time_s)

@@ -1,0 +1,37 @@
+"""The other end of a Millimar C1202: three features by the manual's page 82; silent while `in_menu`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from compd.simulation.device import Sense
+from compd_drivers.simulated.commands import CommandDevice
+
+MM_IN = {"mm": 1.0, "um": 1e-3, "inch": 25.4}
+FEATURES = (1, 2, 3)
+
+
+class SimulatedC1202(CommandDevice):
+    """Shows its channels `1`, `2`, `3`; a feature that is not configured, or whose sensor is off, is ERR6."""
+
+    def __init__(self, options: Any, sense: Sense) -> None:
+        super().__init__(options, sense)
+        self.in_menu = False
+
+    def answer(self, command: str) -> str:
+        if self.in_menu:
+            return ""
+        if command == "?":
+            return ";".join(map(self._shown, FEATURES)) + "\r"
+        if command in {"M1?", "M2?", "M3?"}:
+            return self._shown(int(command[1])) + "\r"
+        return "ERR1\r"
+
+    def _shown(self, feature: int) -> str:
+        value_mm = self.sense(str(feature)) if feature in self.options.features else math.nan
+        if not math.isfinite(value_mm):
+            return f"{feature} ERR6"
+        width = 2 + self.options.digits + self.options.decimals
+        value = f"{value_mm / MM_IN[self.options.unit]:+0{width}.{self.options.decimals}f}"
+        return f"{feature} {value} {self.options.unit}"

@@ -1,0 +1,131 @@
+"""The other end of a described ASCII gauge: answers its `out` with what its `in` shows, printed as C would.
+
+It hears only what the description holds. A sensor that is off is shown by a word or an error reply that the
+description has for it; without one the device is silent.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from compd.simulation.device import Sense, SimulatedByteDevice
+
+MM_IN = {"um": 1e-3, "nm": 1e-6, "inch": 25.4, "mil": 0.0254}
+OTHER = {"kN": 1e3, "kPa": 10.0, "Pa": 1e-2}
+ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
+TOKEN = re.compile(
+    r"%%|%(0?)(\d*)<(\w+)>|%\*\??(\d*)(?:[cdefxs]|\[(\^?)\]?([^\]]*)\])|%(?:\((\w+)\))?([+ 0]*\d*(?:\.\d+)?)([fdex])"
+)
+
+
+def plain(text: str) -> str:
+    r"""Text with \r, \xHH and the like replaced."""
+    return re.sub(
+        r"\\(?:x([0-9A-Fa-f]{2})|(.))", lambda m: chr(int(m[1], 16)) if m[1] else ESCAPES[m[2]], text, flags=re.DOTALL
+    )
+
+
+class SimulatedAscii(SimulatedByteDevice):
+    """Answers the measuring request, the `init` exchanges and the `echo`."""
+
+    def __init__(self, options: Any, sense: Sense) -> None:
+        super().__init__(options, sense)
+        end = plain(options.out_terminator)
+        others = [*options.init, *([options.echo] if options.echo else [])]
+        self._replies = {(plain(one.out) + end).encode("latin-1"): one.in_ for one in others}
+        if options.out:
+            self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
+        self._heard = b""
+
+    def hear(self, data: bytes) -> bytes:
+        self._heard += data
+        replies = ""
+        while asked := self._next():
+            replies += self._answer(asked)
+        return replies.encode("latin-1")
+
+    def _next(self) -> bytes:
+        """The first whole request in what was heard, taken out of it."""
+        places = {request: self._heard.find(request) for request in self._replies}
+        found = {request: place for request, place in places.items() if place >= 0}
+        if not found:
+            self._heard = self._heard[-max(map(len, self._replies), default=0) :]
+            return b""
+        first = min(found, key=lambda request: (found[request], -len(request)))
+        self._heard = self._heard[found[first] + len(first) :]
+        return first
+
+    def _answer(self, request: bytes) -> str:
+        end = plain(self.options.in_terminator)
+        form = self._replies[request]
+        words = {}
+        for channel in self.options.channels if form == self.options.in_ else ():
+            value = self.sense(channel.name)
+            if not math.isfinite(value):
+                word = next((word for word, meant in channel.instead.items() if meant == "sensor_fault"), None)
+                if word is None:
+                    error = next((one.in_ for one in self.options.errors if one.quality == "sensor_fault"), None)
+                    return self._printed(error, {}) + end if error is not None else ""
+                words[channel.name] = plain(word)
+        return self._printed(form, words) + end
+
+    def _printed(self, form: str, words: dict[str, str]) -> str:
+        """`form` with numbers, blanks for what the driver skips, and checksums."""
+        text, done, at = plain(form), "", 0
+        for token in TOKEN.finditer(text):
+            done += text[at : token.start()]
+            at = token.end()
+            done += self._token(token, done, words)
+        return done + text[at:]
+
+    def _token(self, token: re.Match[str], before: str, words: dict[str, str]) -> str:
+        if token[0] == "%%":
+            return "%"
+        if token[3]:
+            return checksum(token[3], before[int(token[2] or 0) :].encode("latin-1"), bool(token[1]))
+        if token[9]:
+            name = token[7] or self.options.channels[0].name
+            return words.get(name) or self._number(name, f"%{token[8]}{token[9]}")
+        if "?" in token[0]:
+            return ""
+        filler = "0" if token[0][-1] in "cdefx" or token[5] else (token[6] or "x")[0]
+        return filler * int(token[4] or 1)
+
+    def _number(self, name: str, form: str) -> str:
+        channel = next(one for one in self.options.channels if one.name == name)
+        value = self.sense(name)
+        match channel.unit:
+            case "degF":
+                value = value * 9 / 5 + 32
+            case "K":
+                value += 273.15
+            case unit:
+                value /= MM_IN.get(unit, OTHER.get(unit, 1.0))
+        value = value / channel.scale * 10**channel.decimals
+        return str(form % (round(value) if form[-1] in "dx" else value))
+
+
+def checksum(kind: str, data: bytes, hexadecimal: bool) -> str:
+    if kind == "crc16_modbus":
+        crc = 0xFFFF
+        for byte in data:
+            crc ^= byte
+            for _ in range(8):
+                crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+        return f"{crc:04X}" if hexadecimal else crc.to_bytes(2, "little").decode("latin-1")
+    value = 0
+    for byte in data:
+        match kind:
+            case "sum8":
+                value = (value + byte) % 256
+            case "negative_sum8":
+                value = (value - byte) % 256
+            case "xor8":
+                value ^= byte
+            case "crc8":
+                value ^= byte
+                for _ in range(8):
+                    value = ((value << 1) ^ (0x07 if value & 0x80 else 0)) & 0xFF
+    return f"{value:02X}" if hexadecimal else chr(value)

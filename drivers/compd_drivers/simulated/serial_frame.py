@@ -1,0 +1,66 @@
+"""The other end of a described binary gauge: answers its `out` with its `frame`."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+from compd.simulation.device import Sense, SimulatedByteDevice
+from compd_drivers.simulated.serial_ascii import MM_IN, OTHER, checksum
+from compd_drivers.simulated.transducer import signal_for
+
+FLOATS = {"float32": "f", "float64": "d"}
+
+
+class SimulatedFrame(SimulatedByteDevice):
+    """A sensor that is off shows its first `invalid` number, nan in a float, or else nothing."""
+
+    def __init__(self, options: Any, sense: Sense) -> None:
+        super().__init__(options, sense)
+        self._request = bytes.fromhex(options.out)
+        self._heard = b""
+
+    def hear(self, data: bytes) -> bytes:
+        self._heard += data
+        replies = b""
+        while self._request in self._heard:
+            _, _, self._heard = self._heard.partition(self._request)
+            replies += self._frame()
+        self._heard = self._heard[-len(self._request) :]
+        return replies
+
+    def _frame(self) -> bytes:
+        tokens = self.options.frame.split()
+        frame = bytearray(0 if token in {"..", "CS"} else int(token, 16) for token in tokens)
+        for channel in self.options.channels:
+            number = self._number(channel)
+            if number is None:
+                return b""
+            frame[channel.at : channel.at + channel.length] = number
+        if "CS" in tokens:
+            first = tokens.index("CS")
+            check = self.options.checksum
+            end = check.end or first
+            made = checksum(check.kind, bytes(frame[check.first : end]), hexadecimal=False).encode("latin-1")
+            frame[first : first + len(made)] = made if check.byte_order == "little" else made[::-1]
+        return bytes(frame)
+
+    def _number(self, channel: Any) -> bytes | None:
+        value = self.sense(channel.name)
+        if not math.isfinite(value):
+            if not channel.invalid and channel.type not in FLOATS:
+                return None
+            number = next(iter(channel.invalid), math.nan)
+        elif channel.linearisation is not None:
+            number = signal_for(channel.linearisation, value) / channel.scale
+        else:
+            number = value / MM_IN.get(channel.unit, OTHER.get(channel.unit, 1.0)) / channel.scale
+        if channel.type in FLOATS:
+            return struct.pack(f"{'<' if channel.byte_order == 'little' else '>'}{FLOATS[channel.type]}", number)
+        signed = channel.type.startswith("int")
+        length = int(channel.length)
+        bits = 8 * length
+        low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+        count = min(high, max(low, round(number)))
+        return int(count).to_bytes(length, "little" if channel.byte_order == "little" else "big", signed=signed)
