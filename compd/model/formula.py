@@ -1,8 +1,8 @@
 """Formulas as people write them, checked: a few arithmetic nodes of Python's syntax tree, nothing else.
 
 Nothing is ever compiled or executed: a formula is text until `parse` has checked every node of its tree against a
-list, and then numbers (`compd.model.expression`). An effect must be linear in its fitted parameters; a parameter in which the
-formula is not linear becomes a shape constant.
+list, and then numbers (`compd.model.expression`). An effect must be linear in its fitted parameters; a parameter in
+which the formula is not linear becomes a shape constant.
 """
 
 from __future__ import annotations
