@@ -128,6 +128,7 @@ def rename(table: Table, faults: Faults) -> Table:
         table.row,
         {names[name]: labels for name, labels in table.labels.items() if name in names},
         table.blank_rows,
+        frozenset(names[name] for name in table.wrong if name in names),
     )
 
 

@@ -112,7 +112,7 @@ def _is_units_row(rows: Sequence[Row]) -> bool:
     return words >= 2 and words * 2 >= len(filled) and (not below or digits * 2 > len(below))
 
 
-def _full_rows(rows: Sequence[Row], width: int, faults: Faults) -> list[Row]:
+def _full_rows(rows: Sequence[Row], width: int, faults: Faults) -> Sequence[Row]:
     """Rows padded or cut to the header's width; too few cells, or filled ones beyond the header, are reported."""
     short = [(number, len(cells)) for number, cells in rows if len(cells) < width]
     long = [(number, len(cells)) for number, cells in rows if any(cells[width:])]
@@ -121,4 +121,6 @@ def _full_rows(rows: Sequence[Row], width: int, faults: Faults) -> list[Row]:
             faults.add(rows_text([number for number, _ in wrong]), what,
                        values_text(f"{count} cells" for _, count in wrong), f"{width} cells",
                        "complete the row, or delete it; a decimal comma also makes cells")  # fmt: skip
-    return [(number, (cells + [""] * width)[:width]) for number, cells in rows]
+    for _, cells in rows:
+        cells[width:] = [""] * (width - len(cells))
+    return rows

@@ -52,7 +52,10 @@ def check_values(table: Table, faults: Faults) -> None:
 
 
 def check_rows(table: Table, excluded: BoolArray, needed: Iterable[str], faults: Faults) -> None:
-    """At least two rows must have everything; otherwise say where they went."""
+    """At least two rows must have everything; otherwise say where they went.
+
+    A cell that was reported as wrong counts as filled: one mistake is told once.
+    """
     rows = len(table.row)
     if rows < 2:
         faults.add("", "no rows" if rows == 0 else "only one row", allowed="two rows or more",
@@ -61,6 +64,8 @@ def check_rows(table: Table, excluded: BoolArray, needed: Iterable[str], faults:
     left = ~excluded
     reasons = [f"{int(excluded.sum())} excluded in the sidecar"] if excluded.any() else []
     for name in needed:
+        if name in table.wrong:
+            continue
         empty = left & np.isnan(table.columns[name])
         if empty.any():
             reasons.append(f"{int(empty.sum())} without {name}")

@@ -6,13 +6,11 @@ empty rows and columns at the end. Everything else that a spreadsheet may write 
 
 from __future__ import annotations
 
-import io
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from compd.workbench.cells import AMBIGUOUS_COMMA, DECIMAL_COMMA, CellFault, fault_of
@@ -39,6 +37,7 @@ class Table:
     row : (N,) the row as a spreadsheet numbers it; the header is row 1.
     labels : name -> the different texts of a column of ids, in the order of their codes in `columns`.
     blank_rows : empty rows between others; they are not in `columns`.
+    wrong : names of columns with cells that were reported as wrong.
     """
 
     path: Path
@@ -48,6 +47,7 @@ class Table:
     row: IntArray
     labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
     blank_rows: int = 0
+    wrong: frozenset[str] = frozenset()
 
     def place(self, name: str) -> str:
         """A column for a person: its name and the letters over it."""
@@ -67,11 +67,11 @@ def read_table(path: Path, faults: Faults, is_header: IsHeader, id_columns: Coll
         return None
     head, _, body = content.removeprefix(b"\xef\xbb\xbf").partition(b"\n")
     names = [name.strip() for name in head.decode("ascii", "replace").split(",")]
-    plain = not body.translate(None, _PLAIN) and b'"' not in head and is_header(names)
+    plain = not body.translate(None, _PLAIN) and b'"' not in head and head.isascii() and is_header(names)
     if plain and _names_are_sound(names):
-        lines = body.splitlines()
-        if all(line.count(b",") == len(names) - 1 or not line for line in lines):
-            table = _read_plain(path, content, names, body)
+        lines = body.decode("ascii").splitlines()
+        if all(line.count(",") == len(names) - 1 or not line for line in lines):
+            table = _read_plain(path, content, names, lines)
             if table is not None:
                 return table
     return _read_any(path, content, faults, is_header, id_columns)
@@ -99,30 +99,19 @@ def _names_are_sound(names: Sequence[str]) -> bool:
     return all(names) and len(set(names)) == len(names)
 
 
-def _read_plain(path: Path, content: bytes, names: list[str], body: bytes) -> Table | None:
+def _read_plain(path: Path, content: bytes, names: list[str], lines: list[str]) -> Table | None:
     """The fast way; None when a cell is no number after all, so that the slow way can say which."""
-    try:
-        frame = pd.read_csv(
-            io.BytesIO(body),
-            header=None,
-            names=names,
-            dtype="float64",
-            keep_default_na=False,
-            na_values=[""],
-            skip_blank_lines=False,
-            float_precision="round_trip",
-        )
-    except ValueError:
+    values = _plain_numbers(",".join(filter(None, lines)).split(",")) if any(lines) else np.empty(0)
+    if values is None:
         return None
-    values = frame.to_numpy(np.float64)
-    if np.isinf(values).any():
-        return None
-    filled = ~np.isnan(values).all(axis=1)
-    row = np.flatnonzero(filled) + 2
+    rows = np.array([number for number, line in enumerate(lines, start=2) if line], dtype=np.int64)
+    by_row = values.reshape(len(rows), len(names))
+    filled = ~np.isnan(by_row).all(axis=1)
+    row = rows[filled]
     blank = int(row[-1] - 1 - len(row)) if len(row) else 0
-    columns = {name: np.ascontiguousarray(values[filled, i]) for i, name in enumerate(names)}
+    columns = {name: np.ascontiguousarray(by_row[filled, i]) for i, name in enumerate(names)}
     letters = {name: column_letters(i) for i, name in enumerate(names)}
-    return Table(path, content, letters, columns, row.astype(np.int64), blank_rows=blank)
+    return Table(path, content, letters, columns, row, blank_rows=blank)
 
 
 def _read_any(
@@ -135,33 +124,34 @@ def _read_any(
     row = np.array([number for number, _ in grid.rows], dtype=np.int64)
     columns: dict[str, FloatArray] = {}
     labels: dict[str, tuple[str, ...]] = {}
+    wrong: set[str] = set()
     commas = _Commas()
+    by_column = list(zip(*(cells for _, cells in grid.rows), strict=True))
     for name, index in grid.names.items():
-        cells = [cells[index] for _, cells in grid.rows]
+        cells = by_column[index] if by_column else ()
         values = _plain_numbers(cells)
         if values is None and name in id_columns:
             labels[name], values = _codes(cells)
         if values is None:
             place = f"column {name} ({column_letters(index)})"
             values = _checked_numbers(place, cells, row, faults, commas)
+            wrong.add(name)
         columns[name] = values
     commas.report(faults)
     letters = {name: column_letters(index) for name, index in grid.names.items()}
-    return Table(path, content, letters, columns, row, labels, grid.blank_rows)
+    return Table(path, content, letters, columns, row, labels, grid.blank_rows, frozenset(wrong))
 
 
 def _plain_numbers(cells: Sequence[str]) -> FloatArray | None:
     """The column as numbers; None when any cell is something else."""
-    if "".join(cells).translate(_NOTHING_BUT_NUMBERS):
+    # Python's own conversion is exact, but also takes 1_000, nan and inf
+    if "".join(cells).encode("utf-8", "replace").translate(None, _PLAIN):
         return None
     try:
         values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
     except ValueError:
         return None
     return None if np.isinf(values).any() else values
-
-
-_NOTHING_BUT_NUMBERS = str.maketrans("", "", "0123456789eE+-.")
 
 
 def _codes(cells: Sequence[str]) -> tuple[tuple[str, ...], FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 from collections.abc import Mapping
@@ -9,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import yaml
 from numpy.typing import ArrayLike
 
@@ -39,10 +39,11 @@ def write_recording(
     arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
     if problems := _problems(path, arrays, overwrite):
         raise RecordingError(problems)
-    frame = pd.DataFrame({name: _cells(name, values) for name, values in arrays.items()})
-    csv_text = frame.to_csv(index=False, lineterminator="\n")
+    cells = [_cells(name, values) for name, values in arrays.items()]
+    lines = [",".join(arrays), *map(",".join, zip(*cells, strict=True))]
+    csv_text = "\n".join(lines) + "\n"
     yaml_text = yaml.safe_dump(dict(sidecar), sort_keys=False, allow_unicode=True)
-    _write_all({path.with_suffix(".yaml"): yaml_text, path: csv_text})
+    _write_all(path, csv_text, path.with_suffix(".yaml"), yaml_text)
 
 
 def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
@@ -74,30 +75,39 @@ def _rounded(name: str, values: FloatArray) -> FloatArray:
     return np.round(values, DECIMALS[unit]) if unit in DECIMALS else values
 
 
-def _cells(name: str, values: FloatArray) -> pd.Series[Any]:
-    """A column as it is written: ids and directions as whole numbers, the rest with a point."""
-    column = known(name)
-    whole = column is not None and not column.unit
-    return pd.Series(_rounded(name, values)).astype("Int64") if whole else pd.Series(_rounded(name, values))
+def _cells(name: str, values: FloatArray) -> list[str]:
+    """A column as it is written: the shortest text that reads back as the same number, without a needless ".0"."""
+    return ["" if math.isnan(value) else repr(value).removesuffix(".0") for value in _rounded(name, values).tolist()]
 
 
-def _write_all(texts: Mapping[Path, str]) -> None:
-    """Every text to its file, or none: temporary files beside them, flushed, then renamed."""
-    written: list[tuple[str, Path]] = []
+def _write_all(csv_path: Path, csv_text: str, yaml_path: Path, yaml_text: str) -> None:
+    """Both files or none: temporary files beside them, flushed, then renamed; the sidecar is put back if the
+    last step fails."""
+    temporary: list[Path] = []
     try:
-        for target, text in texts.items():
-            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            written.append((temporary, target))
-            with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-        for temporary, target in written:
-            # a temporary file is for its owner alone; a recording is read like any other file
-            Path(temporary).chmod(0o644)
-            Path(temporary).replace(target)
+        new_csv = _written(csv_path, csv_text, temporary)
+        new_yaml = _written(yaml_path, yaml_text, temporary)
+        old_yaml = yaml_path.read_bytes() if yaml_path.exists() else None
+        new_yaml.replace(yaml_path)
+        try:
+            new_csv.replace(csv_path)
+        except OSError:
+            yaml_path.unlink() if old_yaml is None else yaml_path.write_bytes(old_yaml)
+            raise
     except OSError as error:
-        for temporary, _ in written:
-            Path(temporary).unlink(missing_ok=True)
-        first = next(iter(texts))
-        raise RecordingError(Problem(str(first.parent), f"cannot be written to: {error.strerror}")) from error
+        for path in temporary:
+            path.unlink(missing_ok=True)
+        raise RecordingError(Problem(str(csv_path.parent), f"cannot be written to: {error.strerror}")) from error
+
+
+def _written(target: Path, text: str, temporary: list[Path]) -> Path:
+    """A file beside `target` that holds `text`, on the disk."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    temporary.append(Path(name))
+    with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    # a temporary file is for its owner alone; a recording is read like any other file
+    temporary[-1].chmod(0o644)
+    return temporary[-1]
