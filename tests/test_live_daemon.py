@@ -150,8 +150,9 @@ def test_udp_carries_one_packet_per_cycle_and_the_same_numbers(tmp_path):
             while not set(packets) & set(lines) or max(packets) < max(lines):
                 packet = receiver.recv(2048)
                 packets[struct.unpack_from("<Q", packet, 8)[0]] = packet
-    seqs = sorted(packets)
-    assert seqs == list(range(seqs[0], seqs[-1] + 1)), "every cycle, missed ones excepted"
+            missed = client.status()["loop"]["missed_cycles"]
+    gaps = max(packets) - min(packets) + 1 - len(packets)
+    assert gaps <= missed, "one for every cycle"
     for seq in set(packets) & set(lines):
         valid = bool(struct.unpack_from("<H", packets[seq], 40)[0] & 1)
         assert valid == lines[seq]["valid"]
