@@ -12,9 +12,9 @@ import pytest
 
 from compd.configuration.operation import Loop as LoopSettings
 from compd.errors import Problem, StateError
-from compd.live import realtime
 from compd.live.loop import Loop, Orders
 from compd.live.notify import Notifier
+from compd.live.realtime import sleep_until
 from compd.live.setpoint import Mode, Setpoint, State
 from compd.live.timing import Histogram, LoopTiming
 from compd.readings import Latest
@@ -124,7 +124,7 @@ def test_the_sleeper_does_not_wake_early_even_through_signals():
     try:
         end_s = time.monotonic() + 0.05
         signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
-        realtime.sleep_until(end_s)
+        sleep_until(end_s)
         assert time.monotonic() >= end_s
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
@@ -133,7 +133,7 @@ def test_the_sleeper_does_not_wake_early_even_through_signals():
 
 
 def test_a_time_that_has_passed_is_not_slept_for():
-    realtime.sleep_until(0.0)
+    sleep_until(0.0)
 
 
 def test_period_statistics_are_those_of_the_periods():
