@@ -21,13 +21,15 @@ class Device:
         self.continuity = Continuity(FASTEST_MM_PER_S)
         self.asked = 0
 
-    def poll(self, *answers: float | Quality) -> Reading:
+    def poll(self, *answers: float | Quality | LineFault) -> Reading:
         waiting = list(answers)
 
         def ask() -> list[Reading]:
             self.time_s += POLL_S
             self.asked += 1
             answer = waiting.pop(0)
+            if isinstance(answer, LineFault):
+                raise answer
             return [bad(self.time_s, answer) if isinstance(answer, Quality) else good(answer, self.time_s)]
 
         (reading,) = self.continuity.read(ask)
@@ -62,7 +64,7 @@ def test_damage_twice_is_a_fault_and_the_next_poll_is_right() -> None:
         device.poll(7.0, 9.0)
     assert caught.value.quality is Quality.MISMATCH
     assert "7.0000" in caught.value.detail
-    assert device.poll(1.0).value == 1.0
+    assert device.poll(1.0, 1.0).value == 1.0, "after a fault two must agree"
 
 
 def test_after_a_long_silence_two_must_agree() -> None:
@@ -70,6 +72,17 @@ def test_after_a_long_silence_two_must_agree() -> None:
     device.poll(1.0, 1.0)
     device.time_s += MEMORY_S
     assert device.poll(1.0, 1.0).value == 1.0
+
+
+def test_a_gap_does_not_widen_what_a_value_may_have_moved() -> None:
+    device = Device()
+    device.poll(1.0, 1.0)
+    with pytest.raises(LineFault):
+        device.poll(LineFault(Quality.TIMEOUT))
+    device.time_s += 0.5  # time enough to have moved by 0.4
+    with pytest.raises(LineFault) as caught:
+        device.poll(1.4, 1.0)
+    assert caught.value.quality is Quality.MISMATCH
 
 
 def test_no_value_needs_no_proof_and_is_no_proof() -> None:

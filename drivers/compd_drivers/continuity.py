@@ -2,7 +2,8 @@
 
 A value that has moved further than it can since the last poll is asked for once more. It counts when the second
 answer agrees with the first (it did jump: somebody set the display) or with the last one (the first was damaged).
-What noise on the wire can still feign is as small as what the part could truly have moved in that time.
+What noise on the wire can still feign is as small as what the part can move from one poll to the next: after a
+poll that failed, nothing is remembered, and two answers must agree.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ class Continuity:
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
         """The readings of one poll by `ask`, or of a second one. Raises LineFault: MISMATCH when no two agree."""
+        remembered, self._last = self._last, ()
         first = ask()
-        last = self._last or [None] * len(first)
+        last = remembered or [None] * len(first)
         if not all(map(self._follows, first, last)):
             second = ask()
             for now, before, earlier in zip(second, first, last, strict=True):
