@@ -157,6 +157,7 @@ class Gauge(ABC, Generic[LineT]):
         "format" where only the shape of a reply tells damage.
     sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver.
     sample_range : what the gauge can show with these options, in its channels' unit.
+    usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
@@ -164,6 +165,7 @@ class Gauge(ABC, Generic[LineT]):
     integrity: ClassVar[Literal["checksum", "format"]] = "format"
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
+    usual_line: ClassVar[tuple[int, str] | None] = None
 
     def __init__(self, options: Any) -> None:
         """`options` is an instance of this class's `Options`."""

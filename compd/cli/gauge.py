@@ -1,0 +1,229 @@
+"""`compd gauge`: from a plug to a number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from compd.cli.gauge_statistics import GaugeStatistics
+    from compd.cli.gauge_target import Target
+    from compd.gauge import Reading
+
+app = typer.Typer(no_args_is_help=True, help="Gauges: list, find, read, watch, learn.")
+
+TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
+NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
+Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, or host:port.")]
+Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
+Format = Annotated[str | None, typer.Option("--format", help="8N1, 7E2 ..., from the device's manual.")]
+Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="How long to wait for the first byte, s.")]
+Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9. Repeatable.")]
+
+
+@app.command("list")
+def list_gauges() -> None:
+    """List the installed drivers and presets, and where each protocol comes from."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
+
+    simulated = set(names(SIMULATED_GAUGES))
+    table = Table("driver", "line carries", "what it is", "options it needs", "simulated")
+    for name in names(GAUGES):
+        driver = load(GAUGES, name, name)
+        needs = [key for key, field in driver.Options.model_fields.items() if field.is_required()]
+        said = _first_line(driver)
+        table.add_row(name, driver.line_kind, said, ", ".join(key.rstrip("_") for key in needs if key not in
+                      ("driver", "line")), "yes" if name in simulated else "no")  # fmt: skip
+    Console().print(table)
+    typer.echo("An unknown gauge: `compd gauge learn`. One more driver: docs/add-a-gauge.md.")
+
+
+@app.command()
+def scan(
+    probe: Annotated[
+        bool, typer.Option("--probe", help="Ask every port with each preset's read request. SENDS BYTES to all ports.")
+    ] = False,
+) -> None:
+    """Find serial ports; with --probe, look which preset gets an answer."""
+    from compd.cli.gauge_scan import candidates, ports, probe_port
+
+    found = ports()
+    if not found:
+        typer.echo("no serial port found; is the adapter plugged in, and are you in group dialout?")
+        return
+    for port in found:
+        typer.echo(f"{port.path}\n    {port.device}  {port.description}")
+    if not probe:
+        return
+    typer.echo("Every preset's read request now goes to every port, at that preset's usual baud rate. A device that\n"
+               "is no gauge may take it for a command.")  # fmt: skip
+    typer.confirm("Is nothing dangerous connected?", abort=True)
+    for port in found:
+        for candidate in candidates():
+            typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: "
+                       f"{probe_port(port.path, candidate)}")  # fmt: skip
+
+
+@app.command()
+def read(
+    target: TargetArgument,
+    name: NameArgument = None,
+    port: Port = "",
+    baud: Baud = None,
+    format_: Format = None,
+    timeout_s: Timeout = 1.0,
+    assignments: Set = None,
+) -> None:
+    """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
+    from compd.cli.gauge_target import open_seen
+    from compd.clock import MonotonicClock
+    from compd.gauge import LineFault
+
+    found = _target(target, name, port, baud, format_, timeout_s, assignments)
+    clock = MonotonicClock()
+    started_s = clock.monotonic()
+
+    def show(direction: str, data: bytes) -> None:
+        typer.echo(f"{(clock.monotonic() - started_s) * 1e3:8.1f} ms {direction} {data.hex(' ')}   {data!r}")
+
+    try:
+        line = open_seen(found.line, clock, show)
+        try:
+            readings = found.gauge.read(line)
+        finally:
+            line.close()
+    except LineFault as fault:
+        typer.echo(f"{found.name}: {fault}")
+        raise typer.Exit(1) from fault
+    for channel, reading in zip(found.gauge.channels, readings, strict=True):
+        typer.echo(f"{found.name}.{channel.name}: {_shown(reading, channel.unit)}")
+    raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
+
+
+@app.command()
+def watch(
+    target: TargetArgument,
+    name: NameArgument = None,
+    port: Port = "",
+    baud: Baud = None,
+    format_: Format = None,
+    timeout_s: Timeout = 1.0,
+    assignments: Set = None,
+    polls: Annotated[int | None, typer.Option(min=1, help="Stop after so many polls; Ctrl-C if left out.")] = None,
+) -> None:
+    """Poll one gauge as fast as its line goes: values, rate, age, noise and faults."""
+    from rich.console import Console
+    from rich.live import Live
+
+    from compd.cli.gauge_statistics import GaugeStatistics
+    from compd.cli.gauge_target import polled
+    from compd.clock import MonotonicClock
+
+    found = _target(target, name, port, baud, format_, timeout_s, assignments)
+    clock = MonotonicClock()
+    statistics = GaugeStatistics(found.gauge.channels)
+    console = Console()
+    with Live(console=console, refresh_per_second=5) as live:
+        try:
+            for readings in polled(found, clock, polls):
+                statistics.add(readings, clock.monotonic())
+                live.update(_watched(found.name, statistics, clock.monotonic()))
+        except KeyboardInterrupt:
+            return
+
+
+@app.command()
+def learn(
+    unit: Annotated[str, typer.Option(help="Unit of the numbers on the wire: mm, um, inch, degC ...")],
+    capture: Annotated[
+        Path | None, typer.Argument(help='File of lines `> 3F 0D` and `< 2B 31 ...` (hex), or > "?\\r" (text).')
+    ] = None,
+    port: Port = "",
+    baud: Baud = None,
+    format_: Format = None,
+    timeout_s: Timeout = 1.0,
+    out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
+    replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
+    names: Annotated[str, typer.Option(help="Names of the channels, with commas between.")] = "",
+    error: Annotated[list[str] | None, typer.Option(help="An error reply: 'ERR0=sensor_fault'. Repeatable.")] = None,
+    to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
+) -> None:
+    """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
+    import yaml
+
+    from compd.cli.gauge_capture import capture_live, read_capture
+    from compd.cli.gauge_target import Wire, byte_settings_of
+    from compd.learning import learn as learn_from
+    from compd.learning import verify
+    from compd.plugins import GAUGES, load
+
+    if capture is not None:
+        request, seen = read_capture(capture)
+    elif port:
+        settings = byte_settings_of(Wire(port, baud, format_, timeout_s))
+        request, seen = capture_live(settings, out, replies, _between_captures, typer.echo)
+    else:
+        raise typer.BadParameter("name a capture file, or a --port")
+    errors = {}
+    for one in error or []:
+        text, _, quality = one.partition("=")
+        errors[text.encode("latin-1")] = quality
+    chosen = [one.strip() for one in names.split(",") if one.strip()]
+    learned = learn_from(request, seen, unit, chosen, errors)
+    said = verify(learned, load(GAUGES, "serial_ascii", "driver serial_ascii"), seen)
+    for reply, values in zip(seen, said, strict=True):
+        typer.echo(f"# {reply!r} -> {values}")
+    for note in learned.notes:
+        typer.echo(f"# note: {note}")
+    text = yaml.safe_dump({"learned_gauge": {**learned.options, "line": "name_of_its_line"}}, sort_keys=False)
+    typer.echo(text)
+    if to is not None:
+        to.write_text(text, encoding="utf-8")
+
+
+def _between_captures(done: int, wanted: int) -> None:
+    typer.prompt(f"{done} of {wanted} captured; move the gauge, then Enter", default="", show_default=False)
+
+
+def _target(
+    target: str, name: str | None, port: str, baud: int | None, form: str | None, timeout_s: float,
+    assignments: Sequence[str] | None,
+) -> Target:  # fmt: skip
+    from compd.cli.gauge_target import Wire, by_driver, configured
+
+    if target.endswith((".yaml", ".yml")):
+        return configured(Path(target), name)
+    if not port:
+        raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
+    return by_driver(target, Wire(port, baud, form, timeout_s), assignments or ())
+
+
+def _first_line(driver: Any) -> str:
+    import sys
+
+    module = sys.modules[driver.__module__].__doc__ or driver.__doc__ or ""
+    return module.strip().splitlines()[0] if module.strip() else ""
+
+
+def _shown(reading: Reading, unit: str) -> str:
+    return f"{reading.value:.6f} {unit}" if reading.ok else f"{reading.quality} {reading.detail}".rstrip()
+
+
+def _watched(name: str, statistics: GaugeStatistics, now_s: float) -> Any:
+    from rich.table import Table
+
+    faults = ", ".join(f"{quality} {count}" for quality, count in statistics.faults.items()) or "none"
+    table = Table("channel", "value", "mean", "noise (1 sigma)", "age, ms",
+                  title=f"{name}: {statistics.polls} polls, {statistics.rate_hz:.1f} Hz, faults: {faults}")  # fmt: skip
+    for k, (channel, reading) in enumerate(zip(statistics.channels, statistics.last, strict=True)):
+        scale, unit = (1e3, "um") if channel.unit == "mm" else (1.0, channel.unit)
+        noise, age_ms = statistics.noise(k) * scale, statistics.age_s(k, now_s) * 1e3
+        table.add_row(channel.name, _shown(reading, channel.unit), f"{statistics.mean(k):.6f} {channel.unit}",
+                      f"{noise:.3f} {unit}", f"{age_ms:.1f}")  # fmt: skip
+    return table
