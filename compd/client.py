@@ -60,7 +60,7 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
 
 
 class Client:
-    """A connection to the daemon. Messages are dictionaries as docs/protocol.md describes them.
+    """A connection to the daemon. Messages are dictionaries as README.md describes them.
 
     version : the daemon's VERSION message.
     """

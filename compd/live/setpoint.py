@@ -48,7 +48,7 @@ _DECIMALS_S = 6
 
 # magic, version, size, seq, time, valid_until, age, flags, state, mode, links, 3 spare bytes, tip 3, frame
 # displacement 3, frame rotation 3, then link length, scale setpoint and correction for 6 links, configuration hash;
-# a CRC-32 follows. docs/protocol.md gives every offset.
+# a CRC-32 follows. README.md gives every offset.
 _PACKET = struct.Struct("<4sHHQdddHBBB3x3d3d3d6d6d6d8s")
 _MAGIC = b"CMPD"
 _VERSION = 1
