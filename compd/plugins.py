@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import stat
+import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -55,10 +56,13 @@ def _load_file(file: Path, class_name: str, where: str) -> Any:
             Problem(where, "the driver's file may be written by group or others", value,
                     "mode 644 or stricter", f"chmod go-w {file}")
         )  # fmt: skip
-    spec = importlib.util.spec_from_file_location(f"compd_file_{file.stem}", file)
+    # one name per path: its classes look their own module up by it (pydantic resolves annotations there)
+    module_name = "compd_file_" + re.sub(r"\W", "_", str(file))
+    spec = importlib.util.spec_from_file_location(module_name, file)
     if spec is None or spec.loader is None:
         raise PluginError(Problem(where, "not a Python file", value))
     module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
         return getattr(module, class_name)
