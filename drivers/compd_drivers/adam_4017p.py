@@ -11,7 +11,8 @@ set differently in the module goes unseen. Compare both once with a meter.
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -49,6 +50,15 @@ class Adam4017p(Modbus):
     """One module; adjacent inputs in one read."""
 
     Options = Adam4017pOptions
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "unit": 1,
+        "channels": [
+            {"name": "a", "input": 0, "range": "+-10V",
+             "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]}},
+            {"name": "b", "input": 7, "range": "4-20mA",
+             "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}},
+        ],
+    }  # fmt: skip
 
     def __init__(self, options: Adam4017pOptions) -> None:
         super().__init__(register_map(options, [_channel(one) for one in options.channels]))

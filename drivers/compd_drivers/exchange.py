@@ -11,7 +11,16 @@ from compd.gauge import ByteLine, GaugeOptions, LineFault, Quality
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class ExchangeOptions(GaugeOptions):
+class WithoutChecksumOptions(GaugeOptions):
+    """Options where nothing but its shape guards a reply."""
+
+    fastest_mm_per_s: float = Field(
+        default=0.5, gt=0, allow_inf_nan=False,
+        description="the fastest that what is measured ever moves; a value that moved faster is asked for again",
+    )  # fmt: skip
+
+
+class ExchangeOptions(WithoutChecksumOptions):
     """Options of every described gauge on a line of bytes (StreamDevice's names and meanings)."""
 
     reply_timeout_s: Seconds | None = Field(default=None, description="to the first byte; the line's own if left out")
@@ -29,26 +38,33 @@ def receive(line: ByteLine, options: ExchangeOptions, count: int) -> bytes:
         return line.receive(count, options.reply_timeout_s)
     data = line.receive(1, options.reply_timeout_s)
     while len(data) < count:
-        data += following(line, options, 1, data)
+        data += following(line, 1, options.gap_timeout_s, data)
     return data
 
 
-def receive_line(line: ByteLine, options: ExchangeOptions, terminator: bytes, limit: int) -> bytes:
-    """Bytes up to `terminator`, without it. Raises LineFault as the line does, MISMATCH beyond `limit` bytes."""
-    if options.gap_timeout_s is None:
-        return line.receive_until(terminator, limit, options.reply_timeout_s)[: -len(terminator)]
-    data = line.receive(1, options.reply_timeout_s)
+def receive_line(
+    line: ByteLine,
+    terminator: bytes,
+    limit: int,
+    reply_timeout_s: float | None = None,
+    gap_timeout_s: float | None = None,
+) -> bytes:
+    """Bytes up to `terminator`, without it: for replies whose length is not known, as they come.
+
+    Raises LineFault as the line does, MISMATCH beyond `limit` bytes.
+    """
+    data = line.receive(1, reply_timeout_s)
     while not data.endswith(terminator):
         if len(data) >= limit:
             raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {data!r}")
-        data += following(line, options, 1, data)
+        data += following(line, 1, gap_timeout_s, data)
     return data[: -len(terminator)]
 
 
-def following(line: ByteLine, options: ExchangeOptions, count: int, so_far: bytes) -> bytes:
+def following(line: ByteLine, count: int, gap_timeout_s: float | None, so_far: bytes) -> bytes:
     """The next `count` bytes of a reply; INCOMPLETE if they do not come."""
     try:
-        return line.receive(count, options.gap_timeout_s)
+        return line.receive(count, gap_timeout_s)
     except LineFault as fault:
         if fault.quality is Quality.TIMEOUT:
             raise LineFault(Quality.INCOMPLETE, f"only {so_far!r}") from fault

@@ -12,7 +12,8 @@ Engineering data is refused: its steps are not in that manual, and a wrong one w
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -53,6 +54,16 @@ class IcpdasM7017c(Modbus):
     """One module; all its inputs in one read."""
 
     Options = IcpdasM7017cOptions
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "unit": 1,
+        "data_format": "hexadecimal",
+        "channels": [
+            {"name": "a", "input": 0, "range": "+-10V",
+             "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]}},
+            {"name": "b", "input": 3, "range": "4-20mA",
+             "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}},
+        ],
+    }  # fmt: skip
 
     def __init__(self, options: IcpdasM7017cOptions) -> None:
         super().__init__(register_map(options, [_channel(one) for one in options.channels]))

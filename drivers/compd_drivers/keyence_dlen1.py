@@ -11,17 +11,21 @@ decimals, but the amplifier's setting decides (`FR` reads it), so it is an optio
     ER,MS,n   031 while it starts its communication, 254 system error or starting, 255 format
 
 Plausible only: any sum of the judgements may be sent, so other states than 03 are not refused.
-TCP keeps the bytes, and the connection keeps requests and replies in order.
+TCP keeps the bytes, and the connection keeps requests and replies in order; behind a serial device server a value
+that jumps is asked for twice.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 from pydantic import Field
 
-from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
+from compd_drivers.continuity import Continuity
+from compd_drivers.exchange import WithoutChecksumOptions
 
 MOST_HEADS = 15
 END = b"\r\n"
@@ -40,7 +44,7 @@ LARGEST = 99_999_997  # beyond it every number is a code
 ERRORS = {b"031": "starting its communication", b"254": "system error, or starting", b"255": "format"}
 
 
-class KeyenceDlEn1Options(GaugeOptions):
+class KeyenceDlEn1Options(WithoutChecksumOptions):
     """Options of a DL-EN1."""
 
     heads: int = Field(ge=1, le=MOST_HEADS, description="how many heads hang on the unit; channels are named 1, 2 ...")
@@ -52,19 +56,27 @@ class KeyenceDlEn1(Gauge[ByteLine]):
 
     Options = KeyenceDlEn1Options
     line_kind = "bytes"
+    sample_options: ClassVar[Mapping[str, Any] | None] = {"heads": 3, "decimals": 4}
 
     def __init__(self, options: KeyenceDlEn1Options) -> None:
         super().__init__(options)
         self._steps_per_mm = 10**options.decimals
         self._limit = max(4 + options.heads * _FIELDS_LENGTH, len("ER,MS,254\r\n"))
         self._channels = tuple(Channel(str(head + 1)) for head in range(options.heads))
+        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        return [(len(b"MS" + END), self._limit)]
+
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but two fields per head."""
+        return self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(b"MS" + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         if error := _ERROR.fullmatch(reply):

@@ -8,7 +8,8 @@ everything ends with CR. `?` asks for all features:
 unit = mm um inch deg rad dms, digits as displayed with leading zeros; behind it, where tolerances are active, one
 judgement of < = > and, where warning limits are active, a second one: neither touches the value. ERR6 stands for a
 feature that is off. `M1?` asks for one feature. The unit on the wire is compared with the configured one.
-Not in the manual: other errors; `ERRn` is read as an error of that feature.
+Not in the manual: other errors; `ERRn` is read as an error of that feature. No checksum: a value that jumps is asked
+for twice.
 
 While somebody is in its menu the C1202 does not answer. If it had answered on this connection before, that is
 `silent`; if it never had, `timeout`. A cable pulled off at the instrument looks the same as the menu.
@@ -17,12 +18,14 @@ While somebody is in its menu the C1202 does not answer. If it had answered on t
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
+from compd_drivers.continuity import Continuity
+from compd_drivers.exchange import WithoutChecksumOptions, receive_line
 
 CR = b"\r"
 LONGEST_REPLY = 80  # three features of at most 26 characters
@@ -32,7 +35,7 @@ _ERROR = re.compile(rb"([123]) ERR(\d)")
 FEATURE_OFF = b"6"
 
 
-class MahrC1202Options(GaugeOptions):
+class MahrC1202Options(WithoutChecksumOptions):
     """Options of a C1202."""
 
     features: Annotated[tuple[Literal[1, 2, 3], ...], Field(min_length=1)] = Field(
@@ -48,6 +51,12 @@ class MahrC1202(Gauge[ByteLine]):
 
     Options = MahrC1202Options
     line_kind = "bytes"
+    sample_options: ClassVar[Mapping[str, Any] | None] = {
+        "features": [1, 3],
+        "unit": "um",
+        "digits": 4,
+        "decimals": 1,
+    }
 
     def __init__(self, options: MahrC1202Options) -> None:
         super().__init__(options)
@@ -59,16 +68,24 @@ class MahrC1202(Gauge[ByteLine]):
             rb"([123]) ([+-]\d{%d}\.\d{%d}) (mm|um|inch)(?: [<=>]){0,2}" % (options.digits, options.decimals)
         )
         self._answered_on: ByteLine | None = None
+        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        feature = len("1 +.mm ") + self.options.digits + self.options.decimals + len(" < <")
+        return [(len(self._request), len(self._asked) * (feature + 1))]
+
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH for anything but the features that were asked."""
+        return self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         try:
-            reply = line.receive_until(CR, LONGEST_REPLY)[:-1]
+            reply = receive_line(line, CR, LONGEST_REPLY)
             readings = self._readings(reply, time_s)
         except LineFault as fault:
             if fault.quality is Quality.TIMEOUT and self._answered_on is line:
@@ -87,8 +104,9 @@ class MahrC1202(Gauge[ByteLine]):
         for feature, part in zip(self._asked, parts, strict=True):
             if part[:1] != str(feature).encode():
                 raise LineFault(Quality.MISMATCH, f"asked feature {feature}: {reply!r}")
+            reading = self._reading(part, time_s, reply)
             if feature in self._features:
-                readings.append(self._reading(part, time_s, reply))
+                readings.append(reading)
         return readings
 
     def _reading(self, part: bytes, time_s: float, reply: bytes) -> Reading:

@@ -15,7 +15,8 @@ Controllers of several channels (MSC7602) answer with one of them per address, a
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -51,6 +52,7 @@ class MicroEpsilonMsc7(SerialFrame):
     """One controller, one channel `position` in mm."""
 
     Options = MicroEpsilonMsc7Options
+    sample_options: ClassVar[Mapping[str, Any] | None] = {"address": 126, "value": "scaled", "unit": "mm"}
 
     def __init__(self, options: MicroEpsilonMsc7Options) -> None:
         super().__init__(SerialFrameOptions.model_validate(_description(options)))

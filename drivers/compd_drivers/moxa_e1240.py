@@ -10,7 +10,8 @@ mended between them may pass once with the module's filter still settling.
 
 from __future__ import annotations
 
-from typing import Any, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -36,6 +37,13 @@ class MoxaE1240(Modbus):
     """One module; values in one read, their status in a second."""
 
     Options = MoxaE1240Options
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "unit": 1,
+        "channels": [
+            {"name": "a", "input": 0, "linearisation": {"signal": "V", "table": [[0, -0.95], [10, 0.95]]}},
+            {"name": "b", "input": 7, "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}},
+        ],
+    }
 
     def __init__(self, options: MoxaE1240Options) -> None:
         super().__init__(register_map(options, [_channel(one) for one in options.channels]))

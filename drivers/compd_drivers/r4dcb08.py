@@ -8,7 +8,8 @@ The sensor's own step is 0.0625 degC and its accuracy 0.5 degC; the module round
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -33,6 +34,7 @@ class R4dcb08(Modbus):
     """One module: channels `1` to `8` in degC."""
 
     Options = R4dcb08Options
+    sample_options: ClassVar[Mapping[str, Any]] = {"unit": 1, "sensors": [1, 2, 8]}
 
     def __init__(self, options: R4dcb08Options) -> None:
         super().__init__(register_map(options, [_channel(sensor) for sensor in sorted(set(options.sensors))]))

@@ -31,6 +31,7 @@ from typing import Literal, cast
 
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 
+OPEN_LENGTH = 32  # bytes of a number or a skipped part without width: more than any instrument sends
 _ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|(.))", re.DOTALL)
 _ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
 _CONVERTER = re.compile(
@@ -85,6 +86,7 @@ class ReplyFormat:
 
     channels : names of its numbers, in order; "" for one that is not named.
     length : bytes of the reply where the format fixes it, else None.
+    longest : bytes of the longest reply that is waited for.
     """
 
     def __init__(self, text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> None:
@@ -94,6 +96,7 @@ class ReplyFormat:
         self._checks: list[_Check] = []
         self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before, where its end is open
         self.length: int | None = 0
+        self.longest = 0
         self.literal = b""  # all that is literal, for counting terminators
         source = unescape(text).decode("latin-1")
         pattern = ""
@@ -107,6 +110,11 @@ class ReplyFormat:
     @property
     def channels(self) -> tuple[str, ...]:
         return tuple(number.channel for number in self._numbers)
+
+    @property
+    def has_checksum(self) -> bool:
+        """Whether damage is found by more than its shape."""
+        return bool(self._checks)
 
     def match(self, reply: bytes) -> tuple[float | bytes, ...] | None:
         """Per number its value, or the bytes that stand in its place; None if the reply is anything else.
@@ -155,6 +163,7 @@ class ReplyFormat:
         return re.escape(text)
 
     def _longer(self, by: int | None) -> None:
+        self.longest += OPEN_LENGTH if by is None else by
         self.length = None if self.length is None or by is None else self.length + by
 
     def _converter(self, match: re.Match[str]) -> str:

@@ -45,21 +45,23 @@ whose reply looks different: asked before every `every`-th poll, it finds a devi
 Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a first whole reply on a
 connection, no byte at all is `silent` instead of `timeout`. A cable that comes off afterwards looks the same, and
 the detail says so; both are without a value.
+
+Without a checksum in `in` a damaged digit is still a digit: a length that moved faster than `fastest_mm_per_s` is
+asked for a second time. Other quantities are not: set a parity on the line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, nothing_behind, receive, receive_line
 from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
 from compd_drivers.reply_format import ReplyFormat, unescape
-
-LONGEST_REPLY = 250  # bytes, where the description does not fix it
 
 
 class _Section(BaseModel):
@@ -165,6 +167,17 @@ class SerialAscii(Gauge[ByteLine]):
 
     Options: ClassVar[type[GaugeOptions]] = SerialAsciiOptions
     line_kind = "bytes"
+    sample_options: ClassVar[Mapping[str, Any] | None] = {
+        "out": "M",
+        "out_terminator": r"\r\n",
+        "in": "M,%(a)+09.4f,%(b)+8.3f",
+        "in_terminator": r"\r\n",
+        "channels": [
+            {"name": "a", "unit": "mm", "instead": {"---------": "sensor_fault"}},
+            {"name": "b", "unit": "um", "instead": {"FAULT": "sensor_fault"}, "scale": 10},
+        ],
+        "errors": [{"in": "ER%*2[0-9]", "quality": "device_error"}],
+    }
 
     def __init__(self, options: SerialAsciiOptions) -> None:
         super().__init__(options)
@@ -178,19 +191,32 @@ class SerialAscii(Gauge[ByteLine]):
         terminator = unescape(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
         self._exchanges = [(unescape(one.out) + terminator, ReplyFormat(one.in_)) for one in exchanges]
-        lengths = [length or LONGEST_REPLY for length in self._description.lengths]
-        lengths += [form.length or LONGEST_REPLY for _, form in self._exchanges]
-        self._limit = max(lengths) + len(self._description.terminator)
+        forms = [self._description.reply, *(form for _, form in self._exchanges)]
+        self._fixed_length = all(form.length is not None for form in forms)
+        forms += [form for form, _ in self._description.errors]
+        self._limit = max(form.longest for form in forms) + len(self._description.terminator)
         self._ready_on: ByteLine | None = None  # the connection on which `init` was said and a reply came
         self._until_echo = 0
+        lengths_only = all(channel.unit == "mm" for channel in self._channels)
+        checked = self._description.reply.has_checksum or not lengths_only
+        self._continuity = None if checked else Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
+    def traffic(self) -> Sequence[tuple[int, int]] | None:
+        length = self._description.reply.length
+        if length is None or not self._said.out:
+            return None
+        return [(len(self._description.request), length + len(self._description.terminator))]
+
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, MISMATCH for a reply of another form, CRC for a wrong checksum,
         DEVICE_ERROR and others for the described error replies, SILENT."""
+        return self._ask(line) if self._continuity is None else self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         known = self._ready_on is line
         try:
             if not known:
@@ -258,7 +284,11 @@ class SerialAscii(Gauge[ByteLine]):
         return reply
 
     def _line(self, line: ByteLine) -> bytes:
-        return receive_line(line, self._said, self._description.terminator, self._limit)
+        """Up to the next terminator, without it."""
+        terminator, said = self._description.terminator, self._said
+        if self._fixed_length and said.gap_timeout_s is None:
+            return line.receive_until(terminator, self._limit, said.reply_timeout_s)[: -len(terminator)]
+        return receive_line(line, terminator, self._limit, said.reply_timeout_s, said.gap_timeout_s)
 
     def _error(self, reply: bytes) -> ErrorReply | None:
         return next((error for form, error in self._description.errors if form.match(reply) is not None), None)

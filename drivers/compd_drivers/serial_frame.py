@@ -11,7 +11,8 @@ may be anything, `CS` for each byte of the checksum. `at` counts from 0. Micro-E
     channels:
       - {name: gap, at: 11, type: float32, byte_order: little, unit: mm, invalid: {0: device_error}}
 
-A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise. `errors` are frames that
+A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise; its lengths are asked for
+twice where they moved faster than `fastest_mm_per_s`. `errors` are frames that
 stand for the whole poll; they may be shorter than the reply.
 """
 
@@ -20,12 +21,13 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
+from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
 from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
 
@@ -153,6 +155,17 @@ class SerialFrame(Gauge[ByteLine]):
 
     Options: ClassVar[type[GaugeOptions]] = SerialFrameOptions
     line_kind = "bytes"
+    integrity: ClassVar[Literal["checksum", "format"]] = "checksum"
+    sample_options: ClassVar[Mapping[str, Any] | None] = {
+        "out": "02 41 00 43",
+        "frame": "02 41 .. .. .. .. .. .. CS CS",
+        "checksum": {"kind": "crc16_modbus"},
+        "channels": [
+            {"name": "a", "at": 2, "type": "int32", "byte_order": "big", "unit": "nm",
+             "invalid": {2147483647: "sensor_fault"}},
+            {"name": "b", "at": 6, "type": "int16", "unit": "um", "scale": 0.1, "invalid": {-32768: "sensor_fault"}},
+        ],
+    }  # fmt: skip
 
     def __init__(self, options: SerialFrameOptions) -> None:
         super().__init__(options)
@@ -161,13 +174,22 @@ class SerialFrame(Gauge[ByteLine]):
         self._frame = Frame.of(options.frame)
         self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
         self._channels = tuple(channel.channel for channel in options.channels)
+        lengths_only = all(channel.unit == "mm" for channel in self._channels)
+        checked = options.checksum is not None or not lengths_only
+        self._continuity = None if checked else Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
+    def traffic(self) -> Sequence[tuple[int, int]]:
+        return [(len(self._request), len(self._frame.fixed))]
+
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, CRC for a wrong checksum, MISMATCH for other fixed bytes."""
+        return self._ask(line) if self._continuity is None else self._continuity.read(lambda: self._ask(line))
+
+    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         data, error = self._receive(line)
         nothing_behind(line, self._said, data)
@@ -180,6 +202,10 @@ class SerialFrame(Gauge[ByteLine]):
             raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._said.frame}")
         return [_reading(channel, data, time_s) for channel in self._said.channels]
 
+    def _rest(self, line: ByteLine, count: int, so_far: bytes) -> bytes:
+        gap_s = self._said.gap_timeout_s
+        return following(line, count if gap_s is None else 1, gap_s, so_far)
+
     def _receive(self, line: ByteLine) -> tuple[bytes, ErrorFrame | None]:
         """The reply, and the error that it is, if it is one."""
         data = b""
@@ -187,7 +213,7 @@ class SerialFrame(Gauge[ByteLine]):
             if not data:
                 data = receive(line, self._said, length)
             while len(data) < length:
-                data += following(line, self._said, length - len(data) if self._said.gap_timeout_s is None else 1, data)
+                data += self._rest(line, length - len(data), data)
             for frame, error in self._errors:
                 if frame.fits(data):
                     return data, error

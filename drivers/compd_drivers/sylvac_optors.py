@@ -5,20 +5,22 @@ manual): 4800 baud, 7E2; `?` CR is answered by sign (+, -, blank), digits, point
 (speed, scale distance), ERR1 command, ERR2 parity of the request, ERR3 range. After power-on the instrument sends
 `SY...` once: that is a mismatch here and never a value.
 Not in the manual: the unit, which is set on the instrument and not sent. It is therefore an option without default.
-The protocol has no checksum and no fixed width: set `decimals`, and a digit lost behind the point is found.
+The protocol has no checksum and no fixed width: set `decimals`, and a digit lost behind the point is found; a value
+that jumps is asked for twice.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from compd.gauge import GaugeOptions
+from compd_drivers.exchange import WithoutChecksumOptions
 from compd_drivers.serial_ascii import SerialAscii, SerialAsciiOptions
 
 
-class SylvacOptoRsOptions(GaugeOptions):
+class SylvacOptoRsOptions(WithoutChecksumOptions):
     """Options of an instrument behind an OPTO-RS cable."""
 
     unit: Literal["mm", "inch"] = Field(description="what the instrument is set to; it does not say")
@@ -30,6 +32,7 @@ class SylvacOptoRs(SerialAscii):
     """One instrument, one channel `position` in mm."""
 
     Options = SylvacOptoRsOptions
+    sample_options: ClassVar[Mapping[str, Any] | None] = {"unit": "mm", "decimals": 3}
 
     def __init__(self, options: SylvacOptoRsOptions) -> None:
         super().__init__(SerialAsciiOptions.model_validate(_description(options)))
@@ -40,6 +43,7 @@ def _description(options: SylvacOptoRsOptions) -> dict[str, Any]:
     return {
         "driver": options.driver,
         "line": options.line,
+        "fastest_mm_per_s": options.fastest_mm_per_s,
         "out": "?",
         "out_terminator": r"\r",
         "in": "% f" if options.decimals is None else f"% .{options.decimals}f",

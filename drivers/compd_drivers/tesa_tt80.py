@@ -11,15 +11,17 @@ Not sure: the TT80's form has two decimals under the label mm, while its ranges 
 that the number may be um. The unit is therefore an option without default: find it with a gauge block before you
 trust the gauge. Leading zeros are taken as zeros or blanks. What the replies to `UNI?` look like is not shown, so
 nothing is asked but `?`. The display's functions (A-B, Min, Max) are what is sent: set it to the probe alone.
+No checksum: a value that jumps is asked for twice.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from compd.gauge import GaugeOptions
+from compd_drivers.exchange import WithoutChecksumOptions
 from compd_drivers.serial_ascii import SerialAscii, SerialAsciiOptions
 
 # page 94; the inch form has no digit before the point, the mil form one or two
@@ -32,7 +34,7 @@ FORMS = {
 }
 
 
-class TesaTt80Options(GaugeOptions):
+class TesaTt80Options(WithoutChecksumOptions):
     """Options of a TT80 or TT90."""
 
     model: Literal["TT80", "TT90"] = Field(description="a TT90 in TT80 mode is a TT80")
@@ -51,6 +53,8 @@ class TesaTt80(SerialAscii):
     """One comparator, one channel `position` in mm."""
 
     Options = TesaTt80Options
+    sample_options: ClassVar[Mapping[str, Any] | None] = {"model": "TT90", "unit": "um"}
+    sample_range: ClassVar[tuple[float, float] | None] = (-0.19, 0.19)
 
     def __init__(self, options: TesaTt80Options) -> None:
         super().__init__(SerialAsciiOptions.model_validate(_description(options)))
@@ -61,6 +65,7 @@ def _description(options: TesaTt80Options) -> dict[str, Any]:
     return {
         "driver": options.driver,
         "line": options.line,
+        "fastest_mm_per_s": options.fastest_mm_per_s,
         "out": "?",
         "out_terminator": r"\r",
         "in": FORMS[options.model, options.unit],

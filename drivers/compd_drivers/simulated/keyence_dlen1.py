@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import ClassVar
 
 from compd_drivers.simulated.commands import CommandDevice
 
@@ -14,6 +16,12 @@ FORMAT_ERROR = "255"
 
 class SimulatedDlEn1(CommandDevice):
     """Shows its channels `1`, `2` ...; a sensor that is off is invalid."""
+
+    error_replies: ClassVar[Mapping[bytes, str]] = {
+        b"ER,MS,031\r\n": "device_error",
+        b"ER,MS,254\r\n": "device_error",
+        b"ER,MS,255\r\n": "device_error",
+    }
 
     terminator = b"\r\n"
 

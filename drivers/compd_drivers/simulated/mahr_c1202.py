@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from compd.simulation.device import Sense
 from compd_drivers.simulated.commands import CommandDevice
@@ -14,6 +15,8 @@ FEATURES = (1, 2, 3)
 
 class SimulatedC1202(CommandDevice):
     """Shows its channels `1`, `2`, `3`; a feature that is not configured, or whose sensor is off, is ERR6."""
+
+    error_replies: ClassVar[Mapping[bytes, str]] = {b"1 ERR6;2 ERR6;3 ERR6\r": "device_error"}
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import ClassVar
 
 from compd_drivers.simulated.commands import CommandDevice
 
@@ -12,6 +14,13 @@ MM_IN = {"mm": 1.0, "inch": 25.4}
 
 class SimulatedOptoRs(CommandDevice):
     """Shows its channel `position`; a sensor that is off says ERR0, one beyond its range ERR3."""
+
+    error_replies: ClassVar[Mapping[bytes, str]] = {
+        b"ERR0\r": "sensor_fault",
+        b"ERR1\r": "device_error",
+        b"ERR2\r": "device_error",
+        b"ERR3\r": "over_range",
+    }
 
     def answer(self, command: str) -> str:
         if command != "?":

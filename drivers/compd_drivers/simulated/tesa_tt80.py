@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import ClassVar
 
 from compd_drivers.simulated.commands import CommandDevice
 
@@ -13,6 +15,8 @@ NO_VALUE = "ERR20\r\n"  # likewise
 
 class SimulatedTt80(CommandDevice):
     """Shows its channel `position`."""
+
+    error_replies: ClassVar[Mapping[bytes, str]] = {b"ERR23\r\n": "device_error"}
 
     def answer(self, command: str) -> str:
         if command != "?":
