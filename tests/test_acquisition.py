@@ -70,6 +70,20 @@ def test_an_unplugged_line_is_lost_and_comes_back_by_itself(tmp_path: Path, case
         assert status["gauges"]["ag"]["faults"]["line_lost"] >= 1
 
 
+@pytest.mark.parametrize("name", ["modbus TCP", "modbus RTU over TCP", "keyence"])
+def test_faults_that_come_and_go_at_any_moment_leave_nothing_behind(tmp_path: Path, name: str) -> None:
+    with made(tmp_path, CASES[name]) as bench, acquiring(bench) as (_, latest):
+        channel, value = next(iter(CASES[name].values.items()))
+        for _ in range(10):
+            for fault in bench.wire.faults:
+                bench.wire.fault = fault
+        bench.wire.fault = None
+        reading = latest.wait_for(f"ag.{channel}", OK, latest.now)
+        assert reading.value == pytest.approx(value, abs=CASES[name].step)
+        assert all(r.value == pytest.approx(value, abs=CASES[name].step) for n, r in latest.history
+                   if r.ok and n == f"ag.{channel}")  # fmt: skip
+
+
 def test_a_device_that_comes_later_is_found(tmp_path: Path) -> None:
     with made(tmp_path, CASES["keyence"]) as bench:
         bench.wire.fault = "unplugged"

@@ -85,6 +85,8 @@ def test_a_fault_that_there_is_not_is_refused_and_the_others_named(tmp_path: Pat
     where = {"host": "x", "port": 1} if "tcp" in kind else {"port": "x", "baud": 9600, "format": "8N1"}
     settings = SETTINGS.validate_python({"kind": kind, "timeout_s": 0.1, **where})
     line = SimulatedLine("line", settings, [], tmp_path)
+    with pytest.raises(RuntimeError, match="start it first"):
+        line.fault = "silent"
     line.start()
     with pytest.raises(ValueError, match="silent, garble, late, cut, doubled"):
         line.fault = "on fire"

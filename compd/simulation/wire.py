@@ -126,6 +126,7 @@ class SimulatedLine:
         self._end: End | None = None
         self._leaving: list[_Leaving] = []
         self._fault: str | None = None
+        self._wanted: str | None = None  # the line's thread follows it between two replies
         self._wake_read, self._wake_write = os.pipe()
         self._stopping = False
         self._applied = threading.Event()
@@ -163,8 +164,10 @@ class SimulatedLine:
     def fault(self, fault: str | None) -> None:
         if fault is not None and fault not in self.faults:
             raise ValueError(f"no fault {fault!r} on a line of kind {self._settings.kind}: {', '.join(self.faults)}")
+        if not self._thread.is_alive():
+            raise RuntimeError("only a line that is served can have a fault: start it first")
+        self._wanted = fault
         self._applied.clear()
-        self._fault = fault
         self._wake()
         self._applied.wait()
 
@@ -198,6 +201,7 @@ class SimulatedLine:
         self._pull_out()
 
     def _follow_fault(self) -> None:
+        self._fault = self._wanted
         if self._fault == UNPLUGGED:
             self._pull_out()
         elif self._end is None:
