@@ -58,6 +58,6 @@ def _wait(command: Command, process: subprocess.Popen[bytes], log: Path) -> None
         if process.poll() is not None or time.monotonic() > end:
             raise DaemonError(
                 Problem(f"compd {' '.join(command.arguments)}", "did not start", next_step="read what it printed:\n"
-                        + log.read_text(errors="replace")[-3000:])
+                        + log.read_text(errors="replace")[-8000:])
             )  # fmt: skip
         time.sleep(LOOK_EVERY_S)
