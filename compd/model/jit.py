@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import fcntl
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numba import float64, guvectorize, int64, njit
+from numba.core import config as numba_config
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -14,7 +20,9 @@ Ints: TypeAlias = NDArray[np.int64]
 Kernel: TypeAlias = Callable[..., Any]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
-_guvectorize: Any = guvectorize  # numba has no types
+# numba has no types
+_guvectorize: Any = guvectorize
+_config: Any = numba_config
 
 # The types of a kernel's arguments: () and (n) are both one-dimensional inside, as gufuncs want outputs.
 SCALAR = float64
@@ -23,28 +31,55 @@ MATRIX = float64[:, :]
 INTEGERS = int64[:]
 
 
-def _probe() -> None:
-    """Stands in this folder, so what numba can cache for it, it can cache for every kernel."""
+def _cache_directory() -> str:
+    """Where compiled code is kept; "" where nothing can be written: then every start compiles anew, in seconds.
+
+    numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
+    limit count as well: no machine runs last version's kernels.
+    """
+    here = Path(__file__).parent
+    texts = [file.read_bytes() for file in sorted(here.glob("*.py"))]
+    compiled = [text for text in texts if b"@kernel" in text or b"@helper" in text or b"_LIMIT = " in text]
+    digest = hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
+    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
+    places = [Path(_config.CACHE_DIR)] if _config.CACHE_DIR else [here / "__pycache__", user]
+    for place in filter(Path.is_absolute, places):
+        directory = place / f"kernels-{digest}"
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(directory, os.W_OK):
+            return str(directory)
+    return ""
 
 
-def _can_cache() -> bool:
-    """Whether compiled code can be kept: not in a read-only installation without NUMBA_CACHE_DIR."""
-    try:
-        njit(cache=True)(_probe)
-    except RuntimeError:  # numba: "no locator available", that is, no writable directory
-        return False
-    return True
+CACHE_DIRECTORY = _cache_directory()
 
 
-CACHE = _can_cache()
+@contextmanager
+def _kept() -> Iterator[None]:
+    """Within, numba keeps what it compiles in our directory; outside, where it always does.
+
+    One process at a time: numba stores a kernel and its wrapper one after the other, and a kernel of one process with
+    the wrapper of another crashes whoever loads them.
+    """
+    if not CACHE_DIRECTORY:
+        yield
+        return
+    before = _config.CACHE_DIR
+    with (Path(CACHE_DIRECTORY) / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        _config.CACHE_DIR = CACHE_DIRECTORY
+        try:
+            yield
+        finally:
+            _config.CACHE_DIR = before
 
 
 def helper(function: FunctionT) -> FunctionT:
-    """Compile `function` for use inside kernels. Division by zero gives inf or nan, as in C.
-
-    numba's cache notices a change in a kernel's own file alone: after editing a helper delete `__pycache__`.
-    """
-    return cast(FunctionT, njit(cache=CACHE, error_model="numpy")(function))
+    """Compile `function` for use inside kernels. Division by zero gives inf or nan, as in C."""
+    return cast(FunctionT, njit(error_model="numpy")(function))  # kept inside the kernels that use it
 
 
 def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]], Kernel]:
@@ -54,7 +89,8 @@ def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]],
     """
 
     def compile_(function: Callable[..., None]) -> Kernel:
-        compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=CACHE)(function)
+        with _kept():
+            compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=bool(CACHE_DIRECTORY))(function)
         return cast(Kernel, compiled.ufunc)  # the plain NumPy ufunc: numba's wrapper costs 0.4 us a call
 
     return compile_
