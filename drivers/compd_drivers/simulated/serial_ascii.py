@@ -11,6 +11,7 @@ import re
 from typing import Any
 
 from compd.simulation.device import Sense, SimulatedByteDevice
+from compd_drivers.simulated.transducer import signal_for
 
 MM_IN = {"um": 1e-3, "nm": 1e-6, "inch": 25.4, "mil": 0.0254}
 OTHER = {"kN": 1e3, "kPa": 10.0, "Pa": 1e-2}
@@ -97,6 +98,8 @@ class SimulatedAscii(SimulatedByteDevice):
         channel = next(one for one in self.options.channels if one.name == name)
         value = self.sense(name)
         match channel.unit:
+            case "V" | "mA":
+                value = signal_for(channel.linearisation, value)
             case "degF":
                 value = value * 9 / 5 + 32
             case "K":
