@@ -10,6 +10,7 @@ import numpy as np
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.configuration.operation import Limits, Loop
 from compd.errors import StateError
+from compd.live.inputs import Carried, Inputs
 from compd.live.limits import limited
 from compd.live.loop import Orders
 from compd.live.protocol import Target
@@ -67,16 +68,25 @@ class Cycle:
 
     def run(self, tick: int, snapshot: Snapshot, orders: Orders) -> Setpoint:
         """The setpoint of one tick; an invalid one says why."""
-        mode = Mode.CMM if orders.target is None else Mode.MACHINE_TOOL
+        # the orders are read once: their writers do not wait for the cycle
+        inputs = Inputs(snapshot, orders.zero, orders.target, self._carried())
+        mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
         try:
-            return self._compute(tick, snapshot, orders.zero, orders.target, mode)
+            return self._compute(tick, inputs, mode)
         except _Invalid as why:
             now_s = snapshot.time_s
-            return Setpoint(tick, now_s, now_s, math.nan, why.state, why.reason, mode, None)
+            return Setpoint(tick, now_s, now_s, math.nan, why.state, why.reason, mode, None, inputs)
 
-    def _compute(
-        self, tick: int, snapshot: Snapshot, zero: MachineZero | StateError, target: Target | None, mode: Mode
-    ) -> Setpoint:
+    def resume(self, carried: Carried) -> None:
+        """Go on as if the cycle before had left this behind."""
+        self._zero, self._warm, self._correction_mm, self._last_good, self._scales_seen = carried
+        self._zero_vectors = None if carried.zero is None else self._vectors(carried.zero)
+
+    def _carried(self) -> Carried:
+        return Carried(self._zero, self._warm, self._correction_mm, self._last_good, self._scales_seen)
+
+    def _compute(self, tick: int, inputs: Inputs, mode: Mode) -> Setpoint:
+        snapshot, zero, target, _ = inputs
         vectors = self._adopted(zero)
         set_ = self._comparators(snapshot, vectors)
         assert set_.comparators is not None
@@ -98,7 +108,7 @@ class Cycle:
         now_s = snapshot.time_s
         valid_until_s = min(now_s + self._valid_for_s, set_.expires_s)
         numbers = self._numbers(found, kept.applied_mm)
-        return Setpoint(tick, now_s, valid_until_s, now_s - oldest_s, state, reason, mode, numbers)
+        return Setpoint(tick, now_s, valid_until_s, now_s - oldest_s, state, reason, mode, numbers, inputs)
 
     def _adopted(self, zero: MachineZero | StateError) -> _ZeroVectors:
         """The zero of this tick; with a new one nothing that was measured from the old one is kept."""
@@ -107,12 +117,13 @@ class Cycle:
             raise _Invalid(State.NO_ZERO, f"{problem.what}; {problem.next_step}" if problem.next_step else problem.what)
         if zero is not self._zero or self._zero_vectors is None:
             self._zero = zero
-            self._zero_vectors = _ZeroVectors(
-                self._wires.scale.zero_vector(zero), self._wires.comparators.zero_vector(zero)
-            )
+            self._zero_vectors = self._vectors(zero)
             self._last_good = None
             self._warm = WarmStart.at_zero(self._model)
         return self._zero_vectors
+
+    def _vectors(self, zero: MachineZero) -> _ZeroVectors:
+        return _ZeroVectors(self._wires.scale.zero_vector(zero), self._wires.comparators.zero_vector(zero))
 
     def _comparators(self, snapshot: Snapshot, zero: _ZeroVectors) -> Usable:
         """Joint and frame comparators as a set: the live one, or what `on_stale` makes of the last."""

@@ -8,10 +8,13 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from compd.live.inputs import Inputs
 
 Array = NDArray[np.float64]
 
@@ -91,6 +94,7 @@ class Setpoint(NamedTuple):
     age_s : of the oldest gauge used; nan where none was.
     reason : why the state is not ok; "" when it is.
     numbers : None unless valid, so that no number looks alive that is not.
+    inputs : what it was computed from, for whoever watches the readings; no part of a SETPOINT message.
     """
 
     seq: int
@@ -101,6 +105,7 @@ class Setpoint(NamedTuple):
     reason: str
     mode: Mode
     numbers: Numbers | None
+    inputs: Inputs | None = None
 
     @property
     def valid(self) -> bool:
