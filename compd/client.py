@@ -81,6 +81,17 @@ class Client:
         while True:
             yield self._setpoints.popleft() if self._setpoints else self._next_setpoint()
 
+    def readings(self, rate_hz: float | None = None) -> Iterator[bytes]:
+        """What the daemon says of its cycles' readings, line by line as it came: first its answer to WATCH, with the
+        columns of a recording, then READINGS messages for ever, `rate_hz` per second; None for every cycle.
+
+        Unix socket only. Raises DaemonError when the daemon refuses or goes away.
+        """
+        asked = {"class": "WATCH", "what": "readings"}
+        self._send(asked if rate_hz is None else asked | {"rate_hz": rate_hz})
+        while True:
+            yield self._read()[0]
+
     def target(
         self,
         tip_B0_mm: Sequence[float] | None = None,
@@ -139,19 +150,24 @@ class Client:
     def _await(self, wanted: str) -> Message:
         """Read until a message of class `wanted`; setpoints that come before it are kept for `watch`."""
         while True:
-            try:
-                line = self._lines.readline()
-            except OSError as error:
-                raise self._lost(error.strerror or "no answer in time") from error
-            if not line.endswith(b"\n"):
-                raise self._lost("it closed the connection")
-            message: Message = json.loads(line)
-            if message["class"] == "ERROR":
-                raise DaemonError(Problem(self._address, message["text"], message["code"]))
+            _, message = self._read()
             if message["class"] == "SETPOINT":
                 self._setpoints.append(message)
             if message["class"] == wanted:
                 return message
+
+    def _read(self) -> tuple[bytes, Message]:
+        """The next line, and the message that it is."""
+        try:
+            line = self._lines.readline()
+        except OSError as error:
+            raise self._lost(error.strerror or "no answer in time") from error
+        if not line.endswith(b"\n"):
+            raise self._lost("it closed the connection")
+        message: Message = json.loads(line)
+        if message["class"] == "ERROR":
+            raise DaemonError(Problem(self._address, message["text"], message["code"]))
+        return line, message
 
     def _lost(self, why: str) -> DaemonError:
         return DaemonError(Problem(self._address, f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))

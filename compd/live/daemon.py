@@ -24,6 +24,7 @@ from compd.live.publisher import Publisher
 from compd.live.requests import Requests
 from compd.live.setpoint import Setpoint, State
 from compd.live.status import StatusReport
+from compd.live.transcript import Transcript
 from compd.live.wiring import MachineWires
 from compd.live.zero import MachineZero, load_zero
 from compd.live.zero_taking import ZeroTaker
@@ -59,7 +60,10 @@ class Daemon:
         self._packets = PacketSender(udp, configuration.config_hash) if udp is not None else None
         outlets = [self.publisher.deliver] if self._packets is None else [self._packets.deliver, self.publisher.deliver]
         model = build_model(configuration.geometry, configuration.wiring)
-        cycle = Cycle(model, self._wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s)
+        cycle = Cycle(
+            model, self._wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s,
+            configuration.geometry.link_length_mm,
+        )  # fmt: skip
         self.loop = Loop(configuration.loop, cycle, self.latest, self.orders, outlets, self._notifier, clock)
         self._zero_taker = ZeroTaker(
             self._wires, self.latest, self.orders, _directory(configuration), configuration.zero_hash, clock
@@ -80,7 +84,10 @@ class Daemon:
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
             rotation=configuration.geometry.kinematics == "hexapod_6ups",
         )
-        self._requests = Requests(version, keys, self.orders, report.message, self._zero_taker.take)
+        self._requests = Requests(
+            version, keys, self.orders, report.message, self._zero_taker.take,
+            Transcript(self._wires, self.latest.channels),
+        )  # fmt: skip
         self._state: State | None = None
 
     def start(self) -> None:

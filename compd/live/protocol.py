@@ -84,15 +84,19 @@ def parse(data: bytes) -> dict[str, Any]:
     return message
 
 
-def parse_watch(message: Mapping[str, Any]) -> float:
-    """WATCH: setpoints per second; inf for every one of them, 0 for none."""
-    _only(message, ("rate_hz",))
+def parse_watch(message: Mapping[str, Any]) -> tuple[float, bool]:
+    """WATCH: how many per second (inf for every one, 0 for none), and whether of the readings, not the setpoints."""
+    _only(message, ("rate_hz", "what"))
+    what = message.get("what", "setpoints")
+    if what not in ("setpoints", "readings"):
+        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"what is {str(what)[:40]!r}, allowed: setpoints, readings")
+    readings = what == "readings"
     if "rate_hz" not in message:
-        return math.inf
+        return math.inf, readings
     rate_hz = _number(message["rate_hz"], "rate_hz")
     if rate_hz < 0:
         raise ProtocolError(ErrorCode.BAD_MESSAGE, f"rate_hz is {rate_hz:g}, allowed 0 or more")
-    return rate_hz
+    return rate_hz, readings
 
 
 def parse_target(message: Mapping[str, Any], keys: TargetKeys) -> Target:

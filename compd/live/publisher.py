@@ -162,18 +162,19 @@ class Publisher:
         os.eventfd_write(self._wake, 1)
 
     def _woken(self, _events: int) -> None:
-        """Setpoints or late answers are waiting. A setpoint is encoded once, and only if someone takes it."""
+        """Setpoints or late answers are waiting. Each is encoded once in each way, and only if someone takes it."""
         os.eventfd_read(self._wake)
         while self._answers:
             self._send(*self._answers.popleft())
         while self._queue:
             setpoint = self._queue.popleft()
             self._observe(setpoint)
-            encoded = b""
+            encoded: dict[Callable[[Setpoint], bytes], bytes] = {}
             for session in list(self._sessions):
                 if session.takes(setpoint.time_s, self._half_period_s):
-                    encoded = encoded or setpoint.to_json()
-                    self._send(session, encoded)
+                    if session.encode not in encoded:
+                        encoded[session.encode] = session.encode(setpoint)
+                    self._send(session, encoded[session.encode])
         self._schedule()
 
     def _schedule(self) -> None:

@@ -17,6 +17,8 @@ from compd.live.protocol import (
     parse_watch,
 )
 from compd.live.session import Session
+from compd.live.setpoint import Setpoint
+from compd.live.transcript import Transcript
 
 # Takes a function that answers the client later, from any thread. Raises ProtocolError (busy).
 TakeZero = Callable[[Callable[[bytes], None]], None]
@@ -32,13 +34,15 @@ class Requests:
         orders: Orders,
         status: Callable[[], Mapping[str, Any]],
         take_zero: TakeZero,
+        transcript: Transcript | None = None,
     ) -> None:
-        """`version`: the VERSION message; `status`: makes the STATUS message."""
+        """`version`: the VERSION message; `status`: makes the STATUS message; `transcript`: READINGS messages."""
         self.version = line(version)
         self._target_keys = target_keys
         self._orders = orders
         self._status = status
         self._take_zero = take_zero
+        self._transcript = transcript
         self._controller: Session | None = None
 
     def answer(self, session: Session, data: bytes, later: Callable[[bytes], None]) -> bytes:
@@ -49,9 +53,7 @@ class Requests:
         message = parse(data)
         match message["class"]:
             case "WATCH":
-                rate_hz = parse_watch(message)
-                session.watch(rate_hz)
-                return line({key: message[key] for key in ("class", "rate_hz") if key in message})
+                return self._watch(session, message)
             case "TARGET":
                 target = parse_target(message, self._target_keys)
                 if self._controller not in {None, session}:
@@ -82,6 +84,18 @@ class Requests:
                     ErrorCode.UNKNOWN_CLASS,
                     f"class {unknown[:40]!r}, allowed: WATCH, TARGET, RELEASE, STATUS, VERSION, ZERO",
                 )
+
+    def _watch(self, session: Session, message: Mapping[str, Any]) -> bytes:
+        rate_hz, readings = parse_watch(message)
+        answer = {key: message[key] for key in ("class", "what", "rate_hz") if key in message}
+        if not readings:
+            session.watch(rate_hz, Setpoint.to_json)
+            return line(answer)
+        if not session.local or self._transcript is None:
+            # several times a setpoint's size, and of use beside the daemon only: its times are this computer's
+            raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
+        session.watch(rate_hz, self._transcript.line)
+        return line(answer | {"columns": self._transcript.columns})
 
     def left(self, session: Session) -> None:
         """A client has gone or gives its role back: without a controller the mode is CMM."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from compd.live.protocol import MAX_LINE_BYTES, ErrorCode, ProtocolError
+from compd.live.setpoint import Setpoint
 
-# About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind reads the past.
+# About 150 setpoints, 0.7 s at 200 Hz; or 30 READINGS. A client that is further behind reads the past.
 MAX_BEHIND_BYTES = 128 * 1024
 _RECEIVE_BYTES = 4096
 _LONGEST_INTERVAL_S = 1e6
@@ -25,13 +26,15 @@ class Session:
         self.local = local
         self.open = True
         self.due_s = math.inf
+        self.encode: Callable[[Setpoint], bytes] = Setpoint.to_json
         self._interval_s = math.inf
         self._received = bytearray()
         self._skipping = False
         self._waiting = bytearray()
 
-    def watch(self, rate_hz: float) -> None:
-        """From now on `rate_hz` setpoints per second: inf for every one, 0 for none."""
+    def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes]) -> None:
+        """From now on `rate_hz` setpoints per second, as `encode` writes them: inf for every one, 0 for none."""
+        self.encode = encode
         self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
 

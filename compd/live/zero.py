@@ -29,6 +29,10 @@ class MachineZero:
     taken_at: str
     readings_mm: Mapping[str, float]
 
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, from which `MachineZero(**data)` is the same again."""
+        return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
+
     def save(self, directory: Path) -> Path:
         """Write it whole or not at all, so that a power cut leaves the old one or the new one.
 
@@ -36,8 +40,7 @@ class MachineZero:
         """
         path = directory / FILE_NAME
         temporary = directory / f".{FILE_NAME}.new"
-        content = {"format": _FORMAT, "zero_hash": self.zero_hash, "taken_at": self.taken_at,
-                   "readings_mm": dict(self.readings_mm)}  # fmt: skip
+        content = {"format": _FORMAT, **self.to_json()}
         try:
             directory.mkdir(parents=True, exist_ok=True)
             with temporary.open("w", encoding="utf-8") as file:

@@ -1,0 +1,146 @@
+"""READINGS: everything that one cycle computed from, as a line of JSON, and back without losing a bit.
+
+A message stands on its own: it has the cycle's readings, machine zero and target, and what the cycle had from
+the one before it. So any subset of a run can be replayed, however thinly it was recorded. Numbers are written
+in full (the shortest text that reads back as the same float64), where a SETPOINT is rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compd.compensation import WarmStart
+from compd.configuration.crosscheck import DISTANCES
+from compd.errors import Problem, StateError
+from compd.gauge import Quality, Reading
+from compd.live.inputs import Carried, Inputs
+from compd.live.protocol import Target, line
+from compd.live.setpoint import Setpoint
+from compd.live.stale import Comparators
+from compd.live.wiring import MachineWires
+from compd.live.zero import MachineZero
+from compd.readings import Snapshot
+
+
+class RecordedCycle(NamedTuple):
+    """One READINGS message: the tick, what went in, and the SETPOINT line that came out."""
+
+    tick: int
+    inputs: Inputs
+    setpoint_line: bytes
+
+
+class Transcript:
+    """Writes a machine's READINGS; `wires` and `channels` are those of the loop's snapshots."""
+
+    def __init__(self, wires: MachineWires, channels: Sequence[str]) -> None:
+        self.columns = columns(wires)
+        self._channels = tuple(channels)
+
+    def line(self, setpoint: Setpoint) -> bytes:
+        """The READINGS line of the cycle that made `setpoint`, with its newline."""
+        inputs = setpoint.inputs
+        assert inputs is not None, "every setpoint of a cycle has its inputs"
+        message: dict[str, Any] = {
+            "class": "READINGS",
+            "seq": setpoint.seq,
+            "time_s": inputs.snapshot.time_s,
+            "readings": dict(zip(self._channels, map(_reading, inputs.snapshot.readings), strict=True)),
+        }
+        if isinstance(inputs.zero, MachineZero):
+            message["zero"] = inputs.zero.to_json()
+        else:
+            problem = inputs.zero.problems[0]
+            message["no_zero"] = {"where": problem.where, "what": problem.what, "next_step": problem.next_step}
+        if inputs.target is not None:
+            message["target"] = _target(inputs.target)
+        message["carried"] = _carried(inputs)
+        return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
+
+
+def columns(wires: MachineWires) -> list[dict[str, Any]]:
+    """Which channel is which column of a recording, for the answer to WATCH.
+
+    A length's column is sign * (reading - machine zero), in the unit at the end of its name; a quantity, which has
+    no sign here, is recorded as it is read.
+    """
+    joints = wires.joints
+    names = [
+        *(f"scale_{i}_mm" for i, _ in enumerate(wires.scale.wires, start=1)),
+        *(f"joint_{k}_um" for k in range(1, joints + 1)),
+        *(f"frame_{distance}_um" for distance in DISTANCES),
+    ]
+    found: list[dict[str, Any]] = [
+        {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
+        for name, wire in zip(names, wires.length_wires, strict=True)
+    ]
+    quantities = wires.all_wires[len(names) :]
+    return found + [
+        {"column": wire.meaning, "channel": wire.channel, "stale_after_s": wire.stale_after_s} for wire in quantities
+    ]
+
+
+def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> RecordedCycle:
+    """The cycle behind a READINGS message; its readings in the order of `channels`.
+
+    Raises KeyError, TypeError or ValueError for what is no such message.
+    """
+    readings = tuple(_parsed_reading(message["readings"][channel]) for channel in channels)
+    zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
+    target = message.get("target")
+    inputs = Inputs(
+        Snapshot(message["time_s"], readings), zero,
+        None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
+        _parsed_carried(message["carried"], zero),
+    )  # fmt: skip
+    return RecordedCycle(message["seq"], inputs, line(message["setpoint"]))
+
+
+def _reading(reading: Reading) -> dict[str, Any]:
+    """A value, or why there is none."""
+    value, time_s, quality, detail = reading
+    if quality is Quality.OK:
+        return {"value": value, "time_s": time_s}
+    found = {"quality": quality, "time_s": time_s}
+    return found | {"detail": detail} if detail else found
+
+
+def _parsed_reading(data: Mapping[str, Any]) -> Reading:
+    quality = Quality(data.get("quality", Quality.OK))
+    return Reading(data.get("value", math.nan), data["time_s"], quality, data.get("detail", ""))
+
+
+def _target(target: Target) -> dict[str, Any]:
+    found: dict[str, Any] = {"tip_mm": target.tip_mm}
+    if target.rotation_B0_rad is not None:
+        found["rotation_B0_rad"] = target.rotation_B0_rad
+    return found
+
+
+def _carried(inputs: Inputs) -> dict[str, Any]:
+    """What was carried over; of its zero only whether it is this cycle's, since of another nothing is used."""
+    carried = inputs.carried
+    found: dict[str, Any] = {
+        "same_zero": carried.zero is inputs.zero,
+        "supports_M_mm": carried.warm.supports_M_mm.tolist(),
+        "origin_M_mm": carried.warm.origin_M_mm.tolist(),
+        "rotation_M_P": carried.warm.rotation_M_P.tolist(),
+        "correction_mm": carried.correction_mm.tolist(),
+        "scales_seen": carried.scales_seen,
+    }
+    if carried.last_good is not None:
+        good = carried.last_good
+        found["last_good"] = {"change_mm": good.change_mm.tolist(), "time_s": good.time_s, "oldest_s": good.oldest_s}
+    return found
+
+
+def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> Carried:
+    warm = WarmStart(np.array(data["supports_M_mm"]), np.array(data["origin_M_mm"]), np.array(data["rotation_M_P"]))
+    good = data.get("last_good")
+    last_good = None if good is None else Comparators(np.array(good["change_mm"]), good["time_s"], good["oldest_s"])
+    same = zero if data["same_zero"] and isinstance(zero, MachineZero) else None
+    return Carried(same, warm, np.array(data["correction_mm"]), last_good, data["scales_seen"])
