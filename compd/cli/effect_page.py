@@ -8,7 +8,16 @@ import numpy as np
 from plotly.graph_objects import Cone, Figure, Scatter, Scatter3d
 
 from compd.assembly import build_model
-from compd.cli.effect_signature import ASIDE_MM, FORCE_N, GRADIENT_K, WARMING_K, Curve, Signature, signature
+from compd.cli.effect_signature import (
+    ASIDE_MM,
+    FORCE_N,
+    GRADIENT_K,
+    SPEED_MM_PER_S,
+    WARMING_K,
+    Curve,
+    Signature,
+    signature,
+)
 from compd.configuration import Configuration
 from compd.configuration.geometry import Geometry
 from compd.model.effect import Constant, Effect, Parameter
@@ -35,7 +44,7 @@ def write_signature(path: Path, effect: Effect, configuration: Configuration) ->
     )
     driven = (
         f"Every thermometer shows {WARMING_K:g} K above 20 degC, the plate is {GRADIENT_K:g} K warmer on top, "
-        f"a force of {FORCE_N:g} N presses down, the links grow at 50 mm/s."
+        f"a force of {FORCE_N:g} N presses down, every link grows at {SPEED_MM_PER_S:g} mm/s."
     )
     panels = [
         Panel("Over the workspace", f"Arrows: the tip's error, drawn large. {driven}", _arrows(found)),

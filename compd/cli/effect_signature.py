@@ -39,10 +39,12 @@ HOUR_S = 3600.0
 class Drive:
     """The state of the machine and its surroundings at N rows; every number may be one for all rows.
 
-    tip_mm (N, 3), from machine zero's tip.  warming_K : of every thermometer; gradient_K : of the plate's top.
+    tip_mm (N, 3), from machine zero's tip.  apart : rows do not follow one another, every link last moved outwards.
+    warming_K : of every thermometer; gradient_K : of the plate's top.
     """
 
     tip_mm: Floats
+    apart: bool = False
     warming_K: Floats = field(default_factory=lambda: np.array([WARMING_K]))
     gradient_K: Floats = field(default_factory=lambda: np.array([GRADIENT_K]))
     force_z_N: Floats = field(default_factory=lambda: np.array([-FORCE_N]))
@@ -85,7 +87,10 @@ def signature(effect: Effect, model: MachineModel, details: Details) -> Signatur
     grid = grid[np.hypot(grid[:, 0], grid[:, 1]) <= 1.05 * REACH_MM]
     curves = [Curve(label, values, place.tip_um(drive)) for label, values, drive in _drives(effect, needed)]
     return Signature(
-        grid + model.zero.contact.tip_M_mm, place.tip_um(Drive(grid)), curves, _taken(effect, place.fitted.shape)
+        grid + model.zero.contact.tip_M_mm,
+        place.tip_um(Drive(grid, apart=True)),
+        curves,
+        _taken(effect, place.fitted.shape),
     )
 
 
@@ -135,9 +140,11 @@ class _Place:
             frame_mm=np.broadcast_to(drive.frame_mm[:, None] * ones, (count, 9)).copy(),
             quantities={name: np.broadcast_to(_value(name, drive), (count,)) for name in self._needed},
             time_s=np.broadcast_to(drive.time_s, (count,)),
-            session_start=np.arange(count) == 0,
+            session_start=(np.arange(count) == 0) | drive.apart,
             movement=Movement(
-                _directions(scale_mm), drive.speed_mm_per_s[:, None] * np.ones_like(scale_mm), np.zeros((count, gauges))
+                np.ones_like(scale_mm) if drive.apart else _directions(scale_mm),
+                drive.speed_mm_per_s[:, None] * np.ones_like(scale_mm),
+                np.zeros((count, gauges)),
             ),
         )
 

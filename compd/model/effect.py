@@ -206,6 +206,8 @@ def port_size(port: Port, rows: Rows) -> int:
 
 def by_port(effect: Effect, rows: Rows, values: NDArray[np.float64]) -> Deltas:
     """Split axis 1 of (N, sum of sizes, ...) into the effect's ports."""
+    if len(effect.ports) == 1:
+        return {effect.ports[0]: values}
     ends = np.cumsum([port_size(port, rows) for port in effect.ports])[:-1]
     return dict(zip(effect.ports, np.split(values, ends, axis=1), strict=True))
 

@@ -89,63 +89,75 @@ def sensitivities(model: MachineModel, rows: Rows, ports: Collection[Port]) -> d
     From the closure's derivatives; for the ports `frame` and `plate` by central differences through the octahedron.
     Rows without a pose are nan.
     """
-    count, n = len(rows), rows.links
-    mechanism = model.mechanism(rows.base_joints_M_mm)
-    close = closure_at(mechanism, rows.origin_M_mm, rows.rotation_M_P)
-    J = np.concatenate(
-        [
-            np.concatenate([close.length_by_displacement, close.length_by_rotation_mm], axis=2),
-            np.concatenate([close.offset_by_displacement, close.offset_by_rotation_mm], axis=2),
-        ],
-        axis=1,
-    )
+    inverse = _pose_by_closure(model, rows)
+    tip_by_pose = _tip_by_pose(model, rows)
+    found: dict[Port, Sensitivity] = {}
+    for port in ports:
+        size = port_size(port, rows)
+        tip, rotation, link_length = (np.zeros((len(rows), m, size)) for m in (3, 3, rows.links))
+        if port == "tool":
+            on_plate = isinstance(model.arrangement, ToolOnPlate)
+            tip[:] = rows.rotation_M_P.transpose(0, 2, 1) if on_plate else rows.rotation_M_P
+        elif port == "reference":
+            tip[:, :, :3] = rotation[:, :, 3:] = np.eye(3)
+        else:
+            pose = inverse @ _closure_by(model, rows, port)
+            tip, rotation = tip_by_pose @ pose, pose[:, 3:]
+        if port in ("scale", "link"):
+            link_length[:] = np.eye(size)
+        elif port == "joint":
+            link_length[:] = -model.joint_weights
+        found[port] = Sensitivity(tip, rotation, link_length)
+    return found
+
+
+def _pose_by_closure(model: MachineModel, rows: Rows) -> Floats:
+    """(N, 6, 6): displacement and rotation of the platform by n link lengths and k offsets of revolute axes."""
+    close = closure_at(model.mechanism(rows.base_joints_M_mm), rows.origin_M_mm, rows.rotation_M_P)
+    lengths = np.concatenate([close.length_by_displacement, close.length_by_rotation_mm], axis=2)
+    offsets = np.concatenate([close.offset_by_displacement, close.offset_by_rotation_mm], axis=2)
+    J = np.concatenate([lengths, offsets], axis=1)
     good = np.isfinite(J).all(axis=(1, 2))
     inverse = np.full_like(J, np.nan)
     inverse[good] = np.linalg.inv(J[good])
-    pose_by_length, pose_by_offset = inverse[:, :, :n], inverse[:, :, n:]
+    return inverse
 
-    lever_M = rows.tip_M_mm - rows.origin_M_mm
-    tip_by_pose = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), -_cross(lever_M)], axis=2)
-    tool_by_tip = np.broadcast_to(np.eye(3), (count, 3, 3))
-    tool = rows.rotation_M_P
+
+def _tip_by_pose(model: MachineModel, rows: Rows) -> Floats:
+    """(N, 3, 6): the tip by displacement and rotation of the platform; with the tool on the plate, as {P} sees it."""
+    x, y, z = (rows.tip_M_mm - rows.origin_M_mm).T
+    nought = np.zeros_like(x)
+    by_rotation = np.stack([nought, z, -y, -z, nought, x, y, -x, nought], axis=1).reshape(-1, 3, 3)  # w x lever
+    found = np.concatenate([np.broadcast_to(np.eye(3), by_rotation.shape), by_rotation], axis=2)
     if isinstance(model.arrangement, ToolOnPlate):
-        tip_by_pose = -rows.rotation_M_P.transpose(0, 2, 1) @ tip_by_pose
-        tool = rows.rotation_M_P.transpose(0, 2, 1)
+        return np.asarray(-rows.rotation_M_P.transpose(0, 2, 1) @ found)
+    return found
 
-    def by_pose(pose: Floats) -> Sensitivity:
-        return Sensitivity(tip_by_pose @ pose, pose[:, 3:], np.zeros((count, n, pose.shape[2])))
 
-    axes_M = rows.revolute_axes_M
-    directions_P = rows.directions_M @ rows.rotation_M_P  # rows are R^T u
-    links_P = directions_P * rows.link_mm[:, :, None]
-    # a base joint shortens its link by u . a and turns the square angle by e . a; a platform joint the other way
-    base_joint = _each(pose_by_length, rows.directions_M) + _each(pose_by_offset, axes_M)
-    result: dict[Port, Sensitivity] = {}
-    for port in ports:
-        if port in ("scale", "link"):
-            result[port] = by_pose(pose_by_length)._replace(link_length=np.broadcast_to(np.eye(n), (count, n, n)))
-        elif port == "joint":
-            weights = -model.joint_weights
-            result[port] = by_pose(pose_by_length @ weights)._replace(
-                link_length=np.broadcast_to(weights, (count, *weights.shape))
-            )
-        elif port == "base_joint":
-            result[port] = by_pose(base_joint)
-        elif port in ("frame", "plate"):
-            result[port] = by_pose(base_joint @ _base_joints_by(model, rows, port))
-        elif port == "platform_joint":
-            axes_P = np.broadcast_to(model.revolute_axes_P, axes_M.shape)
-            result[port] = by_pose(-_each(pose_by_length, directions_P) - _each(pose_by_offset, axes_P))
-        elif port == "revolute_axis":
-            result[port] = by_pose(-_each(pose_by_offset, links_P[:, : axes_M.shape[1]]))
-        else:
-            size = port_size(port, rows)
-            tip = tool if port == "tool" else np.concatenate([tool_by_tip, np.zeros((count, 3, 3))], axis=2)
-            turned = np.zeros((count, 3, size))
-            if port == "reference":
-                turned[:, :, 3:] = np.eye(3)
-            result[port] = Sensitivity(tip, turned, np.zeros((count, n, size)))
-    return result
+def _closure_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
+    """(N, 6, size): what the closure is asked to make up for when something is added at `port`: link lengths first,
+    then offsets of the revolute axes."""
+    count, n, k = len(rows), rows.links, len(model.revolute_axes_P)
+    if port in ("frame", "plate"):
+        return np.asarray(_closure_by(model, rows, "base_joint") @ _base_joints_by(model, rows, port))
+    if port in ("scale", "link", "joint"):
+        found = np.zeros((count, 6, port_size(port, rows)))
+        found[:, :n] = -model.joint_weights if port == "joint" else np.eye(n)
+        return found
+    each, axis = np.arange(n), np.arange(k)
+    directions_P = rows.directions_M @ rows.rotation_M_P  # R^T u
+    if port == "revolute_axis":
+        turned = np.zeros((count, 6, k, 3))
+        turned[:, n + axis, axis] = -directions_P[:, :k] * rows.link_mm[:, :k, None]
+        return turned.reshape(count, 6, 3 * k)
+    moved = np.zeros((count, 6, n, 3))
+    if port == "base_joint":
+        moved[:, each, each] = rows.directions_M
+        moved[:, n + axis, axis] = rows.revolute_axes_M
+    else:
+        moved[:, each, each] = -directions_P
+        moved[:, n + axis, axis] = -model.revolute_axes_P
+    return moved.reshape(count, 6, 3 * n)
 
 
 def columns(effect: Effect, rows: Rows, basis: Floats, by: Mapping[Port, Sensitivity]) -> Sensitivity:
@@ -194,19 +206,6 @@ def _added(value: Floats, port: Port, deltas: Deltas) -> Floats:
 def _points(points: Floats, port: Port, deltas: Deltas) -> Floats:
     """Points (..., m, 3) and their deltas (N, 3 m)."""
     return points + deltas[port].reshape(-1, *points.shape[-2:]) if port in deltas else points
-
-
-def _cross(vectors: Floats) -> Floats:
-    """(N, 3) -> (N, 3, 3) with M w = vector x w."""
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-
-
-def _each(by_scalar: Floats, directions: Floats) -> Floats:
-    """Derivatives (N, 6, m) by one number per joint, and each joint's direction (N, m, 3) -> (N, 6, 3 m)."""
-    count, _, m = by_scalar.shape
-    return np.asarray((by_scalar[:, :, :, None] * directions[:, None]).reshape(count, 6, 3 * m))
 
 
 def _base_joints_by(model: MachineModel, rows: Rows, port: Port) -> Floats:

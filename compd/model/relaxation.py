@@ -87,10 +87,10 @@ def _stop(
             strain[k] = math.nan
             continue
         if start[k] != 0.0 or math.isnan(position_before_mm):
-            strain_before = direction[k]
+            strain_before = direction[k] if abs(direction[k]) == 1.0 else 0.0
         else:
             move_mm = position_mm[k] - position_before_mm
-            if direction[k] != 0.0 and abs(move_mm) > least_mm:
+            if abs(direction[k]) == 1.0 and abs(move_mm) > least_mm:
                 move_mm = direction[k] * abs(move_mm)
             strain_before = min(1.0, max(-1.0, strain_before + move_mm / yield_mm))
         position_before_mm = position_mm[k]
@@ -104,7 +104,7 @@ def stop(
 ) -> tuple[Floats, State]:
     """Stop operator (elastic up to `yield_mm` of travel, then sliding), -1..1; the play operator is the rest.
 
-    position_mm, direction (N, n): a session starts fully yielded in its direction, at 0 where that is unknown.
+    position_mm, direction (N, n): a session starts fully yielded in its direction, at 0 where that is not +1 or -1.
     A move beyond least_mm counts in the direction of its end: approached from one side, a link may have
     gone farther than the two rows tell.
     Returns (N, n) and the state after. (Visintin, Differential Models of Hysteresis, 1994, chapter III.)
