@@ -1,0 +1,66 @@
+"""`compd join`: a reference instrument's export beside the gauges, by time."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class FrameChoice(StrEnum):
+    """Whose coordinates the instrument gives."""
+
+    MACHINE = "machine"
+    INSTRUMENT = "instrument"
+
+
+def join(
+    gauges: Annotated[Path, typer.Argument(help="The recording of the gauges, NAME.csv with NAME.yaml.")],
+    export: Annotated[Path, typer.Argument(help="The instrument's export: CSV with a time and x, y, z or a length.")],
+    out: Annotated[Path, typer.Argument(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    time: Annotated[str | None, typer.Option(help="The export's time column; guessed from its name.")] = None,
+    x: Annotated[str | None, typer.Option(help="The export's column of x; guessed from its name.")] = None,
+    y: Annotated[str | None, typer.Option(help="The export's column of y; guessed from its name.")] = None,
+    z: Annotated[str | None, typer.Option(help="The export's column of z; guessed from its name.")] = None,
+    length: Annotated[str | None, typer.Option(help="The export's column of a length; guessed from its name.")] = None,
+    link: Annotated[int | None, typer.Option(help="For a length: the link that it measures, 1 to 6.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the lengths where names have none: mm, um, m ...")] = None,
+    offset: Annotated[
+        float | None,
+        typer.Option(help="Recording time minus instrument time, in s; estimated from the motion if left out."),
+    ] = None,
+    frame: Annotated[FrameChoice, typer.Option(help="Whose coordinates they are.")] = FrameChoice.INSTRUMENT,
+    sigma_um: Annotated[float | None, typer.Option(help="Its standard uncertainty per axis.")] = None,
+    moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
+) -> None:
+    """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
+    from compd.workbench.instrument import read_track
+    from compd.workbench.join import Instrument
+    from compd.workbench.join import join as put_together
+    from compd.workbench.reader import read_recording
+
+    roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
+    recording = read_recording(gauges, needs_reference=False)
+    track = read_track(export, {role: name for role, name in roles.items() if name is not None}, unit)
+    joined = put_together(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
+    typer.echo(f"{export}: " + ", ".join(f"{role} from {name!r}" for role, name in track.names.items()))
+    found = joined.offset
+    if math.isnan(found.std_s):
+        typer.echo(f"clock offset {found.offset_s:+.4f} s, given; agreement with the scales {found.agreement:.4f}")
+    else:
+        typer.echo(
+            f"clock offset {found.offset_s:+.4f} s +- {found.std_s:.4f} s (one standard uncertainty); "
+            f"agreement with the scales {found.agreement:.4f}"
+            + (f", next best {found.runner_up[1]:.4f} at {found.runner_up[0]:+.2f} s" if found.runner_up else "")
+        )
+    typer.echo(
+        f"{joined.matched} of {recording.rows} rows have a reference now (still within {joined.still_mm * 1e3:.1f} um)"
+    )
+    for reason, count in joined.left_out.items():
+        typer.echo(f"    {count} rows without: {reason}")
+    if track.left_out:
+        typer.echo(f"    {track.left_out} rows of the export have an empty cell")
+    typer.echo(f"written: {joined.path} and {joined.path.with_suffix('.yaml')}")
