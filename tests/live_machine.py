@@ -33,7 +33,8 @@ class Machine:
         self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
         self.wires = MachineWires(configuration, self.latest)
         self.model = build_model(configuration.geometry, configuration.wiring)
-        self.cycle = Cycle(self.model, self.wires, configuration.loop, configuration.limits, 0.1)
+        stroke_mm = configuration.geometry.link_length_mm
+        self.cycle = Cycle(self.model, self.wires, configuration.loop, configuration.limits, 0.1, stroke_mm)
         zero = dict.fromkeys(self.wires.length_channels, RAW_AT_ZERO_MM)
         self.orders = Orders(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
         self.now_s = 1000.0

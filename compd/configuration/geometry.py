@@ -112,6 +112,9 @@ class Geometry(Section):
     platform: MovingPlatform
     tool: Annotated[ToolOnPlatform | ToolOnPlate, Field(discriminator="on")]
     plate_points_M_mm: tuple[Vector, Vector, Vector] = Field(description="reference points m1, m2, m3, in {M}")
+    link_length_mm: tuple[Positive, Positive] | None = Field(
+        default=None, description="shortest and longest length of a link, joint to joint; a target beyond is refused"
+    )
     plate_thickness_mm: Positive | None = Field(default=None, description="thickness of the surface plate")
     scale_signal_period_mm: Positive | None = Field(default=None, description="signal period of the linear scales")
 
@@ -134,6 +137,8 @@ class Geometry(Section):
         ]
         if wrong:
             raise ValueError(f"{self.kinematics}: " + "; ".join(wrong))
+        if self.link_length_mm is not None and self.link_length_mm[0] >= self.link_length_mm[1]:
+            raise ValueError(f"link_length_mm: shortest first, then longest, is {list(self.link_length_mm)}")
         if n == 3 and any(self.tool.zero_rotation_P_in_M_rad):
             raise ValueError("tool.zero_rotation_P_in_M_rad: a tripod's attitude follows from its tip; leave it out")
         return self

@@ -11,7 +11,7 @@ from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_
 from compd.configuration.operation import Limits, Loop
 from compd.errors import StateError
 from compd.live.inputs import Carried, Inputs
-from compd.live.limits import limited
+from compd.live.limits import beyond_stroke, limited
 from compd.live.loop import Orders
 from compd.live.protocol import Target
 from compd.live.setpoint import Array, Mode, Numbers, Setpoint, State
@@ -47,13 +47,21 @@ class Cycle:
     """
 
     def __init__(
-        self, model: MachineModel, wires: MachineWires, loop: Loop, limits: Limits, valid_for_s: float
+        self,
+        model: MachineModel,
+        wires: MachineWires,
+        loop: Loop,
+        limits: Limits,
+        valid_for_s: float,
+        stroke_mm: tuple[float, float] | None = None,
     ) -> None:
+        """`stroke_mm`: shortest and longest link; None where the configuration does not say."""
         self._model = model
         self._wires = wires
         self._loop = loop
         self._limits = limits
         self._valid_for_s = valid_for_s
+        self._stroke_mm = stroke_mm
         self._period_s = 1.0 / loop.rate_hz
         self._no_scales = np.full(model.links, math.nan)
         self._no_comparators = GaugeValues(
@@ -98,6 +106,8 @@ class Cycle:
         change_mm, joints = set_.comparators.change_mm, self._wires.joints
         values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], self._wires.quantities(snapshot))
         found = self._compensation(values, target)
+        if target is not None and (beyond := beyond_stroke(found.link_length_mm, self._stroke_mm)):
+            raise _Invalid(State.REFUSED, f"this target is out of reach: {beyond}")
         kept = limited(found.correction_mm, self._correction_mm, self._period_s, self._limits)
         if kept.state is State.REFUSED:
             raise _Invalid(State.REFUSED, kept.reason)

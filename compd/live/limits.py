@@ -52,6 +52,18 @@ def limited(wanted_mm: Array, previous_mm: Array, period_s: float, limits: Limit
     return Limited(wanted_mm, State.OK, "")
 
 
+def beyond_stroke(length_mm: Array, stroke_mm: tuple[float, float] | None) -> str:
+    """Which links (n) would be shorter or longer than they can be, in words; "" when none, or no stroke is known."""
+    if stroke_mm is None:
+        return ""
+    shortest, longest = stroke_mm
+    return "; ".join(
+        f"link {i + 1}: {length:.3f} mm is beyond its stroke, {shortest:g} to {longest:g} mm"
+        for i, length in enumerate(length_mm.tolist())
+        if not shortest <= length <= longest
+    )
+
+
 def _beyond(links: list[int], wanted: list[float], largest: float, done: str) -> str:
     return "; ".join(
         f"link {i + 1}: correction {wanted[i]:.3f} mm beyond {math.copysign(largest, wanted[i]):.3f} mm, {done}"
