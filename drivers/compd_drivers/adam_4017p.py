@@ -50,6 +50,7 @@ class Adam4017p(Modbus):
     """One module; adjacent inputs in one read."""
 
     Options = Adam4017pOptions
+    usual_line = (9600, "8N1")
     sample_options: ClassVar[Mapping[str, Any]] = {
         "unit": 1,
         "channels": [

@@ -48,6 +48,7 @@ class HeidenhainNd28x(Gauge[ByteLine]):
 
     Options = HeidenhainNd28xOptions
     line_kind = "bytes"
+    usual_line = (9600, "7E2")
 
     def __init__(self, options: HeidenhainNd28xOptions) -> None:
         super().__init__(options)

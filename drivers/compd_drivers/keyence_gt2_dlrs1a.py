@@ -46,6 +46,7 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
 
     Options = KeyenceGt2DlRs1aOptions
     line_kind = "bytes"
+    usual_line = (9600, "8N1")
     sample_options: ClassVar[Mapping[str, Any]] = {"heads": 9}
 
     def __init__(self, options: KeyenceGt2DlRs1aOptions) -> None:

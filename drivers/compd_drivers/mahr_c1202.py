@@ -51,6 +51,7 @@ class MahrC1202(Gauge[ByteLine]):
 
     Options = MahrC1202Options
     line_kind = "bytes"
+    usual_line = (9600, "7E2")
     sample_options: ClassVar[Mapping[str, Any] | None] = {
         "features": [1, 3],
         "unit": "um",

@@ -52,6 +52,7 @@ class MicroEpsilonMsc7(SerialFrame):
     """One controller, one channel `position` in mm."""
 
     Options = MicroEpsilonMsc7Options
+    usual_line = (256000, "8E1")
     sample_options: ClassVar[Mapping[str, Any] | None] = {"address": 126, "value": "scaled", "unit": "mm"}
 
     def __init__(self, options: MicroEpsilonMsc7Options) -> None:

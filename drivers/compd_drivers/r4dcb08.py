@@ -34,6 +34,7 @@ class R4dcb08(Modbus):
     """One module: channels `1` to `8` in degC."""
 
     Options = R4dcb08Options
+    usual_line = (9600, "8N1")
     sample_options: ClassVar[Mapping[str, Any]] = {"unit": 1, "sensors": [1, 2, 8]}
 
     def __init__(self, options: R4dcb08Options) -> None:

@@ -32,6 +32,7 @@ class SylvacOptoRs(SerialAscii):
     """One instrument, one channel `position` in mm."""
 
     Options = SylvacOptoRsOptions
+    usual_line = (4800, "7E2")
     sample_options: ClassVar[Mapping[str, Any] | None] = {"unit": "mm", "decimals": 3}
 
     def __init__(self, options: SylvacOptoRsOptions) -> None:

@@ -53,6 +53,7 @@ class TesaTt80(SerialAscii):
     """One comparator, one channel `position` in mm."""
 
     Options = TesaTt80Options
+    usual_line = (4800, "7E2")
     sample_options: ClassVar[Mapping[str, Any] | None] = {"model": "TT90", "unit": "um"}
     sample_range: ClassVar[tuple[float, float] | None] = (-0.19, 0.19)
 

@@ -91,7 +91,7 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
     master, far = os.openpty()
     tty.setraw(far)
     process = subprocess.Popen(
-        [sys.executable, "-m", __spec__.name if __spec__ else __name__, "slave", str(master), str(baud),
+        [sys.executable, "-m", "tests.benchmarks.bench_throughput", "slave", str(master), str(baud),
          str(pace.turnaround_s)],
         pass_fds=[master],
     )  # fmt: skip
