@@ -15,9 +15,11 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.model.arrangement import ToolOnPlate
 from compd.model.effect import PORTS, Deltas, Fitted, Port, delta, deltas, port_size, together
+from compd.model.kinematics import inverse_kinematics
+from compd.model.links import scale_for_length_mm
 from compd.model.machine import MachineModel
 from compd.model.observe import Movement
-from compd.model.prediction import columns, predict, pull_back, sensitivities, shares
+from compd.model.prediction import altered, columns, predict, pull_back, sensitivities, shares
 from compd.model.reason import Reason
 from compd.model.rotation import compose, rotation_vector
 from compd.model.rows import Rows
@@ -130,6 +132,29 @@ def test_shares_add_up() -> None:
     alone: Deltas = each["tool_bending"]
     by_itself = predict(TRIPOD, rows, alone).tip_mm - rows.tip_M_mm
     np.testing.assert_allclose(found["tool_bending"], by_itself, rtol=2e-3)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
+    """Inverse kinematics of what was predicted, with everything added, gives the readings that it came from."""
+    model = MACHINES[name]
+    rows = rows_of(model, varied(model, 7))
+    machine_effects = [effect for effect in LIBRARY.values() if effect.live]
+    fitted = [
+        Fitted(effect, np.full(len(effect.columns(model.links)), 0.8), some_shape(effect))
+        for effect in machine_effects
+        if model is not HEXAPOD or "revolute_axes" not in effect.needs
+    ]
+    each, _ = deltas(fitted, rows, {})
+    found = together(list(each.values()))
+    shown = predict(model, rows, found)
+    machine = altered(model, rows.joint_mm, rows.frame_mm, found)
+    places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
+    pose = inverse_kinematics(machine.mechanism, *places, shown.rotation_M_P)
+    length_mm = pose.link_length_mm - machine.reading_to_length_mm
+    scale_mm = scale_for_length_mm(model.zero.link_length_mm, length_mm, machine.joint_shortening_mm)
+    np.testing.assert_allclose(scale_mm, rows.scale_mm, atol=1e-9)
+    assert np.abs(shown.tip_mm - predict(model, rows, {}).tip_mm).max() > 1e-3
 
 
 def recorded(file: Path) -> tuple[Rows, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.model.arrangement import ToolOnPlate
 from compd.model.effect import Deltas, Effect, Port, by_port, port_size, together
-from compd.model.frame import solve_frame
+from compd.model.frame import Frame, solve_frame
 from compd.model.jit import Floats, Ints
 from compd.model.kinematics import Mechanism, closure_at, forward_kinematics
 from compd.model.links import joint_shortening, link_length_mm
@@ -50,37 +50,65 @@ class Sensitivity(NamedTuple):
     link_length: Floats
 
 
-def predict(model: MachineModel, rows: Rows, deltas: Deltas) -> Prediction:
-    """Equations (1), (3) and forward kinematics with `deltas` added at the machine's ports.
+class Altered(NamedTuple):
+    """The machine with something added at its ports, before any link length is known.
 
-    deltas : (N, size) per port, in mm (rad for directions); a port left out gets nothing.
-    A row fails as `solve_frame` and `forward_kinematics` do.
+    frame : by equation (3).  mechanism : with the base joints as they are now.
+    tool_mm : (..., 3), in {P}; of a tool that stands on the plate, in {M}.
+    joint_shortening_mm : (..., n), gB + gS of equation (1).
+    reading_to_length_mm : (..., n), what the ports `scale` and `link` add between a scale's reading and its link.
+    reason : (...), a Reason, of the frame and the joint comparators.
     """
-    plate_points_M_mm = _points(model.frame.plate_points_M_mm, "plate", deltas)
-    geometry = model.frame._replace(plate_points_M_mm=plate_points_M_mm)
-    frame = solve_frame(geometry, model.zero.distances_mm + _added(rows.frame_mm, "frame", deltas))
-    shortening_mm, joint_reason = joint_shortening(model.joint_weights, _added(rows.joint_mm, "joint", deltas))
-    scale_mm = _added(rows.scale_mm, "scale", deltas)
-    length_mm = _added(link_length_mm(model.zero.link_length_mm, scale_mm, shortening_mm), "link", deltas)
+
+    frame: Frame
+    mechanism: Mechanism
+    tool_mm: Floats
+    joint_shortening_mm: Floats
+    reading_to_length_mm: Floats | float
+    reason: Ints
+
+
+def altered(
+    model: MachineModel, joint_mm: Floats, frame_mm: Floats, deltas: Deltas, guess_supports_M_mm: Floats | None = None
+) -> Altered:
+    """The machine as the gauges and `deltas` have it; forward and inverse kinematics both start here.
+
+    joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  deltas : (N, size) per port, in mm (rad for
+    directions); a port left out gets nothing.
+    """
+    geometry = model.frame._replace(plate_points_M_mm=_points(model.frame.plate_points_M_mm, "plate", deltas))
+    distances_mm = model.zero.distances_mm + _added(frame_mm, "frame", deltas)
+    frame = solve_frame(geometry, distances_mm, guess_supports_M_mm)
+    shortening_mm, reason = joint_shortening(model.joint_weights, _added(joint_mm, "joint", deltas))
     mechanism = Mechanism(
         _points(frame.base_joints_M_mm, "base_joint", deltas),
         _points(model.platform_joints_P_mm, "platform_joint", deltas),
         _points(model.revolute_axes_P, "revolute_axis", deltas),
     )
-    pose = forward_kinematics(mechanism, length_mm, rows.origin_M_mm, rows.rotation_M_P)
-    # a tool on the platform has its vector in {P}; one that stands on the plate, in {M}
-    if isinstance(model.arrangement, ToolOnPlate):
-        tool_M_mm = _added(model.arrangement.tool_M_mm, "tool", deltas)
-        tip = to_inner(pose.rotation_M_P, pose.origin_M_mm, tool_M_mm)
-    else:
-        tool_P_mm = _added(model.arrangement.tool_P_mm, "tool", deltas)
-        tip = to_outer(pose.rotation_M_P, pose.origin_M_mm, tool_P_mm)
+    tool = model.arrangement
+    tool_mm = _added(tool.tool_M_mm if isinstance(tool, ToolOnPlate) else tool.tool_P_mm, "tool", deltas)
+    to_length_mm = deltas.get("scale", 0.0) + deltas.get("link", 0.0)
+    return Altered(frame, mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame.reason))
+
+
+def predict(model: MachineModel, rows: Rows, deltas: Deltas) -> Prediction:
+    """Equations (1), (3) and forward kinematics with `deltas` added at the machine's ports.
+
+    deltas : as in `altered`; and at the port `reference`, which no machine has.
+    A row fails as `solve_frame` and `forward_kinematics` do.
+    """
+    machine = altered(model, rows.joint_mm, rows.frame_mm, deltas)
+    length_mm = link_length_mm(model.zero.link_length_mm, rows.scale_mm, machine.joint_shortening_mm)
+    pose = forward_kinematics(
+        machine.mechanism, length_mm + machine.reading_to_length_mm, rows.origin_M_mm, rows.rotation_M_P
+    )
+    seen_from = to_inner if isinstance(model.arrangement, ToolOnPlate) else to_outer
+    tip = seen_from(pose.rotation_M_P, pose.origin_M_mm, machine.tool_mm)
     rotation = pose.rotation_M_P
     if "reference" in deltas:
         tip = tip + deltas["reference"][:, :3]
         rotation = compose(rotation_matrix(deltas["reference"][:, 3:]), rotation)
-    reason = np.maximum(np.maximum(joint_reason, frame.reason), pose.reason)
-    return Prediction(tip, rotation, pose.link_length_mm, reason)
+    return Prediction(tip, rotation, pose.link_length_mm, np.maximum(machine.reason, pose.reason))
 
 
 def sensitivities(model: MachineModel, rows: Rows, ports: Collection[Port]) -> dict[Port, Sensitivity]:
