@@ -81,16 +81,16 @@ class Client:
         while True:
             yield self._setpoints.popleft() if self._setpoints else self._next_setpoint()
 
-    def readings(self, rate_hz: float | None = None) -> Iterator[bytes]:
-        """What the daemon says of its cycles' readings, line by line as it came: first its answer to WATCH, with the
-        columns of a recording, then READINGS messages for ever, `rate_hz` per second; None for every cycle.
+    def readings(self, rate_hz: float | None = None) -> Iterator[tuple[bytes, Message]]:
+        """What the cycles compute from: lines as they came, and the messages in them. First the answer to WATCH, with
+        the columns of a recording, then READINGS for ever, `rate_hz` per second; None for every cycle.
 
         Unix socket only. Raises DaemonError when the daemon refuses or goes away.
         """
         asked = {"class": "WATCH", "what": "readings"}
         self._send(asked if rate_hz is None else asked | {"rate_hz": rate_hz})
         while True:
-            yield self._read()[0]
+            yield self._read()
 
     def target(
         self,

@@ -10,12 +10,11 @@ from typing import Any
 import structlog
 
 from compd import __version__
-from compd.assembly import build_model
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.live.acquisition import Acquisition
-from compd.live.cycle import Cycle
+from compd.live.chain import build_chain
 from compd.live.loop import Loop, Orders
 from compd.live.notify import Notifier
 from compd.live.packets import PacketSender
@@ -25,10 +24,8 @@ from compd.live.requests import Requests
 from compd.live.setpoint import Setpoint, State
 from compd.live.status import StatusReport
 from compd.live.transcript import Transcript
-from compd.live.wiring import MachineWires
 from compd.live.zero import MachineZero, load_zero
 from compd.live.zero_taking import ZeroTaker
-from compd.readings import Latest
 
 # How soon the daemon notices that one of its threads has ended.
 _LOOK_EVERY_S = 0.5
@@ -46,8 +43,7 @@ class Daemon:
         self.configuration = configuration
         self._notifier = notifier or Notifier.from_environment()
         gauges = configuration.gauge_objects()
-        self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
-        self._wires = MachineWires(configuration, self.latest)
+        self.latest, self._wires, cycle = build_chain(configuration, gauges)
         self.orders = Orders(self._zero_on_disk())
         by_line = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
@@ -59,11 +55,6 @@ class Daemon:
         udp = configuration.sockets.udp
         self._packets = PacketSender(udp, configuration.config_hash) if udp is not None else None
         outlets = [self.publisher.deliver] if self._packets is None else [self._packets.deliver, self.publisher.deliver]
-        model = build_model(configuration.geometry, configuration.wiring)
-        cycle = Cycle(
-            model, self._wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s,
-            configuration.geometry.link_length_mm,
-        )  # fmt: skip
         self.loop = Loop(configuration.loop, cycle, self.latest, self.orders, outlets, self._notifier, clock)
         self._zero_taker = ZeroTaker(
             self._wires, self.latest, self.orders, _directory(configuration), configuration.zero_hash, clock

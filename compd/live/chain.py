@@ -1,0 +1,33 @@
+"""From a configuration to what computes its setpoints; the daemon and replay build it here, so it is the same."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from compd.assembly import build_model
+from compd.configuration import Configuration
+from compd.gauge import Gauge
+from compd.live.cycle import Cycle
+from compd.live.wiring import MachineWires
+from compd.readings import Latest
+
+
+class Chain(NamedTuple):
+    """Readings go into `latest`; `wires` say what they measure; `cycle` makes setpoints of its snapshots."""
+
+    latest: Latest
+    wires: MachineWires
+    cycle: Cycle
+
+
+def build_chain(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) -> Chain:
+    """`gauges`: the configuration's own, by name. Raises KinematicsError for a machine that cannot be."""
+    latest = Latest([f"{name}.{channel.name}" for name, gauge in gauges.items() for channel in gauge.channels])
+    wires = MachineWires(configuration, latest)
+    model = build_model(configuration.geometry, configuration.wiring)
+    cycle = Cycle(
+        model, wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s,
+        configuration.geometry.link_length_mm,
+    )  # fmt: skip
+    return Chain(latest, wires, cycle)
