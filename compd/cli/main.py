@@ -10,6 +10,8 @@ import typer
 from compd import __version__
 from compd.cli.check import check
 from compd.cli.demo import demo
+from compd.cli.record import record
+from compd.cli.replay import replay
 from compd.cli.run import run
 from compd.cli.simulate import simulate
 from compd.cli.watch import watch
@@ -36,5 +38,5 @@ def _options(
     """Live error compensation for parallel kinematic machines: joints, links and frame."""
 
 
-for command in (demo, check, simulate, run, watch, zero):
+for command in (demo, check, simulate, run, watch, zero, record, replay):
     app.command()(command)

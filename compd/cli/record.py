@@ -1,0 +1,67 @@
+"""`compd record`: raw readings from the running daemon onto the disk."""
+
+from __future__ import annotations
+
+import signal
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compd.cli.zero import DEFAULT_SOCKET, unix_address
+
+_MB = 1_000_000
+_S_PER_H = 3600.0
+# The daemon is gone when it has said nothing for this long, or for three intervals.
+_TIMEOUT_S = 5.0
+
+
+class WhenFull(StrEnum):
+    """What happens at the limit."""
+
+    STOP = "stop"
+    DROP_OLDEST = "drop-oldest"
+
+
+def record(
+    name: Annotated[Path, typer.Argument(help="Where to: NAME becomes NAME-0001.csv and so on.")],
+    address: Annotated[
+        str, typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it.")
+    ] = DEFAULT_SOCKET,
+    rate_hz: Annotated[float, typer.Option(min=0.001, help="Rows per second; the cycles between are left out.")] = 10.0,
+    burst: Annotated[
+        float | None, typer.Option(min=0.001, help="Every cycle, for so many seconds; another recorder may run beside.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.001, help="End after so long; otherwise at Ctrl-C.")] = None,
+    part_mb: Annotated[float, typer.Option(min=0.01, help="Begin a new part after so many MB.")] = 100.0,
+    part_hours: Annotated[float, typer.Option(min=0.0001, help="Begin a new part after so many hours.")] = 24.0,
+    limit_mb: Annotated[float, typer.Option(min=0.01, help="All parts together; see --when-full.")] = 5000.0,
+    when_full: Annotated[
+        WhenFull, typer.Option(help="At the limit: end the recording, or delete its oldest part and say so.")
+    ] = WhenFull.STOP,
+) -> None:
+    """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs."""
+    from compd.client import connect
+    from compd.clock import MonotonicClock
+    from compd.live.recorder import Keeping, Recorder
+
+    keeping = Keeping(round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB),
+                      when_full is WhenFull.DROP_OLDEST)  # fmt: skip
+    for_s = burst if burst is not None else seconds
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with connect(unix_address(address), max(_TIMEOUT_S, 3 / rate_hz)) as client:
+        lines = client.readings(None if burst is not None else rate_hz)
+        _, watch = next(lines)
+        recorder = Recorder(name, client.version, watch, keeping, lambda text: typer.echo(text, err=True),
+                            MonotonicClock())  # fmt: skip
+        recorder.start()
+        try:
+            recorder.follow(lines, for_s)
+        except KeyboardInterrupt:
+            pass  # the usual end
+        finally:
+            try:
+                recorder.close()
+            finally:
+                typer.echo(recorder.summary(), err=True)

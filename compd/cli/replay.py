@@ -1,0 +1,46 @@
+"""`compd replay`: a recorded run through the live path again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def replay(
+    name: Annotated[Path, typer.Argument(help="As given to `compd record` (all parts), or one part.")],
+    machine: Annotated[Path, typer.Option("--machine", help="The configuration with which the daemon ran.")],
+    setpoints: Annotated[bool, typer.Option(help="Print the setpoints that come out, one per line.")] = False,
+) -> None:
+    """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
+
+    Exit code 1 when one differs.
+    """
+    from compd.configuration import load
+    from compd.live.replay import ReplayedCycle, Transcripts
+    from compd.live.replay import replay as replay_cycles
+
+    configuration = load(machine)
+    transcripts = Transcripts(name)
+    if others := transcripts.config_hashes() - {configuration.config_hash}:
+        typer.echo(f"warning: recorded with another configuration ({', '.join(sorted(others))}, this is "
+                   f"{configuration.config_hash}): setpoints may differ by that", err=True)  # fmt: skip
+    cycles = differing = 0
+    first: ReplayedCycle | None = None
+    for cycle in replay_cycles(configuration, transcripts):
+        cycles += 1
+        if cycle.differs:
+            differing += 1
+            first = first or cycle
+        if setpoints:
+            typer.echo(cycle.replayed, nl=False)
+    if transcripts.torn:
+        typer.echo(f"{transcripts.torn} torn line at the end left out: the recorder was killed", err=True)
+    if first is None:
+        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent", err=True)
+        return
+    typer.echo(f"{differing} of {cycles} setpoints differ; the first is tick {first.tick}, {first.where}", err=True)
+    typer.echo(f"    sent     {first.sent.decode().rstrip()}", err=True)
+    typer.echo(f"    replayed {first.replayed.decode().rstrip()}", err=True)
+    raise typer.Exit(1)
