@@ -135,6 +135,15 @@ def test_links_remember_their_direction_through_noise() -> None:
     assert seen == [0, 1, 1, 1, 1, 1, -1, -1, -1, 1]
 
 
+def test_a_link_that_comes_back_in_tiny_steps_has_turned_round() -> None:
+    motion = None
+    seen = []
+    for i, position in enumerate([0.0, 5.0, 4.9997, 4.9994, 4.9991, 4.9988]):
+        motion = moved(motion, 0.001 * i, np.array([position]), np.zeros(1))
+        seen.append(float(motion.direction[0]))
+    assert seen == [0, 1, 1, 1, 1, -1]
+
+
 def test_velocity_settles_at_the_links_speed() -> None:
     motion = None
     for i in range(400):
