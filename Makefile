@@ -53,4 +53,5 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.bench_latency
 
 clean:
+	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
