@@ -26,11 +26,12 @@ def check(
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
     from compd.assembly import build_model
+    from compd.cli.line_plan import print_line_plan
     from compd.configuration import load
 
     configuration = load(config)
     build_model(configuration.geometry, configuration.wiring)
-    for warning in configuration.warnings:
+    for warning in (*configuration.warnings, *print_line_plan(configuration)):
         typer.echo(f"warning: {warning}")
     wiring = configuration.wiring
     typer.echo(

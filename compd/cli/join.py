@@ -49,7 +49,8 @@ def join(
     typer.echo(f"{export}: " + ", ".join(f"{role} from {name!r}" for role, name in track.names.items()))
     found = joined.offset
     if math.isnan(found.std_s):
-        typer.echo(f"clock offset {found.offset_s:+.4f} s, given; agreement with the scales {found.agreement:.4f}")
+        agreement = "not known" if math.isnan(found.agreement) else f"{found.agreement:.4f}"
+        typer.echo(f"clock offset {found.offset_s:+.4f} s, given; agreement with the scales {agreement}")
     else:
         typer.echo(
             f"clock offset {found.offset_s:+.4f} s +- {found.std_s:.4f} s (one standard uncertainty); "

@@ -8,9 +8,17 @@ from __future__ import annotations
 import typer
 
 from compd import __version__
+from compd.cli import model_commands
 from compd.cli.check import check
+from compd.cli.compare import compare
 from compd.cli.demo import demo
+from compd.cli.driver import app as driver
+from compd.cli.effect import effect
+from compd.cli.gauge import app as gauge
+from compd.cli.join import join
+from compd.cli.ledger import ledger
 from compd.cli.record import record
+from compd.cli.recording import recording
 from compd.cli.replay import replay
 from compd.cli.run import run
 from compd.cli.simulate import simulate
@@ -38,5 +46,9 @@ def _options(
     """Live error compensation for parallel kinematic machines: joints, links and frame."""
 
 
-for command in (demo, check, simulate, run, watch, zero, record, replay):
+for command in (demo, check, simulate, run, watch, zero, record, replay, join, compare, ledger):
     app.command()(command)
+for command in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
+    effect.command()(command)
+for name, group in (("gauge", gauge), ("driver", driver), ("effect", effect), ("recording", recording)):
+    app.add_typer(group, name=name)

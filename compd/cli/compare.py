@@ -1,0 +1,115 @@
+"""`compd compare`: the model beside measurements."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from compd.configuration import Configuration
+    from compd.model_file import ModelFile
+    from compd.workbench.compare import Comparison
+    from compd.workbench.observed import Observed
+
+
+def compare(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="NAME.csv with NAME.yaml beside it.")
+    ],
+    machine: Annotated[
+        Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="The model file with fitted effects; without it, no effect acts.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print numbers for programs.")] = False,
+    html: Annotated[
+        Path | None, typer.Option("--html", help="Write the page with the pictures; works offline.")
+    ] = None,
+) -> None:
+    """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
+    from compd.errors import CompdError, Problem
+    from compd.workbench.compare import compare as compared
+
+    problems: list[Problem] = []
+    found: list[Comparison] = []
+    file: ModelFile | None = None
+    for path in recordings:
+        try:
+            seen, _ = open_recording(path, machine)
+            file = open_model(model, seen)
+            found.append(compared(seen, file.fitted, file.covariance))
+        except CompdError as error:
+            problems += error.problems
+    if problems:
+        raise CompdError(list(dict.fromkeys(problems)))
+    if html is not None:
+        from compd.workbench.report import write_report
+
+        write_page_to(html)
+        write_report(html, found, file)
+    if as_json:
+        each = [one.as_json() for one in found]
+        typer.echo(json.dumps(each[0] if len(each) == 1 else {"recordings": each}, indent=1, allow_nan=False))
+        return
+    print_comparisons(found)
+    if html is not None:
+        typer.echo(f"The same as pictures: {html}")
+
+
+def open_recording(path: Path, machine: Path | None) -> tuple[Observed, Configuration | None]:
+    """A recording on its machine. Raises RecordingError with every problem."""
+    from compd.cli.recording import read_with_machine
+    from compd.workbench.observed import observed
+
+    recording, configuration = read_with_machine(path, machine)
+    return observed(recording, configuration), configuration
+
+
+def open_model(path: Path | None, seen: Observed) -> ModelFile:
+    """The model file, or the model without effects where none is named. Raises StateError."""
+    from compd.model_file import ModelFile, read_model_file
+
+    machine = seen.recording.machine
+    return ModelFile(machine) if path is None else read_model_file(path, machine, seen.rows.links)
+
+
+def write_page_to(path: Path) -> None:
+    """Raise CompdError where a page cannot be written, before the work and not after it."""
+    from compd.errors import CompdError, Problem
+
+    if not path.parent.is_dir():
+        raise CompdError(Problem(str(path), "its directory does not exist", str(path.parent), next_step="make it"))
+
+
+def print_comparisons(found: list[Comparison]) -> None:
+    """The result for a person: a table, then sentences."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.workbench.report import name_of, summary
+
+    console = Console(highlight=False)
+    numbers = summary(found)
+    table = Table(*numbers.head)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for row in numbers.rows:
+        table.add_row(*row)
+    console.print(table)
+    for one in found:
+        if len(found) > 1:
+            console.print(f"[bold]{name_of(one)}[/]")
+        console.print(one.verdict)
+        console.print(f"Noise floor: {one.floor.how}.")
+        for finding in one.findings:
+            console.print(f"  - {finding.text}")
+        rows = one.seen.recording.row[one.outlier].tolist()
+        if rows:
+            shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")
+            console.print(f"Rows beyond all noise, not used: {shown}")
+        for why, count in one.left_out.items():
+            console.print(f"{count} rows left out: {why}")

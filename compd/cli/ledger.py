@@ -1,0 +1,37 @@
+"""`compd ledger`: every step that changed a model, and the falling error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def ledger(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="The model file.")],
+    html: Annotated[Path | None, typer.Option("--html", help="Draw the falling error into this page.")] = None,
+) -> None:
+    """Print every step that changed a model: what, on which recording, the error before and after."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.cli.compare import write_page_to
+    from compd.model_file import read_stored
+    from compd.workbench.report import LEDGER_HEAD, ledger_rows, write_ledger
+
+    stored = read_stored(model)
+    steps = stored.steps
+    console = Console(highlight=False)
+    if not steps:
+        console.print(f"{model}: no step yet; `compd effect add` makes the first")
+        return
+    largest = max(max(step.rms_before_um, step.rms_after_um) for step in steps)
+    table = Table(*LEDGER_HEAD, "error after", title=f"{model}: {stored.machine}", title_justify="left")
+    for row, step in zip(ledger_rows(stored), steps, strict=True):
+        table.add_row(*row, "#" * max(1, round(24 * step.rms_after_um / largest)))
+    console.print(table)
+    if html is not None:
+        write_page_to(html)
+        write_ledger(html, stored)
+        typer.echo(f"The falling error as a picture: {html}")

@@ -1,0 +1,131 @@
+"""`compd effect add | remove | fit | undo`: changing a model, one step at a time."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from compd.model.effect import Effect
+    from compd.model_file import Declaration, ModelFile
+    from compd.workbench.ledger import Change
+    from compd.workbench.observed import Observed
+
+ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
+MachineOption = Annotated[
+    Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
+]
+RecordingArgument = Annotated[Path, typer.Argument(metavar="RECORDING", help="What to fit on: NAME.csv.")]
+EFFECT_HELP = "An id from `compd effect list`, /absolute/file.py:NAME, or a YAML file with a formula."
+
+
+def add(
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
+    recording: RecordingArgument,
+    model: ModelOption,
+    machine: MachineOption = None,
+) -> None:
+    """Add an effect to a model and fit all its effects together."""
+    from compd.cli.compare import open_recording
+    from compd.model_file import ModelFile
+    from compd.workbench.ledger import add as added
+
+    declared, found = declaration_of(effect)
+    seen, _ = open_recording(recording, machine)
+    file = _opened(model, seen) if model.exists() else ModelFile(seen.recording.machine)
+    _finish(model, added(file, declared, found, seen, _now()), f"added {found.id}")
+
+
+def remove(
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="The id of an effect in the model.")],
+    recording: RecordingArgument,
+    model: ModelOption,
+    machine: MachineOption = None,
+) -> None:
+    """Take an effect out of a model and fit the others again."""
+    from compd.cli.compare import open_recording
+    from compd.workbench.ledger import remove as removed
+
+    seen, _ = open_recording(recording, machine)
+    _finish(model, removed(_opened(model, seen), effect, seen, _now()), f"removed {effect}")
+
+
+def fit(recording: RecordingArgument, model: ModelOption, machine: MachineOption = None) -> None:
+    """Fit all effects of a model again, on another recording."""
+    from compd.cli.compare import open_recording
+    from compd.workbench.ledger import refit
+
+    seen, _ = open_recording(recording, machine)
+    _finish(model, refit(_opened(model, seen), seen, _now()), "fitted again")
+
+
+def undo(model: ModelOption) -> None:
+    """Take back the last step; undo again for the step before it. The ledger keeps both."""
+    from compd.model_file import read_stored, write_stored
+    from compd.workbench.ledger import undo as undone
+
+    after = undone(read_stored(model), _now(), str(model))
+    write_stored(model, after)
+    names = ", ".join(_name(entry["effect"]) for entry in after.state["effects"]) or "none"
+    typer.echo(f"{model}: one step taken back; effects now: {names}")
+
+
+def _name(declared: Declaration) -> str:
+    return declared if isinstance(declared, str) else str(declared["id"])
+
+
+def declaration_of(text: str) -> tuple[Declaration, Effect]:
+    """What the person named, and the effect it stands for. Raises CompdError with every problem."""
+    from compd.configuration.document import read
+    from compd.model.effects import find
+
+    if Path(text).suffix in (".yaml", ".yml"):
+        declared = read(Path(text)).data
+        return declared, find(declared, text)
+    return text, find(text, "compd effect add")
+
+
+def _opened(path: Path, seen: Observed) -> ModelFile:
+    from compd.model_file import read_model_file
+
+    return read_model_file(path, seen.recording.machine, seen.rows.links)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _finish(path: Path, change: Change, done: str) -> None:
+    """Write the file, then say what the step did."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.model_file import numbers_of, write_model_file
+
+    links = change.after.seen.rows.links
+    write_model_file(path, change.file, links)
+    before, after = change.before, change.after
+    console = Console(highlight=False)
+    console.print(
+        f"{path}: {done}; residual {before.rms_um:.3g} um -> {after.rms_um:.3g} um, floor ratio "
+        f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
+    )
+    ranges = {
+        (one.effect.id, column.name): column.parameter
+        for one in change.file.fitted for column in one.effect.columns(links)
+    }  # fmt: skip
+    table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
+    for effect, number in numbers_of(change.file.fitted, links):
+        parameter = ranges[effect, number["name"]]
+        inside = parameter.low <= number["value"] <= parameter.high
+        said = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
+        table.add_row(effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], said)
+    for one in change.file.fitted:
+        for name, value in one.shape.items():
+            unit = next(constant.unit for constant in one.effect.constants if constant.name == name)
+            table.add_row(one.effect.id, name, f"{value:.5g}", "searched", unit, "")
+    console.print(table)
+    typer.echo(after.verdict)
