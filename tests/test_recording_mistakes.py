@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from compd.cli.recording import recording
@@ -188,6 +191,24 @@ def test_german_spreadsheet_gets_two_problems_not_ninety(tmp_path: Path) -> None
 )
 def test_file_of_another_kind(tmp_path: Path, content: bytes, wanted: str) -> None:
     assert wanted in "\n".join(problems_of(put(tmp_path, content)))
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(data=st.data())
+def test_nothing_but_words_comes_of_any_file(tmp_path: Path, data: st.DataObject) -> None:
+    """Whatever a file holds, it is read or refused as a RecordingError: no other exception."""
+    text = csv_text(4)
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text)))
+        cut = data.draw(st.integers(0, 30))
+        text = text[:at] + data.draw(st.text("0,;\n\r\t\"'#.-eE_x \u00b0\u2212\x00", max_size=6)) + text[at + cut :]
+    sidecar = data.draw(st.sampled_from([SIDECAR, SIDECAR[1:], SIDECAR[:40], SIDECAR + "excluded_rows: [{rows: 3-4}]"]))
+    try:
+        found = read_recording(put(tmp_path, text, sidecar))
+    except RecordingError:
+        return
+    assert np.isfinite(found.time_s).all()
+    assert (np.diff(found.time_s) > 0).all()
 
 
 def test_ball_plate_mistakes(tmp_path: Path) -> None:

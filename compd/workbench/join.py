@@ -145,11 +145,10 @@ def _sidecar(
         "instrument": track.path.name,
         "offset_s": round(offset.offset_s, 6),
         "offset_from": "a person" if np.isnan(offset.std_s) else "the motion that both saw",
-        "agreement": round(offset.agreement, 6),
         "matched_rows": matched,
     }
-    if not np.isnan(offset.std_s):
-        joined["offset_std_s"] = round(offset.std_s, 6)
+    known = {"agreement": offset.agreement, "offset_std_s": offset.std_s}
+    joined |= {name: round(value, 6) for name, value in known.items() if not np.isnan(value)}
     sidecar: dict[str, Any] = {"machine": recording.machine, "reference": reference}
     if excluded:
         sidecar["excluded_rows"] = excluded
