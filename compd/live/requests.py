@@ -16,7 +16,7 @@ from compd.live.protocol import (
     parse_target,
     parse_watch,
 )
-from compd.live.session import Session
+from compd.live.session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES, Session
 from compd.live.setpoint import Setpoint
 from compd.live.transcript import Transcript
 
@@ -89,12 +89,12 @@ class Requests:
         rate_hz, readings = parse_watch(message)
         answer = {key: message[key] for key in ("class", "what", "rate_hz") if key in message}
         if not readings:
-            session.watch(rate_hz, Setpoint.to_json)
+            session.watch(rate_hz, Setpoint.to_json, MAX_BEHIND_BYTES)
             return line(answer)
         if not session.local or self._transcript is None:
             # several times a setpoint's size, and of use beside the daemon only: its times are this computer's
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
-        session.watch(rate_hz, self._transcript.line)
+        session.watch(rate_hz, self._transcript.line, MAX_READINGS_BEHIND_BYTES)
         return line(answer | {"columns": self._transcript.columns})
 
     def left(self, session: Session) -> None:

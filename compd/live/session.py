@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 from compd.live.protocol import MAX_LINE_BYTES, ErrorCode, ProtocolError
 from compd.live.setpoint import Setpoint
 
-# About 150 setpoints, 0.7 s at 200 Hz; or 30 READINGS. A client that is further behind reads the past.
+# About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind reads the past.
 MAX_BEHIND_BYTES = 128 * 1024
+# About 1500 READINGS: 1.5 s at 1 kHz. Who watches them wants the past, and they are for this computer alone.
+MAX_READINGS_BEHIND_BYTES = 8 * 1024 * 1024
 _RECEIVE_BYTES = 4096
 _LONGEST_INTERVAL_S = 1e6
 
@@ -28,13 +30,15 @@ class Session:
         self.due_s = math.inf
         self.encode: Callable[[Setpoint], bytes] = Setpoint.to_json
         self._interval_s = math.inf
+        self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
         self._skipping = False
         self._waiting = bytearray()
 
-    def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes]) -> None:
+    def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes], max_behind_bytes: int) -> None:
         """From now on `rate_hz` setpoints per second, as `encode` writes them: inf for every one, 0 for none."""
         self.encode = encode
+        self._max_behind_bytes = max_behind_bytes
         self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
 
@@ -76,7 +80,7 @@ class Session:
 
     def send(self, data: bytes) -> bool:
         """Send now what the system takes and keep the rest; False when the client is too far behind."""
-        if len(self._waiting) + len(data) > MAX_BEHIND_BYTES:
+        if len(self._waiting) + len(data) > self._max_behind_bytes:
             return False
         self._waiting += data
         self.flush()
