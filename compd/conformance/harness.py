@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -21,6 +22,8 @@ MARGIN = 2.0
 SMALLEST = 1e-9  # of the range: rounding in floating point
 MOST_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
+# The daemon lets a gauge that did not answer rest for `back_off_s`, 0.5 s or more: at least so many line timeouts.
+REST_TIMEOUTS = 2.0
 
 
 class Wire(Protocol):
@@ -60,7 +63,8 @@ class Poll:
 
 @dataclass
 class Session:
-    """A driver that polls over `wire`, as a line's thread would: drained after a fault, opened anew when lost."""
+    """A driver that polls over `wire`, as a line's thread would: drained after a fault, opened anew when lost,
+    at rest after a silence."""
 
     gauge: Gauge[Any]
     wire: Wire
@@ -143,6 +147,8 @@ class Session:
             if fault.quality is not Quality.LINE_LOST:
                 if fault.quality not in NOTHING_UNDER_WAY:
                     self._line.drain()
+                if fault.quality is Quality.TIMEOUT:
+                    self.wire.clock.wait(threading.Event(), REST_TIMEOUTS * self.wire.timeout_s)
                 return
         except LineFault:
             pass  # lost while draining: closed like any lost line
