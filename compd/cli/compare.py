@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from compd.workbench.compare import Comparison
     from compd.workbench.observed import Observed
 
+# More sentences than this nobody reads in a terminal.
+MOST_SENTENCES = 6
+
 
 def compare(
     recordings: Annotated[
@@ -97,6 +100,7 @@ def print_comparisons(found: list[Comparison]) -> None:
     table = Table(*numbers.head)
     for column in table.columns[1:]:
         column.justify = "right"
+        column.overflow = "fold"
     for row in numbers.rows:
         table.add_row(*row)
     console.print(table)
@@ -105,8 +109,10 @@ def print_comparisons(found: list[Comparison]) -> None:
             console.print(f"[bold]{name_of(one)}[/]")
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
-        for finding in one.findings:
+        for finding in one.findings[:MOST_SENTENCES]:
             console.print(f"  - {finding.text}")
+        if len(one.findings) > MOST_SENTENCES:
+            console.print(f"  and {len(one.findings) - MOST_SENTENCES} weaker ones (--json and --html have all)")
         rows = one.seen.recording.row[one.outlier].tolist()
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")

@@ -27,9 +27,9 @@ def ledger(
         console.print(f"{model}: no step yet; `compd effect add` makes the first")
         return
     largest = max(max(step.rms_before_um, step.rms_after_um) for step in steps)
-    table = Table(*LEDGER_HEAD, "error after", title=f"{model}: {stored.machine}", title_justify="left")
+    table = Table(*LEDGER_HEAD, "", title=f"{model}: {stored.machine}", title_justify="left")
     for row, step in zip(ledger_rows(stored), steps, strict=True):
-        table.add_row(*row, "#" * max(1, round(24 * step.rms_after_um / largest)))
+        table.add_row(*row, "#" * max(1, round(16 * step.rms_after_um / largest)))
     console.print(table)
     if html is not None:
         write_page_to(html)

@@ -18,7 +18,7 @@ _MEDIAN, _P95 = 0.674490, 1.959964
 # A declared uncertainty is taken to be right within 5 %, which counts as so many measurements (GUM, G.4.2:
 # 1 / (2 x 0.05^2)). Repeats that contradict it overrule it.
 DECLARED_DOF = 200.0
-CONTRADICTION = 0.05
+CONTRADICTION = 0.01
 
 Source = Literal["repeats", "declared", "estimate"]
 

@@ -166,6 +166,7 @@ def _follow(
         slope = 2 * best.slope if one.name.startswith("direction") else best.slope
         alike = tuple(other.name for other in candidates if other is not one and _likeness(one, other, used) > ALIKE)
         found.append((of_all * total, Finding(label, one.name, one.unit, slope, of_all, p, alike[:4], largest)))
+        largest = ""  # once per coordinate is enough
         rest = rest - best.slope * (np.nan_to_num(one.values - np.nanmean(one.values[used])))
     return found
 

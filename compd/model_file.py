@@ -1,0 +1,220 @@
+"""The model file: a machine's effects with their fitted numbers, and every step by which they came to be.
+
+One YAML file, written whole or not at all. Each step keeps what it replaced, so that it can be undone.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import yaml
+
+from compd.errors import CompdError, Problem, StateError
+from compd.model.effect import Fitted
+from compd.model.effects import find
+from compd.model.jit import Floats
+
+FORMAT = 1
+Kind = Literal["add", "remove", "fit", "undo"]
+# An effect's id, /absolute/file.py:NAME, or a formula written out.
+Declaration: TypeAlias = str | Mapping[str, Any]
+# The parts of the file that a step replaces, as plain data.
+State: TypeAlias = Mapping[str, Any]
+NOTHING: State = {"effects": [], "covariance": []}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One command that changed the model; um per coordinate.
+
+    effect : what was added or removed, "" for a fit of all.  date : UTC, ISO 8601.
+    recording, sha256 : what it was fitted on.  undone : whether a later step took it back.
+    """
+
+    kind: Kind
+    effect: str
+    date: str
+    recording: str
+    sha256: str
+    rms_before_um: float
+    rms_after_um: float
+    noise_floor_um: float
+    replaced: State
+    undone: bool = False
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A model file as plain data: what can be shown and undone without the machine."""
+
+    machine: str
+    state: State = field(default_factory=lambda: NOTHING)
+    steps: tuple[Step, ...] = ()
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """machine : the name of its configuration, or "external".
+
+    declared : each effect as the person named it.  fitted : with numbers and their own covariance.
+    covariance : (P, P) of all fitted numbers jointly, in the order of `fitted`.
+    """
+
+    machine: str
+    declared: tuple[Declaration, ...] = ()
+    fitted: tuple[Fitted, ...] = ()
+    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    steps: tuple[Step, ...] = ()
+
+    def state(self, links: int) -> State:
+        """The effects as plain data, for the file."""
+        effects = [
+            {
+                "effect": declared if isinstance(declared, str) else dict(declared),
+                "shape": {name: float(value) for name, value in one.shape.items()},
+                "parameters": _numbers(one, links),
+            }
+            for declared, one in zip(self.declared, self.fitted, strict=True)
+        ]
+        return {"effects": effects, "covariance": self.covariance.tolist()}
+
+
+def read_stored(path: Path) -> Stored:
+    """Read a model file without looking into its effects.
+
+    Raises StateError: no such file, not YAML, another format, a step that cannot be read.
+    """
+    where = str(path)
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StateError(
+            Problem(where, f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
+        ) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise StateError(Problem(where, "is not YAML", str(error).splitlines()[0])) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        found = data.get("format") if isinstance(data, dict) else None
+        raise StateError(Problem(where, "is no model file of this version", f"format: {found}", f"format: {FORMAT}"))
+    try:
+        steps = tuple(Step(**step) for step in data.get("steps") or ())
+    except TypeError as error:
+        raise StateError(Problem(where, f"a step cannot be read: {error}")) from error
+    state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
+    return Stored(str(data.get("machine")), state, steps)
+
+
+def read_model_file(path: Path, machine: str, links: int) -> ModelFile:
+    """Read a model file for the machine of this name with so many links (0 for an external model).
+
+    Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
+    installed, numbers that are missing.
+    """
+    stored = read_stored(path)
+    if stored.machine != machine:
+        raise StateError(
+            Problem(str(path), "belongs to another machine", stored.machine, machine,
+                    "give this machine's model file, or begin a new one")
+        )  # fmt: skip
+    return _opened(stored, links, str(path))
+
+
+def _opened(stored: Stored, links: int, where: str) -> ModelFile:
+    problems: list[Problem] = []
+    declared: list[Declaration] = []
+    fitted: list[Fitted] = []
+    for number, entry in enumerate(stored.state["effects"], start=1):
+        place = f"{where}, effect {number}"
+        try:
+            fitted.append(_fitted(entry, links, place, problems))
+            declared.append(entry["effect"])
+        except CompdError as error:
+            problems += error.problems
+        except (KeyError, TypeError) as error:
+            problems.append(Problem(place, f"cannot be read: {error!r}", allowed="effect, shape, parameters"))
+    count = sum(len(one.theta) for one in fitted)
+    covariance = np.array(stored.state["covariance"] or np.zeros((0, 0)), dtype=np.float64)
+    if not problems and covariance.shape != (count, count):
+        problems.append(Problem(f"{where}, covariance", "has another size than the parameters",
+                                str(covariance.shape), f"({count}, {count})"))  # fmt: skip
+    if problems:
+        raise StateError(problems)
+    begin = 0
+    for k, one in enumerate(fitted):
+        end = begin + len(one.theta)
+        fitted[k] = replace(one, covariance=covariance[begin:end, begin:end])
+        begin = end
+    return ModelFile(stored.machine, tuple(declared), tuple(fitted), covariance, stored.steps)
+
+
+def write_model_file(path: Path, file: ModelFile, links: int) -> None:
+    """Write a model whole or not at all. Raises StateError where the disk refuses."""
+    write_stored(path, Stored(file.machine, file.state(links), file.steps))
+
+
+def write_stored(path: Path, stored: Stored) -> None:
+    """As `write_model_file`, from plain data."""
+    data = {
+        "format": FORMAT,
+        "machine": stored.machine,
+        **stored.state,
+        "steps": [{**asdict(step), "replaced": dict(step.replaced)} for step in stored.steps],
+    }
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    temporary = ""
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # a temporary file is for its owner alone; the daemon reads this one under another name
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except OSError as error:
+        if temporary:
+            Path(temporary).unlink(missing_ok=True)
+        raise StateError(
+            Problem(str(path), f"cannot be written: {error.strerror}", next_step="choose a place that may be written")
+        ) from error
+
+
+def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Problem]) -> Fitted:
+    effect = find(entry["effect"], where)
+    values = {number["name"]: number["value"] for number in entry["parameters"]}
+    columns = effect.columns(links)
+    names = [column.name for column in columns]
+    if sorted(values) != sorted(names):
+        problems.append(
+            Problem(where, f"has not the parameters of {effect.id}", ", ".join(values), ", ".join(names),
+                    "fit it again with `compd effect fit`")
+        )  # fmt: skip
+        return Fitted(effect, np.zeros(len(columns)))
+    theta = np.array([column.parameter.fitted(float(values[column.name])) for column in columns])
+    shape = {name: float(value) for name, value in (entry.get("shape") or {}).items()}
+    absent = [constant.name for constant in effect.constants if constant.name not in shape]
+    if absent:
+        problems.append(Problem(where, f"has not the shape constants of {effect.id}", allowed=", ".join(absent)))
+    return Fitted(effect, theta, shape)
+
+
+def _numbers(one: Fitted, links: int) -> list[dict[str, Any]]:
+    """Each number as people read it: value, standard error, unit."""
+    found = []
+    for k, column in enumerate(one.effect.columns(links)):
+        std = float(np.sqrt(one.covariance[k, k])) if k < len(one.covariance) else float("nan")
+        value, value_std = column.parameter.shown(float(one.theta[k]), std)
+        found.append({"name": column.name, "value": float(value), "std": float(value_std),
+                      "unit": column.parameter.unit})  # fmt: skip
+    return found
+
+
+def numbers_of(fitted: Sequence[Fitted], links: int) -> list[tuple[str, dict[str, Any]]]:
+    """(effect id, {name, value, std, unit}) of every number."""
+    return [(one.effect.id, number) for one in fitted for number in _numbers(one, links)]
