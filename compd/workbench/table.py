@@ -101,7 +101,7 @@ def _names_are_sound(names: Sequence[str]) -> bool:
 
 def _read_plain(path: Path, content: bytes, names: list[str], lines: list[str]) -> Table | None:
     """The fast way; None when a cell is no number after all, so that the slow way can say which."""
-    values = _plain_numbers(",".join(filter(None, lines)).split(",")) if any(lines) else np.empty(0)
+    values = _numbers(",".join(filter(None, lines)).split(",")) if any(lines) else np.empty(0)
     if values is None:
         return None
     rows = np.array([number for number, line in enumerate(lines, start=2) if line], dtype=np.int64)
@@ -147,6 +147,11 @@ def _plain_numbers(cells: Sequence[str]) -> FloatArray | None:
     # Python's own conversion is exact, but also takes 1_000, nan and inf
     if "".join(cells).encode("utf-8", "replace").translate(None, _PLAIN):
         return None
+    return _numbers(cells)
+
+
+def _numbers(cells: Sequence[str]) -> FloatArray | None:
+    """Cells of nothing but _PLAIN as numbers; None when any is none after all, or not finite."""
     try:
         values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
     except ValueError:
