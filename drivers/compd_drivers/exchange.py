@@ -82,3 +82,30 @@ def nothing_behind(line: ByteLine, options: ExchangeOptions, reply: bytes) -> No
             raise
     else:
         raise LineFault(Quality.MISMATCH, f"bytes behind the reply: {reply!r} + {extra!r}")
+
+
+class MenuSilence:
+    """Tells a device that does not answer while in its menu from one that is lost.
+
+    It had answered on this connection and then twice not: silent. The first time is a timeout like any other, so
+    that the line is drained and rests before the next request. A cable that came off looks the same as the menu.
+    """
+
+    def __init__(self) -> None:
+        self._answered_on: ByteLine | None = None
+        self._timeouts = 0
+
+    def answered(self, line: ByteLine) -> None:
+        """A whole reply has come."""
+        self._answered_on = line
+        self._timeouts = 0
+
+    def named(self, fault: LineFault, line: ByteLine) -> LineFault:
+        """The fault of a poll by its right name. Drains before it gives SILENT. Raises LineFault as draining does."""
+        if fault.quality is not Quality.TIMEOUT or self._answered_on is not line:
+            return fault
+        self._timeouts += 1
+        if self._timeouts == 1:
+            return fault
+        line.drain()
+        return LineFault(Quality.SILENT, f"{fault.detail}: in its menu, or its cable is off")

@@ -12,7 +12,7 @@ Not in the manual: other errors; `ERRn` is read as an error of that feature. No 
 for twice.
 
 While somebody is in its menu the C1202 does not answer. If it had answered on this connection before, that is
-`silent`; if it never had, `timeout`. A cable pulled off at the instrument looks the same as the menu.
+`silent` from the second time on; if it never had, `timeout`. A cable pulled off at the instrument looks the same.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
 from compd_drivers.continuity import Continuity
-from compd_drivers.exchange import WithoutChecksumOptions, receive_line
+from compd_drivers.exchange import MenuSilence, WithoutChecksumOptions, receive_line
 
 CR = b"\r"
 LONGEST_REPLY = 80  # three features of at most 26 characters
@@ -68,7 +68,7 @@ class MahrC1202(Gauge[ByteLine]):
         self._value = re.compile(
             rb"([123]) ([+-]\d{%d}\.\d{%d}) (mm|um|inch)(?: [<=>]){0,2}" % (options.digits, options.decimals)
         )
-        self._answered_on: ByteLine | None = None
+        self._silence = MenuSilence()
         self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
@@ -89,12 +89,8 @@ class MahrC1202(Gauge[ByteLine]):
             reply = receive_line(line, CR, LONGEST_REPLY)
             readings = self._readings(reply, time_s)
         except LineFault as fault:
-            if fault.quality is Quality.TIMEOUT and self._answered_on is line:
-                line.drain()
-                raise LineFault(Quality.SILENT, f"{fault.detail}: in its menu, or its cable is off") from fault
-            self._answered_on = None
-            raise
-        self._answered_on = line
+            raise self._silence.named(fault, line) from None
+        self._silence.answered(line)
         return readings
 
     def _readings(self, reply: bytes, time_s: float) -> list[Reading]:

@@ -42,9 +42,9 @@ Vetek DGT, page 47 (force): an address in the reply is checked by being literal;
 
 A device that speaks unasked has no `out`: its newest whole line counts, never a half one. `echo` is a second request
 whose reply looks different: asked before every `every`-th poll, it finds a device whose replies are one behind.
-Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a first whole reply on a
-connection, no byte at all is `silent` instead of `timeout`. A cable that comes off afterwards looks the same, and
-the detail says so; both are without a value.
+Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a whole reply on a connection,
+the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
+and the detail says so; both are without a value.
 
 Without a checksum in `in` a damaged digit is still a digit: a length that moved faster than `fastest_mm_per_s` is
 asked for a second time. Other quantities are not: set a parity on the line.
@@ -59,7 +59,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.continuity import Continuity
-from compd_drivers.exchange import ExchangeOptions, nothing_behind, receive, receive_line
+from compd_drivers.exchange import ExchangeOptions, MenuSilence, nothing_behind, receive, receive_line
 from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
 from compd_drivers.reply_format import ReplyFormat, unescape
 
@@ -195,8 +195,9 @@ class SerialAscii(Gauge[ByteLine]):
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]
         self._limit = max(form.longest for form in forms) + len(self._description.terminator)
-        self._ready_on: ByteLine | None = None  # the connection on which `init` was said and a reply came
+        self._ready_on: ByteLine | None = None  # the connection on which `init` was said
         self._until_echo = 0
+        self._silence = MenuSilence()
         lengths_only = all(channel.unit == "mm" for channel in self._channels)
         checked = self._description.reply.has_checksum or not lengths_only
         self._continuity = None if checked else Continuity(options.fastest_mm_per_s)
@@ -217,28 +218,29 @@ class SerialAscii(Gauge[ByteLine]):
         return self._ask(line) if self._continuity is None else self._continuity.read(lambda: self._ask(line))
 
     def _ask(self, line: ByteLine) -> Sequence[Reading]:
-        known = self._ready_on is line
         try:
-            if not known:
-                for request, form in self._exchanges[: len(self._said.init)]:
-                    self._exchange(line, request, form)
-                self._until_echo = 0
-            self._check_echo(line)
-            reply, time_s = self._poll(line)
-            values = self._description.reply.match(reply)
-            if values is None:
-                error = self._refused(reply, self._description.reply)
-                self._ready_on = None if error.quality == "device_error" else line
-                return [bad(time_s, Quality(error.quality), _shown(reply, error))] * len(self._channels)
+            readings = self._readings(line)
         except LineFault as fault:
             self._ready_on = None
-            if fault.quality is Quality.TIMEOUT and known and self._said.silent_in_menu:
-                line.drain()
-                self._ready_on = line  # it is still the device that had answered
-                raise LineFault(Quality.SILENT, f"{fault.detail}: in its menu, or its cable is off") from fault
-            raise
+            raise (self._silence.named(fault, line) if self._said.silent_in_menu else fault) from None
+        self._silence.answered(line)
+        return readings
+
+    def _readings(self, line: ByteLine) -> Sequence[Reading]:
+        if self._ready_on is not line:
+            for request, form in self._exchanges[: len(self._said.init)]:
+                self._exchange(line, request, form)
+            self._until_echo = 0
+        self._check_echo(line)
+        reply, time_s = self._poll(line)
         self._ready_on = line
-        return [self._reading(k, values[place], time_s) for k, place in enumerate(self._order)]
+        values = self._description.reply.match(reply)
+        if values is not None:
+            return [self._reading(k, values[place], time_s) for k, place in enumerate(self._order)]
+        error = self._refused(reply, self._description.reply)
+        if error.quality == "device_error":
+            self._ready_on = None
+        return [bad(time_s, Quality(error.quality), _shown(reply, error))] * len(self._channels)
 
     def _poll(self, line: ByteLine) -> tuple[bytes, float]:
         """The reply without its terminator, and the time of asking (s)."""
