@@ -43,7 +43,7 @@ def test_installed_it_is_found_and_passes(tmp_path: Path, monkeypatch: pytest.Mo
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert "my_gauge" in names(GAUGES)
-    result = CliRunner().invoke(driver_cli.app, ["test", "my_gauge"])
+    result = CliRunner().invoke(driver_cli.app, ["test", "my_gauge", "--quick"])
     assert result.exit_code == 0, result.output
     assert "nothing failed" in result.output
     for name in [module for module in sys.modules if module.startswith("my_gauge")]:

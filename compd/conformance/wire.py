@@ -21,7 +21,7 @@ FAST_BAUD = 115200
 CHARACTER_BITS = 10  # 8N1: a pty knows no parity
 TURNAROUND_S = 1e-3
 # Long enough that a busy computer's pauses do not pass for a silent device.
-TIMEOUT_S = 0.15
+TIMEOUT_S = 0.2
 FORMAT = "8N1"
 
 
@@ -66,7 +66,7 @@ class RealWire:
     def close(self) -> None:
         """End the thread and give everything back."""
         self._stopping = True
-        self._follow()
+        os.write(self._wake_write, b"!")
         self._thread.join()
         os.close(self._wake_read)
         os.close(self._wake_write)
@@ -99,8 +99,9 @@ class RealWire:
                     self._hear(self._end, fd)
             if self._wake_read in ready:
                 os.read(self._wake_read, 1)
-                self._set_plug(self._plugged and not self._stopping)
+                self._set_plug(self._plugged)
                 self._followed.set()
+        self._set_plug(False)
 
     def _set_plug(self, plugged: bool) -> None:
         if plugged and self._end is None:
