@@ -11,7 +11,6 @@ from compd.model_file import ModelFile, Stored, numbers_of
 from compd.workbench.compare import Comparison
 from compd.workbench.page import Panel, Table, write_page
 from compd.workbench.report_figures import (
-    NOT_RECORDED,
     against,
     arrows,
     at_links,
@@ -73,7 +72,7 @@ def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile
 def write_ledger(path: Path, model: Stored) -> None:
     """The picture of the falling error, and every step."""
     steps = model.steps
-    labels = ["at the start", *(f"{k}. {step.kind} {step.effect}".strip() for k, step in enumerate(steps, start=1))]
+    labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
     rms = [steps[0].rms_before_um, *(step.rms_after_um for step in steps)]
     floors = [steps[0].noise_floor_um, *(step.noise_floor_um for step in steps)]
     table = Table(LEDGER_HEAD, ledger_rows(model))
@@ -123,7 +122,7 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
     groups["everything else measured"] = [name for name in found if name not in placed]
     vectors, enlarged = arrows(one)
     said = [finding.text for finding in one.findings] or ["nothing that the residual follows was found"]
-    sentences = Table(("", "where it fails"), [[str(k), text] for k, text in enumerate(said, start=1)])
+    sentences = Table(("",), [[text] for text in said])
     panels = [
         Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
         Panel("What each part does", "The error that is left with one part switched off.", switched_off(one)),
@@ -148,7 +147,7 @@ def _excluded(one: Comparison) -> Table:
     if numbers:
         shown = ", ".join(map(str, numbers[:40])) + (f" and {len(numbers) - 40} more" if len(numbers) > 40 else "")
         rows.append([f"beyond all noise: rows {shown}", str(len(numbers))])
-    return Table(("reason", "rows"), rows) if rows else NOT_RECORDED
+    return Table(("reason", "rows"), rows or [["none", "0"]])
 
 
 def _effects(model: ModelFile, one: Comparison) -> Table:

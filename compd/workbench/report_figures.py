@@ -47,7 +47,7 @@ def at_links(comparison: Comparison) -> Figure | Table:
         length_mm = comparison.seen.rows.link_mm[:, i]
         _dots_and_means(figure, (1, i + 1), length_mm, links_um[:, i], rows, f"link {i + 1}", SERIES_COLOURS[i], False)
         figure.update_xaxes(title_text="length, mm", row=1, col=i + 1)
-    return styled(figure, "length, mm", "error of length, um", 320)
+    return styled(figure, "length, mm", "error of length, um", 340).update_layout(margin={"t": 60})
 
 
 def small_multiples(
@@ -61,7 +61,10 @@ def small_multiples(
     lines = -(-len(shown) // COLUMNS)
     across = min(COLUMNS, len(shown))
     figure = make_subplots(lines, across, shared_yaxes=True, subplot_titles=[one.name for one in shown],
-                           vertical_spacing=min(0.5 / lines, 0.3), horizontal_spacing=0.04)  # fmt: skip
+                           vertical_spacing=min(0.45 / lines, 0.3), horizontal_spacing=0.04)  # fmt: skip
+    styled(figure, "", "", 80 + 240 * lines).update_layout(
+        legend={"y": 1 + 45 / (240 * lines), "itemsizing": "constant"}, margin={"t": 70}
+    )
     for k, one in enumerate(shown):
         place = (k // across + 1, k % across + 1)
         for series, name in enumerate(names):
@@ -70,13 +73,12 @@ def small_multiples(
         figure.update_xaxes(title_text=_unit(one), title_standoff=4, row=place[0], col=place[1])
         if place[1] == 1:
             figure.update_yaxes(title_text=label, row=place[0], col=1)
-    styled(figure, _unit(shown[0]), label, 60 + 250 * lines)
-    return figure.update_layout(legend={"y": 1 + 40 / (250 * lines), "itemsizing": "constant"})
+    return figure
 
 
 def _unit(one: Covariate) -> str:
     if one.name.startswith("temperature"):
-        return "degC"
+        return "K" if " - " in one.name else "degC"
     return one.unit if one.unit != "1" else "-1 = shortening, +1 = lengthening"
 
 
@@ -105,12 +107,12 @@ def _dots_and_means(
 
 
 def class_means(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means of x and y in classes of equally many rows; one class per value where there are few values."""
-    values = np.unique(x)
-    if len(values) <= BINS:
-        return values, np.array([y[x == value].mean() for value in values])
-    parts = np.array_split(np.argsort(x, kind="stable"), BINS)
-    return np.array([x[part].mean() for part in parts]), np.array([y[part].mean() for part in parts])
+    """Means of x and y in classes of about equally many rows; equal values are never split."""
+    ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:]))
+    group = np.searchsorted(ends, x)
+    count = np.bincount(group)
+    filled = count > 0
+    return np.bincount(group, x)[filled] / count[filled], np.bincount(group, y)[filled] / count[filled]
 
 
 def arrows(comparison: Comparison) -> tuple[Figure | Table, float]:
@@ -138,12 +140,13 @@ def arrows(comparison: Comparison) -> tuple[Figure | Table, float]:
                                line={"width": 4, "color": np.repeat(size_um, 3), "colorscale": "Viridis"},
                                hoverinfo="skip"))  # fmt: skip
     figure.add_trace(Scatter3d(x=end[:, 0], y=end[:, 1], z=end[:, 2], mode="markers", showlegend=False, text=hover,
-                               hoverinfo="text", marker={"size": 3, "color": size_um, "colorscale": "Viridis",
-                                                         "colorbar": {"title": "um", "thickness": 14}}))  # fmt: skip
+                               hoverinfo="text",
+                               marker={"size": 3, "color": size_um, "colorscale": "Viridis",
+                                       "colorbar": {"title": "um", "thickness": 14, "len": 0.8}}))  # fmt: skip
     styled(figure, "", "", 600)
     figure.update_layout(
         scene={**{f"{axis}axis_title": f"{axis}, mm" for axis in "xyz"}, "aspectmode": "data",
-               "camera": {"eye": {"x": 1.1, "y": -1.3, "z": 0.8}}},
+               "camera": {"eye": {"x": 1.3, "y": -1.6, "z": 0.9}}},
         margin={"l": 0, "r": 0, "t": 10, "b": 0},
     )  # fmt: skip
     return figure, enlarged
@@ -152,7 +155,7 @@ def arrows(comparison: Comparison) -> tuple[Figure | Table, float]:
 def histogram(comparison: Comparison) -> Figure:
     """Each coordinate's residual, and what noise alone would make."""
     labels = comparison.seen.labels
-    figure = make_subplots(1, len(labels), subplot_titles=list(labels), shared_yaxes=True)
+    figure = make_subplots(1, len(labels), subplot_titles=list(labels))
     for k, label in enumerate(labels, start=1):
         values = comparison.residual_um[comparison.used, k - 1]
         sigma = float(comparison.floor.by_axis_um[k - 1])
@@ -169,9 +172,8 @@ def histogram(comparison: Comparison) -> Figure:
         figure.add_trace(Scatter(x=grid, y=noise, mode="lines", line={"color": COLOURS["worst"], "width": 2},
                                  name="noise alone", showlegend=k == 1), row=1, col=k)  # fmt: skip
         figure.update_xaxes(title_text=f"residual of {label}, um", row=1, col=k)
-    styled(figure, f"residual of {labels[0]}, um", "rows", 320)
-    figure.update_yaxes(range=[0, None], row=1, col=1)
-    return figure
+    styled(figure, f"residual of {labels[0]}, um", "rows", 350)
+    return figure.update_layout(margin={"t": 70}, legend={"y": 1.12})
 
 
 def workspace(comparison: Comparison) -> Figure | Table:
@@ -199,7 +201,7 @@ def workspace(comparison: Comparison) -> Figure | Table:
                                  hovertemplate="%{z:.2f} um rms<extra></extra>"), row=1, col=k)  # fmt: skip
         figure.update_xaxes(title_text=f"{'xyz'[a]}, mm", row=1, col=k)
         figure.update_yaxes(title_text=f"{'xyz'[b]}, mm", title_standoff=2, row=1, col=k)
-    return styled(figure, "x, mm", "y, mm", 360).update_layout(margin={"r": 80})
+    return styled(figure, "x, mm", "y, mm", 390).update_layout(margin={"r": 80, "t": 60})
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
@@ -226,10 +228,13 @@ def switched_off(comparison: Comparison) -> Figure | Table:
 def falling(labels: Sequence[str], rms_um: Sequence[float], floors_um: Sequence[float]) -> Figure:
     """The error after each step of a model, and the noise floor that it cannot fall below."""
     figure = Figure()
+    figure.add_trace(Scatter(x=list(labels), y=list(floors_um), mode="lines", name="noise floor",
+                             line={"color": COLOURS["worst"], "dash": "dash"}))  # fmt: skip
     figure.add_trace(Scatter(x=list(labels), y=list(rms_um), mode="lines+markers+text", name="residual",
                              text=[f"{value:.3g}" for value in rms_um], textposition="top center",
                              line={"color": COLOURS["plain"], "width": 3}, marker={"size": 9}))  # fmt: skip
-    figure.add_trace(Scatter(x=list(labels), y=list(floors_um), mode="lines", name="noise floor",
-                             line={"color": COLOURS["worst"], "dash": "dash"}))  # fmt: skip
     styled(figure, "", "residual, um rms per coordinate", 420)
-    return figure.update_yaxes(type="log")
+    ends = np.log10([0.7 * min(*rms_um, *floors_um), 1.6 * max(*rms_um, *floors_um)])
+    return figure.update_yaxes(type="log", dtick="D2", tickformat=".3~g", range=ends.tolist()).update_layout(
+        margin={"b": 90}, xaxis={"tickangle": 0}
+    )

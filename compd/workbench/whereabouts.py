@@ -98,6 +98,11 @@ def covariates(seen: Observed) -> list[Covariate]:
     for name, column in recording.quantities.items():
         unit = unit_of(name)
         found.append(Covariate(name.removesuffix(f"_{unit}"), _shown(unit), column, _link_of(name)))
+    for top in [name for name in recording.quantities if name.endswith("_top_degC")]:
+        bottom = top.replace("_top_", "_bottom_")
+        if bottom in recording.quantities:
+            name = f"{top.removesuffix('_degC')} - {bottom.removesuffix('_degC')}"
+            found.append(Covariate(name, "K", recording.quantities[top] - recording.quantities[bottom]))
     for i, length in enumerate(seen.rows.link_mm.T, start=1):
         found.append(Covariate(f"length of link {i}", "mm", length, i))
     if recording.approach is not None:
@@ -116,7 +121,7 @@ def whereabouts(
     """
     coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(seen.labels)]
     if links_um is not None:
-        # the floor of a link is the floor at the tip, seen through the same Jacobian; the quiet half of it serves
+        # noise at the tip, seen through the same Jacobian as the residual, is as much smaller at the links
         share = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(
             float(np.sqrt(np.mean(residual_um[used] ** 2))), 1e-12
         )
@@ -132,7 +137,18 @@ def whereabouts(
         candidates = [one for one in all_covariates if not own or one.link in (0, own)]
         found += _follow(label, values, used, candidates, group, looks, _largest(seen, values, used))
     found.sort(key=lambda pair: -pair[0])
-    return tuple(finding for _, finding in found)
+    return _clearest([finding for _, finding in found])
+
+
+def _clearest(found: list[Finding]) -> tuple[Finding, ...]:
+    """A link is named only for what it shows more clearly than the tip does."""
+    at_tip: dict[str | None, float] = {}
+    for one in found:
+        if not one.coordinate.startswith("link"):
+            at_tip[one.covariate] = max(one.explained, at_tip.get(one.covariate, 0.0))
+    return tuple(
+        one for one in found if not one.coordinate.startswith("link") or one.explained > at_tip.get(one.covariate, 0.0)
+    )
 
 
 def _follow(
