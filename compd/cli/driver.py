@@ -19,8 +19,8 @@ def _drivers() -> None:
     """Gauge drivers."""
 
 
-@app.command()
-def test(
+@app.command("test")
+def try_on_wires(
     name: Annotated[
         str | None, typer.Argument(help="Entry point, or /absolute/file.py:ClassName; all installed if left out.")
     ] = None,
