@@ -18,7 +18,8 @@ Everything is literal but a backslash and a percent sign:
 
 Give width and decimals wherever the manual shows them: a digit lost on the wire is then found.
 A width counts characters, blanks and sign included; leading zeros may come as blanks. Flag + : the sign is always
-there; flag blank: a sign or a blank is always there. What is skipped never takes a digit of a number beside it.
+there; flag blank: a sign or a blank is always there. What is skipped never takes the sign or a digit of a
+number beside it.
 Sources: StreamDevice (format converters, checksums), C printf.
 """
 
@@ -94,7 +95,7 @@ class ReplyFormat:
         self._instead = instead or {}
         self._numbers: list[_Number] = []
         self._checks: list[_Check] = []
-        self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before, where its end is open
+        self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before
         self.length: int | None = 0
         self.longest = 0
         self.literal = b""  # all that is literal, for counting terminators
@@ -192,7 +193,7 @@ class ReplyFormat:
             self._before = "skipped"
             return f"{whole}{characters}*" if width is None else f"{whole}{characters}{{0,{width}}}"
         self._longer(width)
-        self._before = "skipped" if width is None else "fixed"
+        self._before = "skipped"
         return f"{whole}{characters}+" if width is None else f"{whole}{characters}{{{width}}}"
 
     def _number(self, match: re.Match[str]) -> str:
@@ -220,8 +221,8 @@ class ReplyFormat:
         lengths = {len(word) for word in self._instead.get(name, ())} | {width}
         self._longer(width if len(lengths) == 1 else None)
         exact = body if width is None else f"{_CHARACTERS[kind]}{{{width}}}"
-        # nor may it take digits of this one; and a number of open width ends with its last digit
-        begins = r"(?<![0-9.+\-])" if self._before == "skipped" else ""
+        # nor may it take the sign or a digit of this one; and a number of open width ends with its last digit
+        begins = r"(?:(?<![0-9.+\-])|(?<![.+\-])(?=[+\- ]))" if self._before == "skipped" else ""
         ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if kind == "x" else r"(?![0-9.])"
         self._before = "number"
         return f"{begins}(?P<{group}>{'|'.join([*words, exact])}){ends}"

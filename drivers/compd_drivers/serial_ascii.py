@@ -1,47 +1,46 @@
 r"""Generic ASCII gauge: a description in the configuration, in the manner of StreamDevice's protocol files.
 
 `out` is what is sent, `in` what the reply must look like (converters: `compd_drivers.reply_format`). Three examples
-from manuals' pages:
+from manuals' pages (M, read in manuals):
 
-Magnescale MG80-SC1, page 39: header of two bytes and a space-separated value per channel, "Error" for an alarm
-    mg:
+Magnescale MG80-SC1, page 39: module, counter, mode N, unit M, judgement, 8 characters; "Error" for an alarm
+    magnescale:
       driver: serial_ascii
-      line: mg
+      line: comparators
       out: "R"
       out_terminator: "\r\n"
-      in: "00%(a)+08.4f 01%(b)+08.4f"
+      in: "00NM%*[UGLE]%(a)+08.4f 01NM%*[UGLE]%(b)+08.4f"
       in_terminator: "\r\n"
       channels:
-        - {name: a, unit: mm, instead: {"  Error ": sensor_fault}}
-        - {name: b, unit: mm, instead: {"  Error ": sensor_fault}}
+        - {name: a, unit: mm, instead: {"   Error": sensor_fault}}
+        - {name: b, unit: mm, instead: {"   Error": sensor_fault}}
 
 Sylvac OPTO-RS, page 12: sign, digits, point, digits, CR; ERR0 sensor, ERR1 command, ERR2 parity, ERR3 range
     sylvac:
       driver: serial_ascii
-      line: sylvac
+      line: dial
       out: "?"
       out_terminator: "\r"
       in: "% .3f"
       in_terminator: "\r"
-      channels: [{name: value, unit: mm, range: [-12.5, 12.5]}]
+      channels: [{name: position, unit: mm, range: [-12.5, 12.5]}]
       errors:
         - {in: "ERR0", quality: sensor_fault}
         - {in: "ERR3", quality: over_range}
-        - {in: "ERR%*c", quality: device_error}
+        - {in: "ERR%*1[12]", quality: device_error}
 
-Vetek DGT, page 47 (force): an address in the reply is checked by being literal; ERRnn
+Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak in a peak mode; HELP: overloaded
     force:
       driver: serial_ascii
       line: force
-      out: "00READ"
-      out_terminator: "\r\n"
-      in: "00ST,GS,%10.1f,kg"
+      in: "% 7.2f LB "
       in_terminator: "\r\n"
-      channels: [{name: weight, unit: N, scale: 9.80665}]
-      errors: [{in: "00OL,%*s", quality: over_range}, {in: "ERR%*2c", quality: device_error}]
+      channels: [{name: force, unit: N, scale: 4.4482216152605}]
+      errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
-A device that speaks unasked has no `out`: its newest whole line counts, never a half one. `echo` is a second request
-whose reply looks different: asked before every `every`-th poll, it finds a device whose replies are one behind.
+A device that speaks unasked, as the last, has no `out`: its newest whole line counts, never a half one, and its time is
+that at which waiting for it began. `echo` is a second request whose reply looks different: asked before every
+`every`-th poll, it finds a device whose replies are one behind.
 Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a whole reply on a connection,
 the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
 and the detail says so; both are without a value.
