@@ -51,6 +51,7 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.bench_cycle
 	$(BIN)/python -m tests.benchmarks.bench_loop
 	$(BIN)/python -m tests.benchmarks.bench_latency
+	$(BIN)/python -m tests.benchmarks.bench_throughput
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

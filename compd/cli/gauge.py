@@ -41,7 +41,7 @@ def list_gauges() -> None:
         table.add_row(name, driver.line_kind, said, ", ".join(key.rstrip("_") for key in needs if key not in
                       ("driver", "line")), "yes" if name in simulated else "no")  # fmt: skip
     Console().print(table)
-    typer.echo("An unknown gauge: `compd gauge learn`. One more driver: docs/add-a-gauge.md.")
+    typer.echo("An unknown gauge: `compd gauge learn`. README.md, \"Add a gauge\", says the rest.")
 
 
 @app.command()

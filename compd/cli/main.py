@@ -48,7 +48,7 @@ def _options(
 
 for command in (demo, check, simulate, run, watch, zero, record, replay, join, compare, ledger):
     app.command()(command)
-for command in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
-    effect.command()(command)
+for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
+    effect.command()(change)
 for name, group in (("gauge", gauge), ("driver", driver), ("effect", effect), ("recording", recording)):
     app.add_typer(group, name=name)

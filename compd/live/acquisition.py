@@ -18,6 +18,7 @@ from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.live.polled_gauge import BackOff, PolledGauge
+from compd.live.realtime import sharpen_timers
 from compd.readings import Latest
 
 log = structlog.get_logger()
@@ -95,6 +96,7 @@ class LineThread:
         return found
 
     def _run(self) -> None:
+        sharpen_timers()
         while not self._stop.is_set():
             try:
                 self._line = self._opener(self._settings, self._clock)
