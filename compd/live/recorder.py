@@ -134,9 +134,7 @@ class Recorder:
 
     def _run(self) -> None:
         try:
-            while not self._clock.wait(self._stop, _WRITE_EVERY_S):
-                self.write()
-            self.write()
+            self._write_until_stopped()
         except CompdError as failure:
             self._failure = failure
         except OSError as error:
@@ -144,6 +142,12 @@ class Recorder:
                 Problem(str(self._name.parent), f"cannot be written to: {error.strerror}",
                         next_step="what was written before is whole; make room, and record under another name")
             )  # fmt: skip
+
+    def _write_until_stopped(self) -> None:
+        try:
+            while not self._clock.wait(self._stop, _WRITE_EVERY_S):
+                self.write()
+            self.write()
         finally:
             if self._parts:
                 self._parts[-1].close()
@@ -194,7 +198,6 @@ class Recorder:
     def _at_limit(self) -> None:
         limit = f"{self._keeping.limit_bytes / 1e6:g} MB"
         if not self._keeping.drop_oldest:
-            self._parts[-1].sync()
             raise RecordingError(
                 Problem(str(self._name), "the recording has reached its limit on disk and ends here", limit,
                         next_step="give a larger limit, or let the oldest part be dropped")

@@ -1,0 +1,188 @@
+"""A recorded run replayed gives the setpoints that were sent, bit for bit; and a difference is seen."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace as changed
+
+import pytest
+
+from compd.cli.replay import replay as replay_command
+from compd.errors import Problem, RecordingError, StateError
+from compd.live.loop import Orders
+from compd.live.replay import Transcripts, replay
+from compd.live.setpoint import State
+from compd.live.transcript import parse_readings
+from tests.live_machine import CONFIG, machine
+from tests.recorded_run import Run
+
+CYCLES = 400
+
+
+def record(run, name, cycles, every=1):
+    """Record every `every`-th of some eventful cycles; the setpoints that were sent."""
+    sent = []
+    with run.recorder(name) as recorder:
+        for number, (line, message, setpoint) in enumerate(run.eventful(cycles)):
+            if number % every == 0:
+                recorder.put(line, message)
+                sent.append(setpoint)
+    return sent
+
+
+@pytest.mark.parametrize("on_limit", ["clamp", "refuse"])
+@pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
+    run = Run(machine(name, on_stale=on_stale, on_limit=on_limit), seed=11)
+    sent = record(run, tmp_path / "run", CYCLES)
+    replayed = list(replay(run.machine.configuration, Transcripts(tmp_path / "run")))
+    assert [cycle.sent for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    lost = {"hold": State.HOLD, "fade": State.FADE, "stop": State.STOP}[on_stale]
+    beyond = {"clamp": State.CLAMPED, "refuse": State.REFUSED}[on_limit]
+    assert {State.OK, State.SLEWING, lost, beyond} <= {setpoint.state for setpoint in sent}
+    assert {"cmm", "machine_tool"} == {setpoint.mode for setpoint in sent}
+
+
+def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):
+    run = Run(machine(), seed=5)
+    sent = record(run, tmp_path / "run", CYCLES, every=20)
+    replayed = list(replay(run.machine.configuration, Transcripts(tmp_path / "run")))
+    assert len(replayed) == CYCLES / 20
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+
+
+def test_a_cycle_without_zero_reads_back_as_it_was():
+    run = Run(machine())
+    run.machine.orders.zero = StateError(Problem("here", "machine zero has never been taken", next_step="take it"))
+    _, message, setpoint = run.recorded(run.machine.step())
+    assert setpoint.state is State.NO_ZERO
+    recorded = parse_readings(message, run.machine.latest.channels)
+    assert recorded.setpoint_line == setpoint.to_json()
+    assert recorded.inputs.snapshot == setpoint.inputs.snapshot
+    again = run.machine.cycle.run(recorded.tick, recorded.inputs.snapshot, Orders(recorded.inputs.zero))
+    assert again.to_json() == setpoint.to_json()
+
+
+def altered(path, number, change):
+    """The file with `change` applied to the message in line `number`, counted from 0."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    message = json.loads(lines[number])
+    change(message)
+    lines[number] = json.dumps(message, separators=(",", ":")).encode() + b"\n"
+    path.write_bytes(b"".join(lines))
+
+
+def change_reading(message):
+    message["readings"]["scale_1.position"]["value"] += 1e-6
+
+
+def change_carried(message):
+    message["carried"]["correction_mm"][1] += 1.0
+
+
+def change_setpoint(message):
+    message["setpoint"]["tip_M_mm"][2] += 1e-7
+
+
+def change_time(message):
+    message["time_s"] += 1e-5
+
+
+@pytest.mark.parametrize("change", [change_reading, change_carried, change_setpoint, change_time])
+def test_one_changed_number_is_found_and_its_place_is_told(tmp_path, capsys, change):
+    run = Run(machine())
+    configuration = changed(run.machine.configuration, path=CONFIG / "tripod-cmm.yaml")
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(30):
+            recorder.put(line, message)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    altered(path, 21, change)  # two lines of opening, so the 20th cycle
+    found = [cycle for cycle in replay(configuration, Transcripts(path)) if cycle.differs]
+    assert [(cycle.tick, cycle.where) for cycle in found] == [(20, f"{path}:22")]
+
+
+def shipped_run(tmp_path, cycles=30):
+    """A recording of the shipped tripod, so that the command can load its configuration."""
+    from compd.configuration import load
+    from tests.live_machine import Machine
+
+    run = Run(Machine(load(CONFIG / "tripod-cmm.yaml")))
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(cycles):
+            recorder.put(line, message)
+    return run
+
+
+def test_the_command_says_that_nothing_differs_and_prints_setpoints(tmp_path, capsys):
+    shipped_run(tmp_path)
+    replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=True)
+    out, err = capsys.readouterr()
+    assert err == "30 cycles replayed; every setpoint is the one that was sent\n"
+    assert [json.loads(line)["class"] for line in out.splitlines()] == ["SETPOINT"] * 30
+
+
+def test_the_command_fails_and_shows_the_first_difference(tmp_path, capsys):
+    import typer
+
+    shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    altered(path, 11, change_setpoint)
+    altered(path, 15, change_setpoint)
+    with pytest.raises(typer.Exit) as ended:
+        replay_command(tmp_path / "run-0001.csv", CONFIG / "tripod-cmm.yaml", setpoints=False)
+    assert ended.value.exit_code == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"2 of 30 setpoints differ; the first is tick 10, {path}:12" in err
+    assert err.count('"class":"SETPOINT"') == 2
+
+
+def test_another_configuration_is_told_and_may_give_other_setpoints(tmp_path, capsys):
+    shipped_run(tmp_path)
+    text = (CONFIG / "tripod-cmm.yaml").read_text()
+    assert "valid_for_s: 0.1" in text
+    other = tmp_path / "other.yaml"
+    other.write_text(text.replace("valid_for_s: 0.1", "valid_for_s: 0.2"))
+    import typer
+
+    with pytest.raises(typer.Exit):
+        replay_command(tmp_path / "run", other, setpoints=False)
+    err = capsys.readouterr().err
+    assert "recorded with another configuration" in err
+    assert "30 of 30 setpoints differ" in err
+
+
+def test_a_line_torn_by_a_kill_is_left_out_and_counted(tmp_path, capsys):
+    shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    path.write_bytes(path.read_bytes()[:-100])
+    replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=False)
+    err = capsys.readouterr().err
+    assert "1 torn line" in err
+    assert "29 cycles replayed" in err
+
+
+@pytest.mark.parametrize("damage", [b"{\n", b"[1]\n", b'{"class":"READINGS"}\n',
+                                    b'{"class":"READINGS","readings":{}}\n'])  # fmt: skip
+def test_a_damaged_line_is_named(tmp_path, damage):
+    run = shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[7] = damage
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(RecordingError, match=r"run-0001\.cycles\.jsonl:8"):
+        list(replay(run.machine.configuration, Transcripts(path)))
+
+
+def test_a_recording_of_another_machine_is_refused(tmp_path):
+    shipped_run(tmp_path)
+    hexapod = machine("hexapod.yaml")
+    with pytest.raises(RecordingError, match="has no reading of"):
+        list(replay(hexapod.configuration, Transcripts(tmp_path / "run")))
+
+
+def test_what_is_not_there_is_told_with_what_would_be_right(tmp_path):
+    with pytest.raises(RecordingError, match="a recording by `compd record`"):
+        Transcripts(tmp_path / "nothing")
