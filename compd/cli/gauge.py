@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from compd.cli.gauge_target import Target
     from compd.gauge import Reading
 
-app = typer.Typer(no_args_is_help=True, help="Gauges: list, find, read, watch, learn.")
+app = typer.Typer(no_args_is_help=True, help="Gauges: list, show, find, read, watch, learn.")
 
 TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
 NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
@@ -41,7 +41,27 @@ def list_gauges() -> None:
         table.add_row(name, driver.line_kind, said, ", ".join(key.rstrip("_") for key in needs if key not in
                       ("driver", "line")), "yes" if name in simulated else "no")  # fmt: skip
     Console().print(table)
-    typer.echo("An unknown gauge: `compd gauge learn`. README.md, \"Add a gauge\", says the rest.")
+    typer.echo('An unknown gauge: `compd gauge learn`. README.md, "Add a gauge", says the rest.')
+
+
+@app.command()
+def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge list`.")]) -> None:
+    """Show a driver: what it speaks, where that was read, an example, and every option."""
+    import inspect
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.plugins import GAUGES, load
+
+    driver = load(GAUGES, name, name)
+    console = Console()
+    console.print(inspect.getdoc(inspect.getmodule(driver)) or inspect.getdoc(driver) or "", markup=False)
+    table = Table("option", "needed", "meaning", title="Options", title_justify="left")
+    for key, field in driver.Options.model_fields.items():
+        default = "yes" if field.is_required() else f"no: {field.get_default(call_default_factory=True)!r}"
+        table.add_row(field.alias or key, default, field.description or "")
+    console.print(table)
 
 
 @app.command()
