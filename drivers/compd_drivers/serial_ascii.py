@@ -52,113 +52,13 @@ asked for a second time. Other quantities are not: set a parity on the line.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Self
-
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from typing import Any, ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd_drivers.ascii_description import Description, ErrorReply, SerialAsciiOptions
 from compd_drivers.continuity import Continuity
-from compd_drivers.exchange import ExchangeOptions, MenuSilence, nothing_behind, receive, receive_line
-from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+from compd_drivers.exchange import MenuSilence, nothing_behind, receive, receive_line
 from compd_drivers.reply_format import ReplyFormat, unescape
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class AsciiChannel(MeasuredChannel):
-    """One number in the reply."""
-
-    decimals: int = Field(default=0, ge=0, le=12, description="of a whole number (%d): 12345 with 4 is 1.2345")
-    instead: dict[str, SaidQuality] = Field(
-        default={}, description='what may stand in the number\'s place, and what it means: {"ERR6": device_error}'
-    )
-
-
-class ErrorReply(_Section):
-    """A reply that stands for the whole poll."""
-
-    in_: str = Field(alias="in", description="what it looks like")
-    quality: SaidQuality = Field(description="what it means")
-    says: str = Field(default="", description="in words, for the status")
-
-
-class Exchange(_Section):
-    """One request and its reply, without a value in it."""
-
-    out: str = Field(min_length=1)
-    in_: str = Field(alias="in")
-
-
-class Echo(Exchange):
-    """A request whose reply cannot be mistaken for a measurement."""
-
-    every: int = Field(default=1, ge=1, description="before every so many polls; 1 finds every reply that is behind")
-
-
-class SerialAsciiOptions(ExchangeOptions):
-    """Options of a described ASCII gauge."""
-
-    out: str = Field(default="", description="the request; left out: the device speaks unasked")
-    out_terminator: str = Field(default="", description="what ends every request")
-    in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
-    in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
-    channels: tuple[AsciiChannel, ...] = Field(min_length=1)
-    errors: tuple[ErrorReply, ...] = Field(default=(), description="the first that fits counts")
-    init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
-    echo: Echo | None = Field(default=None, description="finds a reply that is one behind")
-    silent_in_menu: bool = Field(default=False, description="the device does not answer while in its menu")
-
-    @model_validator(mode="after")
-    def _whole(self) -> Self:
-        names = [channel.name for channel in self.channels]
-        if doubled := twice(names):
-            raise ValueError(f"channel named twice: {doubled}")
-        description = Description.of(self)
-        numbers = description.reply.channels
-        if numbers != ("",) or len(names) > 1:
-            if missing := [name for name in names if name not in numbers]:
-                raise ValueError(f"`in` has no %({missing[0]})f")
-            if unknown := [number for number in numbers if number not in names]:
-                raise ValueError(f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}")
-        if not self.in_terminator and None in description.lengths:
-            raise ValueError("without `in_terminator` every reply must have a fixed length: give every width")
-        if not self.in_terminator and len(set(description.lengths)) > 1:
-            raise ValueError("without `in_terminator` all replies, errors too, must have the same length")
-        if not self.out and (self.init or self.echo or self.silent_in_menu):
-            raise ValueError("a device that speaks unasked has no init, echo or silent_in_menu")
-        if not self.out and not self.in_terminator:
-            raise ValueError("a device that speaks unasked needs an `in_terminator`")
-        return self
-
-
-class Description(NamedTuple):
-    """The options' texts, ready for use."""
-
-    reply: ReplyFormat
-    errors: tuple[tuple[ReplyFormat, ErrorReply], ...]
-    request: bytes
-    terminator: bytes
-
-    @classmethod
-    def of(cls, options: SerialAsciiOptions) -> Self:
-        """ValueError for a text that cannot be read."""
-        single = len(options.channels) == 1
-        instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
-        if single:
-            instead[""] = instead[options.channels[0].name]
-        return cls(
-            ReplyFormat(options.in_, instead),
-            tuple((ReplyFormat(error.in_), error) for error in options.errors),
-            unescape(options.out) + unescape(options.out_terminator),
-            unescape(options.in_terminator),
-        )
-
-    @property
-    def lengths(self) -> tuple[int | None, ...]:
-        """Of every reply the device may give."""
-        return (self.reply.length, *(form.length for form, _ in self.errors))
 
 
 class SerialAscii(Gauge[ByteLine]):

@@ -16,8 +16,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from compd_drivers.ascii_description import SerialAsciiOptions
 from compd_drivers.exchange import WithoutChecksumOptions
-from compd_drivers.serial_ascii import SerialAscii, SerialAsciiOptions
+from compd_drivers.serial_ascii import SerialAscii
 
 
 class SylvacOptoRsOptions(WithoutChecksumOptions):

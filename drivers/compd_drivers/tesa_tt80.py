@@ -21,8 +21,9 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from compd_drivers.ascii_description import SerialAsciiOptions
 from compd_drivers.exchange import WithoutChecksumOptions
-from compd_drivers.serial_ascii import SerialAscii, SerialAsciiOptions
+from compd_drivers.serial_ascii import SerialAscii
 
 # page 94; the inch form has no digit before the point, the mil form one or two
 FORMS = {
