@@ -80,7 +80,7 @@ class ModelFile:
                 "shape": {name: float(value) for name, value in one.shape.items()},
                 "parameters": _numbers(one, links),
             }
-            for declared, one in zip(self.declared, self.fitted, strict=True)
+            for declared, one in zip(self.declared, _each_its_own(self.fitted, self.covariance), strict=True)
         ]
         return {"effects": effects, "covariance": self.covariance.tolist()}
 
@@ -145,12 +145,7 @@ def _opened(stored: Stored, links: int, where: str) -> ModelFile:
                                 str(covariance.shape), f"({count}, {count})"))  # fmt: skip
     if problems:
         raise StateError(problems)
-    begin = 0
-    for k, one in enumerate(fitted):
-        end = begin + len(one.theta)
-        fitted[k] = replace(one, covariance=covariance[begin:end, begin:end])
-        begin = end
-    return ModelFile(stored.machine, tuple(declared), tuple(fitted), covariance, stored.steps)
+    return ModelFile(stored.machine, tuple(declared), _each_its_own(fitted, covariance), covariance, stored.steps)
 
 
 def write_model_file(path: Path, file: ModelFile, links: int) -> None:
@@ -183,6 +178,14 @@ def write_stored(path: Path, stored: Stored) -> None:
         raise StateError(
             Problem(str(path), f"cannot be written: {error.strerror}", next_step="choose a place that may be written")
         ) from error
+
+
+def _each_its_own(fitted: Sequence[Fitted], covariance: Floats) -> tuple[Fitted, ...]:
+    """The effects, each with its block of the joint covariance."""
+    ends = np.cumsum([0, *(len(one.theta) for one in fitted)])
+    return tuple(
+        replace(one, covariance=covariance[a:b, a:b]) for one, a, b in zip(fitted, ends[:-1], ends[1:], strict=True)
+    )
 
 
 def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Problem]) -> Fitted:

@@ -183,13 +183,14 @@ def _covariance(
     seen: Observed, G_um: FloatArray, residual_um: FloatArray, used: BoolArray, sigma_um: FloatArray
 ) -> tuple[FloatArray, int]:
     """(P, P) of all fitted numbers, the frame's last; and the number of blocks."""
-    A = (G_um[used] / sigma_um[:, None]).reshape(-1, G_um.shape[2])
-    scaled = residual_um[used] / sigma_um
     group = blocks_of(seen.recording)[used]
-    count, numbers = A.shape
     clusters = len(np.unique(group))
+    numbers = G_um.shape[2]
     if not numbers:
         return np.zeros((0, 0)), clusters
+    A = (G_um[used] / sigma_um[:, None]).reshape(-1, numbers)
+    scaled = residual_um[used] / sigma_um
+    count = len(A)
     size = np.linalg.norm(A, axis=0)
     acts = size > 0
     size[~acts] = 1.0
