@@ -1,12 +1,11 @@
 """Advantech ADAM-4017+, ADAM-4117: eight analogue inputs on Modbus RTU.
 
-Source: public code of Modbus clients (C, read in public code); the register numbers also in Advantech's Modbus
-mapping table of the ADAM-4000 series (M): 9600 baud 8N1 as delivered; inputs at 40001 to 40008, read by function 3
-(not 4), address 0 to 7. The value is raw / 65535 x (highest - lowest) + lowest of the input's range; FFFF stands for
-an open or switched-off input, and would be full scale: it is never a value here. 0000, the lower end, is taken as
-below the range: a lower current or voltage reads the same.
-Not sure: the type code of each input is at 40201 to 40208; it is not compared with `range`, so that a range that is
-set differently in the module goes unseen. Compare both once with a meter.
+Source: public code of Modbus clients (C, read in public code): 9600 baud 8N1 as delivered; inputs at 40001 to 40008,
+read by function 3 (not 4), address 0 to 7. The value is raw / 65535 x (highest - lowest) + lowest of the input's range;
+FFFF stands for an open or switched-off input, and would be full scale: it is never a value here. 0000, the lower end,
+is taken as below the range: a lower current or voltage reads the same.
+Not sure: where the module keeps each input's range; it is not compared with `range`, so that one that is set
+differently in the module goes unseen. Compare both once with a meter.
 """
 
 from __future__ import annotations

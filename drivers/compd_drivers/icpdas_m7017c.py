@@ -1,13 +1,13 @@
 """ICP DAS M-7017C: eight analogue inputs on Modbus RTU.
 
-Source: I-7017(F)C, M-7017C quick start guide, Modbus table (M, read in a manual): 1200 to 115200 baud, 8N1 and
-others; input values at 30001 to 30008 (function 4, address 0 to 7); coil 00269 (also bit of the data format)
-0 = hexadecimal, 1 = engineering. Over and under range of the 4-20 and 0-20 mA ranges are discrete inputs 10129 to
-10136, which a register line does not read: both ends of the scale are taken as beyond it instead, in every range.
-Hexadecimal data, from the module family's type codes (C, read in public code): two's complement, 7FFF = +full scale
-and 8000 = -full scale, for the ranges with both signs; 0000 to FFFF for 0-20 mA and 4-20 mA. One count is
-full scale / 32768; a module that divides by 32767 reads 31 ppm less, below its accuracy of 0.1 %.
-Engineering data is refused: its steps are not in that manual, and a wrong one would look like a measurement.
+Source: I-7017(F)C, M-7017C quick start guide, Modbus table (M, read in a manual): 1200 to 115200 baud; input values at
+30001 to 30008 (function 4, address 0 to 7); a setting makes them hexadecimal or engineering data. Over and under range
+of the 4-20 and 0-20 mA ranges are discrete inputs from 10129 on, which a line of registers does not read: both ends of
+the scale are taken as beyond it instead, in every range.
+Plausible only (P): the scale of hexadecimal data is not in that guide. It is taken as in the like-built ADLINK ND-6017
+(manual, pages 96 and 97: 7FFF = +full scale, 8000 = -full scale, one count = full scale / 32768) for the ranges with
+both signs, and 0000 to FFFF for 0-20 mA and 4-20 mA. Compare once with a meter.
+Engineering data is refused: its steps are not in the guide, and a wrong one would look like a measurement.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ master 1.
 
 The first float is the sensor's signal in V, the second the value scaled as the controller was set up; a scaled 0
 says that it was not set up, and is never a measurement here. What unit it was scaled to is not on the wire.
-Controllers of several channels (MSC7602) answer with one of them per address, as far as the manuals show.
+Controllers of several channels (MSC7602) answer with one of them per address, as far as the manuals show (P).
 """
 
 from __future__ import annotations

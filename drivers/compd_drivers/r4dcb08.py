@@ -1,9 +1,8 @@
 """R4DCB08: eight DS18B20 thermometers on Modbus RTU.
 
 Source: public code of Modbus clients (C, read in public code; chmelat/r4dcb08 on GitHub among them): 9600 baud 8N1,
-function 3, address 0 to 7, int16 in 0.1 degC; 0x8000 = no sensor. DS18B20 datasheet (M): -55 to +125 degC, and
-+85.0 degC is what a sensor holds after power-on, before its first conversion. 85.0 is therefore never a value here.
-The sensor's own step is 0.0625 degC and its accuracy 0.5 degC; the module rounds to 0.1.
+function 3, address 0 to 7, int16 in 0.1 degC; 0x8000 = no sensor. The sensor measures -55 to +125 degC (C, same code), and
++85.0 degC is what a DS18B20 holds after power-on, before its first conversion (P). 85.0 is therefore never a value here.
 """
 
 from __future__ import annotations
