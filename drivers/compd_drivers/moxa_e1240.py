@@ -2,8 +2,9 @@
 
 Source: ioLogik E1200 series user's manual, E1240 Modbus address and register map (M, read in a manual): port 502;
 function 4; AI_scaledValue at 0x0008 to 0x0017, float32, high word first; AI_status at 0x003C to 0x0043:
-0 normal, 1 burn-out, 2 over range, 3 under range. Without a scaling set up in the module the value is in V or mA (P); that
-is what this preset expects. Where the module scales to mm itself, describe it with the driver `modbus`.
+0 normal, 1 burn-out, 2 over range, 3 under range. Without a scaling set up in the module the value is in
+V or mA (P, plausible only); that is what this preset expects. Where the
+module scales to mm itself, describe it with the driver `modbus`.
 The values are read before the status, so that a wire that breaks between the two reads does not pass; one that is
 mended between them may pass once with the module's filter still settling.
 """

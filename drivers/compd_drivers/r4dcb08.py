@@ -1,8 +1,8 @@
 """R4DCB08: eight DS18B20 thermometers on Modbus RTU.
 
 Source: public code of Modbus clients (C, read in public code; chmelat/r4dcb08 on GitHub among them): 9600 baud 8N1,
-function 3, address 0 to 7, int16 in 0.1 degC; 0x8000 = no sensor. The sensor measures -55 to +125 degC (C, same code), and
-+85.0 degC is what a DS18B20 holds after power-on, before its first conversion (P). 85.0 is therefore never a value here.
+function 3, address 0 to 7, int16 in 0.1 degC; 0x8000 = no sensor; range -55 to +125 degC. A DS18B20 holds +85.0 degC
+from power-on to its first conversion (P, plausible only): 85.0 is therefore never a value here.
 """
 
 from __future__ import annotations
