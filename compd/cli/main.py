@@ -9,6 +9,7 @@ import typer
 
 from compd import __version__
 from compd.cli import model_commands
+from compd.cli.campaign import campaign
 from compd.cli.check import check
 from compd.cli.compare import compare
 from compd.cli.demo import demo
@@ -46,7 +47,7 @@ def _options(
     """Live error compensation for parallel kinematic machines: joints, links and frame."""
 
 
-for command in (demo, check, simulate, run, watch, zero, record, replay, join, compare, ledger):
+for command in (demo, check, simulate, campaign, run, watch, zero, record, replay, join, compare, ledger):
     app.command()(command)
 for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
     effect.command()(change)

@@ -16,8 +16,8 @@ FOOT_BELOW_PLATE_MM = 200.0
 # The ring is stiff against columns that lean differently: it lets them keep this share of the difference.
 LEAN_KEPT_SHARE = 0.2
 # The nine distances (paper, equation (3)): ends among b1 b2 b3 m1 m2 m3, in order t1 t2 t3 u1 .. u6.
-_FROM = np.array([0, 1, 2, 0, 0, 1, 1, 2, 2])
-_TO = np.array([1, 2, 0, 3, 5, 3, 4, 4, 5])
+DISTANCE_ENDS = ((0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5))
+_FROM, _TO = np.array(DISTANCE_ENDS).T
 DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
 PPM = 1e-6
 UM = 1e-3

@@ -58,9 +58,9 @@ class Joints:
     def __init__(self, mechanism: Mechanism, strengths: Strengths, rng: np.random.Generator) -> None:
         self._strengths = strengths
         self._n = mechanism.links
-        directions_M = _directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
+        directions_M = link_directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
         axes_M = mechanism.axes_P @ mechanism.posture0[1:] if len(mechanism.axes_P) else None
-        self._base_triads = _triads(directions_M, axes_M)
+        self._base_triads = triads(directions_M, axes_M)
         self._platform_triads = self._base_triads @ mechanism.posture0[1:].T
         across = strengths.ball_runout_across_share
         amplitude_um = strengths.ball_runout_um * np.array([1.0, across, across])
@@ -70,9 +70,9 @@ class Joints:
 
     def balls(self, posture: Posture, base_M: Floats, platform_M: Floats, axial_N: Floats, lateral_M: Floats) -> Balls:
         """`axial_N` (n,) and `lateral_M` (n, 3): link forces beyond those at machine zero."""
-        directions_M = _directions(base_M, platform_M)
-        base = self._base.displacement_mm(_angles(self._base_triads, directions_M))
-        platform_angles_rad = _angles(self._platform_triads, directions_M @ posture[1:].T)
+        directions_M = link_directions(base_M, platform_M)
+        base = self._base.displacement_mm(angles(self._base_triads, directions_M))
+        platform_angles_rad = angles(self._platform_triads, directions_M @ posture[1:].T)
         platform = self._platform.displacement_mm(platform_angles_rad)
         along = self._strengths.ball_give_along_um_per_N * UM
         across = self._strengths.ball_give_across_um_per_N * UM
@@ -86,12 +86,13 @@ class Joints:
         )
 
 
-def _directions(base_M: Floats, platform_M: Floats) -> Floats:
+def link_directions(base_M: Floats, platform_M: Floats) -> Floats:
+    """(n, 3) unit vectors from base to platform joints."""
     links_M = platform_M - base_M
     return np.asarray(links_M / np.linalg.norm(links_M, axis=1, keepdims=True))
 
 
-def _triads(directions: Floats, axes: Floats | None) -> Floats:
+def triads(directions: Floats, axes: Floats | None) -> Floats:
     """(n, 3, 3): rows along the link at machine zero, along the revolute axis (or any other), across both."""
     if axes is None:
         aside = np.where(np.abs(directions[:, [2]]) > 0.9, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]])
@@ -100,9 +101,9 @@ def _triads(directions: Floats, axes: Floats | None) -> Floats:
     return np.stack([directions, axes, np.cross(directions, axes)], axis=1)
 
 
-def _angles(triads: Floats, directions: Floats) -> Floats:
-    """(n, 2) by which links have turned since machine zero."""
-    along, first, second = np.einsum("nij,nj->in", triads, directions)
+def angles(axes: Floats, directions: Floats) -> Floats:
+    """(n, 2) by which links have turned since machine zero; `axes` as from `triads`."""
+    along, first, second = np.einsum("nij,nj->in", axes, directions)
     return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=1)
 
 

@@ -25,6 +25,7 @@ class Move:
 
     start_mm: Floats
     end_mm: Floats
+    speed_mm_per_s: float = SPEED_MM_PER_S
 
     @property
     def _way_mm(self) -> float:
@@ -32,7 +33,7 @@ class Move:
 
     @property
     def _ramp_s(self) -> float:
-        return min(SPEED_MM_PER_S / ACCELERATION_MM_PER_S2, math.sqrt(self._way_mm / ACCELERATION_MM_PER_S2))
+        return min(self.speed_mm_per_s / ACCELERATION_MM_PER_S2, math.sqrt(self._way_mm / ACCELERATION_MM_PER_S2))
 
     @property
     def duration_s(self) -> float:

@@ -31,13 +31,13 @@ class Sensors:
         self._rng = rng
 
     def show(
-        self, scale_mm: Floats, balls: Balls, frame_mm: Floats, thermometers_degC: Mapping[str, float]
+        self, scale_mm: Floats, joint_mm: Floats, frame_mm: Floats, thermometers_degC: Mapping[str, float]
     ) -> dict[str, float]:
         """Every reading by name: mm and degC."""
         step_mm = self._strengths.comparator_step_um * UM
         noise_mm = self._strengths.comparator_noise_um * UM
         scale = self._seen(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
-        joint = self._seen(self._joints_mm(balls), noise_mm, step_mm)
+        joint = self._seen(joint_mm, noise_mm, step_mm)
         frame = self._seen(frame_mm, noise_mm, step_mm)
         thermometer = self._seen(np.array(list(thermometers_degC.values())), self._strengths.thermometer_noise_K, 0.0)
         return {
@@ -47,8 +47,8 @@ class Sensors:
             **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
         }
 
-    def _joints_mm(self, balls: Balls) -> Floats:
-        """A comparator counts what shortens the link (paper, equation (1)): its ball coming the link's way."""
+    def joints_mm(self, balls: Balls) -> Floats:
+        """(k,) mm: a comparator counts what shortens the link (paper, equation (1)), its ball coming the link's way."""
         seen = {
             "S": -balls.base_along_mm,
             "Ra": balls.platform_along_mm + balls.shank_mm,

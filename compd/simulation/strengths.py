@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 
 @dataclass(frozen=True)
@@ -57,3 +57,15 @@ class Strengths:
 
 
 NOTHING = Strengths(**{field.name: 0.0 for field in fields(Strengths)})
+
+# A machine whose gauges see everything: joints move along the links only, and every rod and the platform
+# keep their lengths. What is then hidden in it is all that the gauges do not see.
+SEEN = replace(
+    Strengths(), ball_runout_across_share=0.0, ball_give_across_um_per_N=0.0, support_expansion_ppm_per_K=0.0,
+    plate_expansion_ppm_per_K=0.0, frame_rod_expansion_ppm_per_K=0.0, scale_rod_expansion_ppm_per_K=0.0,
+    platform_expansion_ppm_per_K=0.0, tool_expansion_ppm_per_K=0.0,
+)  # fmt: skip
+WITHOUT_NOISE = {
+    "comparator_noise_um": 0.0, "comparator_step_um": 0.0, "scale_noise_um": 0.0, "thermometer_noise_K": 0.0,
+}  # fmt: skip
+SEEN_WITHOUT_NOISE = replace(SEEN, **WITHOUT_NOISE)

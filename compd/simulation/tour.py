@@ -17,8 +17,8 @@ TURN_RAD = 0.08
 POINTS = 24
 
 
-def tour_points_mm(mechanism: Mechanism, rng: np.random.Generator) -> Floats:
-    """(24, n) scale values of points in a cylinder about machine zero, along z of {B} (or of {P}: figure 15).
+def tour_points_mm(mechanism: Mechanism, rng: np.random.Generator, count: int = POINTS) -> Floats:
+    """(count, n) scale values of points in a cylinder about machine zero, along z of {B} (or of {P}: figure 15).
 
     As a controller without compensation computes them: all parts as drawn.
     """
@@ -27,7 +27,7 @@ def tour_points_mm(mechanism: Mechanism, rng: np.random.Generator) -> Floats:
     zero = mechanism.tip0_M if mechanism.tip_frame == "M" else mechanism.tip0_P
     turn_rad = TURN_RAD if len(mechanism.axes_P) == 0 else 0.0
     points: list[Floats] = []
-    while len(points) < POINTS:
+    while len(points) < count:
         radius = RADIUS_SHARE * np.sqrt(rng.uniform())
         angle = rng.uniform(0, 2 * np.pi)
         height = HEIGHT_SHARE * rng.uniform(-1, 1)

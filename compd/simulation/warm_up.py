@@ -8,6 +8,7 @@ radiation together: 8 W/(m2 K).
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,27 @@ _CABINET_W = (8.0, 3.0, 4.0)
 _PLATFORM_W = 0.4
 _LAMPS_W = 3.0
 
+
+@dataclass(frozen=True)
+class Heat:
+    """Heat at work; W. `drives`: (n,) in each link, beyond what it takes to move it; `cabinet`: (3,) per column."""
+
+    drives_W: Floats
+    ring_W: float
+    cabinet_W: Floats
+    platform_W: float
+    tool_W: float
+    lamps_W: float
+
+
+def usual_heat(links: int, share: float) -> Heat:
+    """What this machine's drives and electronics give off, times `share`."""
+    return Heat(
+        np.full(links, share * _DRIVE_HOLDING_W), share * _RING_W, share * np.array(_CABINET_W),
+        share * _PLATFORM_W, 0.0, share * _LAMPS_W,
+    )  # fmt: skip
+
+
 # Weather moves in minutes: within this step the room's change is taken at its middle.
 LONGEST_STEP_S = 20.0
 
@@ -54,12 +76,13 @@ class WarmUp:
         self._at_link = np.array([[index[name] for name in pieces] for pieces in self._links])
         self._at_column = np.array([[[index[n] for n in column[face]] for face in _FACES] for column in self._columns])
         self._at_plate = np.array([index[name] for name in self._plate])
-        self._standing_W = heat_share * self._heat(_DRIVE_HOLDING_W, standing=True)
-        self._moving_W = heat_share * self._heat(_DRIVE_MOVING_W, standing=False)
+        self.heat = usual_heat(links, heat_share)
+        self._moving_W: Floats = np.zeros(len(index))
+        self._moving_W[self._at_link[:, _DRIVE_PIECE]] = heat_share * _DRIVE_MOVING_W
 
     def advance(self, time_s: float, moving_share: float) -> None:
         """Let `time_s` pass; the drives moved during `moving_share` of it."""
-        heat_W = self._standing_W + moving_share * self._moving_W
+        heat_W = self._standing_W() + moving_share * self._moving_W
         steps = max(1, int(np.ceil(time_s / LONGEST_STEP_S)))
         for _ in range(steps):
             step_s = time_s / steps
@@ -78,6 +101,11 @@ class WarmUp:
     def links_K(self) -> Floats:
         """(n,) mean of each link over 20 degC."""
         return np.asarray(self._network.temperature_degC[self._at_link].mean(axis=1) - REFERENCE_degC)
+
+    @property
+    def link_pieces_K(self) -> Floats:
+        """(n, pieces) over 20 degC, from the base end on."""
+        return np.asarray(self._network.temperature_degC[self._at_link] - REFERENCE_degC)
 
     @property
     def columns_K(self) -> Floats:
@@ -107,13 +135,15 @@ class WarmUp:
     def _at(self, body: str) -> float:
         return float(self._network.temperature_degC[self._network.index[body]])
 
-    def _heat(self, drive_W: float, *, standing: bool) -> Floats:
-        heat_W = np.zeros(len(self._network.index))
-        heat_W[self._at_link[:, _DRIVE_PIECE]] = drive_W
-        if standing:
-            heat_W[self._at_column[:, 1, :]] = np.array(_CABINET_W)[:, None] / COLUMN_STOREYS
-            for body, watts in (("base", _RING_W), ("platform", _PLATFORM_W), (self._plate[0], _LAMPS_W)):
-                heat_W[self._network.index[body]] = watts
+    def _standing_W(self) -> Floats:
+        index, heat = self._network.index, self.heat
+        heat_W = np.zeros(len(index))
+        heat_W[self._at_link[:, _DRIVE_PIECE]] = heat.drives_W
+        heat_W[self._at_column[:, 1, :]] = heat.cabinet_W[:, None] / COLUMN_STOREYS
+        for body, watts in (
+            ("base", heat.ring_W), ("platform", heat.platform_W), ("tool", heat.tool_W), (self._plate[0], heat.lamps_W)
+        ):  # fmt: skip
+            heat_W[index[body]] = watts
         return heat_W
 
     def _build(self) -> HeatNetwork:

@@ -16,6 +16,11 @@ _TEMPERATURE_WAVES = ((86400.0, 1.0), (9000.0, 0.35), (1300.0, 0.12))
 _PRESSURE_WAVES_hPa = ((200000.0, 8.0), (43200.0, 1.0))
 _HUMIDITY_WAVES_pct = ((86400.0, 6.0), (14400.0, 2.0))
 
+# A workshop without air conditioning (VDI/VDE 2627, class 5): K, hPa, pct, between sessions and within one.
+ROOM_LEVEL = np.array([2.0, 8.0, 8.0])
+ROOM_WANDERS = np.array([1.5, 2.0, 4.0])
+KNOTS_PER_SESSION = 4
+
 
 class Weather:
     """Slow waves with seeded phases. At time 0 the room is at reference conditions."""
@@ -45,3 +50,35 @@ def _phased(waves: list[tuple[float, float]] | tuple[tuple[float, float], ...], 
 
 def _waves(waves: _Waves, time_s: float) -> float:
     return sum(a * (math.sin(w * time_s + phase) - math.sin(phase)) for w, a, phase in waves)
+
+
+class WorkshopWeather(Weather):
+    """A workshop over days: room, pressure and humidity run straight between drawn values. At time 0 as at reference.
+
+    Sessions are weeks apart in mood: each has a level of its own, around which the room wanders.
+    """
+
+    def __init__(self, starts_s: list[float], session_s: float, rng: np.random.Generator) -> None:
+        """`starts_s`: when each session begins; the room changes to the next one's level in between."""
+        super().__init__(0.0, rng)
+        knots: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, 0.0)]
+        for number, start_s in enumerate(starts_s):
+            level = rng.uniform(-1.0, 1.0, 3) * ROOM_LEVEL if number else np.zeros(3)
+            for k in range(KNOTS_PER_SESSION + 1):
+                time_s = start_s + k * session_s / KNOTS_PER_SESSION
+                if time_s > knots[-1][0]:
+                    room_K, pressure_hPa, humidity_pct = level + rng.uniform(-1.0, 1.0, 3) * ROOM_WANDERS
+                    knots.append((time_s, room_K, pressure_hPa, humidity_pct))
+        self._knots = np.array(knots).T
+
+    def room_degC(self, time_s: float) -> float:
+        return REFERENCE_degC + self._at(1, time_s)
+
+    def pressure_hPa(self, time_s: float) -> float:
+        return STANDARD_PRESSURE_hPa + self._at(2, time_s)
+
+    def humidity_pct(self, time_s: float) -> float:
+        return MIDDLE_HUMIDITY_pct + self._at(3, time_s)
+
+    def _at(self, row: int, time_s: float) -> float:
+        return float(np.interp(time_s, self._knots[0], self._knots[row]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -11,35 +10,21 @@ import numpy as np
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from compd.errors import CompdError, KinematicsError, Problem
-from compd.simulation.closure import Floats, Posture, homogeneous
-from compd.simulation.frame import PPM, Frame
-from compd.simulation.joints import Balls, Joints
+from compd.simulation.cause import Cause, Travel
+from compd.simulation.closure import Floats, Posture
+from compd.simulation.equilibrium import Equilibrium, Settled
+from compd.simulation.frame import Frame
+from compd.simulation.joints import Joints
 from compd.simulation.mechanism import Mechanism
 from compd.simulation.motion import Follower, Phase, Tour
 from compd.simulation.sensors import Sensors
 from compd.simulation.strengths import Strengths
 from compd.simulation.tour import STROKE_SHARE, tour_points_mm
-from compd.simulation.warm_up import WarmUp
+from compd.simulation.warm_up import Heat, WarmUp
 from compd.simulation.weather import Weather
 
 DWELL_S = 1.5
-# A platform that leans more than 60 degrees from its attitude at machine zero has hit something.
-LEAST_UPRIGHT = 0.5
-
 Mode = Literal["zero", "tour", "commanded", "blocked"]
-
-
-@dataclass(frozen=True)
-class Settled:
-    """The machine in equilibrium at one instant; mm, N."""
-
-    scale_mm: Floats
-    posture: Posture
-    supports_M: Floats
-    plate_M: Floats
-    balls: Balls
-    tip_M: Floats
-    tip_P: Floats
 
 
 class World:
@@ -48,11 +33,13 @@ class World:
 
     def __init__(
         self, geometry: Geometry, wiring: Wiring, seed: int, speedup: float = 1.0,
-        zero_hold_s: float = 0.0, strengths: Strengths | None = None,
+        zero_hold_s: float = 0.0, strengths: Strengths | None = None, causes: Sequence[Cause] = (),
+        weather: Weather | None = None,
     ) -> None:  # fmt: skip
         """`speedup`: weather and warm-up run this many times faster than the machine moves.
 
         `zero_hold_s`: how long it stands at machine zero; a command or a call of `tour` ends it too.
+        `causes`: beyond those in `strengths`. `weather`: another than the usual one.
         """
         self._strengths = strengths or Strengths()
         weather_rng, joint_rng, self._tour_rng, sensor_rng = (
@@ -61,7 +48,8 @@ class World:
         self._speedup = speedup
         self.zero_hold_s = zero_hold_s
         self._mechanism = Mechanism(geometry)
-        self._weather = Weather(self._strengths.room_swing_K, weather_rng)
+        self._causes = tuple(causes)
+        self._weather = weather or Weather(self._strengths.room_swing_K, weather_rng)
         self._warm = WarmUp(self._mechanism.links, self._weather, self._strengths.heat_share)
         self._frame = Frame(self._mechanism, self._strengths)
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
@@ -72,8 +60,8 @@ class World:
         self.time_s = 0.0
         self.force_M_N: Floats = np.zeros(3)
         self.mode: Mode = "zero"
-        self._axial0_N, self._lateral0_M = self._forces(
-            self._mechanism.posture0, self._mechanism.joints0_M, self._mechanism.joints_P
+        self._equilibrium = Equilibrium(
+            self._mechanism, self._strengths, self._frame, self._joints, self._causes, self._warm, self._weather
         )
         self._settled = self._settle(self._drives.position_mm, self._mechanism.posture0)
         self._shown: Mapping[str, float] = self._show()
@@ -91,12 +79,23 @@ class World:
                 self.tour()
         if time_s > 0:
             moved_s = self._drives.advance(time_s)
-            self._warm.advance(time_s * self._speedup, moved_s / time_s)
             try:
-                self._settled = self._settle(self._drives.position_mm, self._settled.posture)
+                self._stand(self._drives.position_mm, self._settled.posture, time_s, moved_s)
             except KinematicsError:
                 self._drives = Follower(self._settled.scale_mm)
                 self.mode = "blocked"
+        self._shown = self._show()
+
+    def carry(self, scale_mm: Floats, guess: Posture, time_s: float, travel_s: float) -> None:
+        """Let `time_s` pass, after `travel_s` of which the links have gone straight to `scale_mm`.
+
+        For a campaign, which does not watch the machine on its way. `guess`: a posture near the end.
+        Raises KinematicsError where the links cannot meet.
+        """
+        self.time_s += time_s
+        self._stand(scale_mm, guess, time_s, travel_s)
+        self._drives = Follower(scale_mm)
+        self.mode, self.zero_hold_s = "commanded", 0.0
         self._shown = self._show()
 
     def tour(self) -> None:
@@ -150,6 +149,26 @@ class World:
         """(3,) the place in {P} that the tool's tip touches."""
         return self._settled.tip_P
 
+    def shown_mm(self) -> Floats:
+        """(3,) where a reference instrument without noise shows the tip, in `tip_frame`."""
+        return self._settled.shown
+
+    def link_change_mm(self) -> Floats:
+        """(n,) by which the true distances of each link's joints have changed since machine zero."""
+        return self._settled.link_mm - self._mechanism.lengths0_mm
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return self._mechanism
+
+    @property
+    def posture(self) -> Posture:
+        return self._settled.posture
+
+    def heat(self, heat: Heat) -> None:
+        """Drives, electronics, lamps from now on."""
+        self._warm.heat = heat
+
     def tip_for(self, scale_mm: Sequence[float]) -> Floats:
         """(3,) where the tip would be, in `tip_frame`, were the scales at these values now; nothing moves.
 
@@ -177,65 +196,32 @@ class World:
 
     # --- how it comes about -------------------------------------------------------------------------
 
-    def _show(self) -> dict[str, float]:
-        settled = self._settled
-        frame_mm = self._frame.comparators_mm(settled.supports_M, settled.plate_M, self._warm)
-        return {
-            **self._sensors.show(settled.scale_mm, settled.balls, frame_mm, self._warm.thermometers_degC()),
-            "pressure_hPa": self._weather.pressure_hPa(self._warm.time_s),
-            "humidity_pct": self._weather.humidity_pct(self._warm.time_s),
-            **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", self.force_M_N, strict=True)},
-        }
+    def _stand(self, scale_mm: Floats, guess: Posture, time_s: float, travel_s: float) -> None:
+        """Let `time_s` pass, `travel_s` of it on the way to `scale_mm`, and settle there."""
+        weather_s = time_s * self._speedup
+        self._warm.advance(weather_s, travel_s / time_s)
+        travel = Travel(self._settled.scale_mm, scale_mm, travel_s, time_s, weather_s)
+        for cause in self._causes:
+            cause.pass_time(travel, self._warm)
+        self._settled = self._settle(scale_mm, guess)
 
     def _settle(self, scale_mm: Floats, guess: Posture) -> Settled:
-        """Twice round: forces and joint angles hardly depend on the micrometres that they cause."""
-        s, warm, machine = self._strengths, self._warm, self._mechanism
-        stretch = s.support_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
-        joints_P = machine.joints_P * (1 + s.platform_expansion_ppm_per_K * PPM * warm.over_reference_K("platform"))
-        # the rods between the balls and the scale (paper, figure 5) lie within the links
-        rods_mm = s.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
-        lengths_mm = machine.lengths0_mm + scale_mm + rods_mm
+        return self._equilibrium.settle(scale_mm, guess, self.force_M_N)
 
-        supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
-        base_M = machine.base_joints_M(supports_M, stretch)
-        posture = machine.closure.by_lengths(base_M, joints_P, lengths_mm, guess)
-        platform_M = homogeneous(joints_P) @ posture
-        axial_N, lateral_M = self._forces(posture, base_M, joints_P)
-        axial_N, lateral_M = axial_N - self._axial0_N, lateral_M - self._lateral0_M
-
-        pull_M = np.zeros((3, 3))
-        directions_M = (platform_M - base_M) / lengths_mm[:, None]
-        np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
-        supports_M = self._frame.supports_M(warm, pull_M)
-        balls = self._joints.balls(posture, base_M, platform_M, axial_N, lateral_M)
-        posture = machine.closure.by_lengths(
-            machine.base_joints_M(supports_M, stretch) + balls.base_across_M,
-            joints_P + balls.platform_across_P,
-            lengths_mm + balls.base_along_mm - balls.platform_along_mm,
-            posture,
-        )
-        if np.sum(posture[3] * machine.posture0[3]) < LEAST_UPRIGHT:
-            raise KinematicsError(
-                Problem("simulated machine", "the platform would tip over at these scale values",
-                        np.array2string(scale_mm, precision=3), next_step="ask for a place nearer to machine zero")
-            )  # fmt: skip
-        return self._at(scale_mm, posture, supports_M, balls)
-
-    def _at(self, scale_mm: Floats, posture: Posture, supports_M: Floats, balls: Balls) -> Settled:
-        tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.over_reference_K("tool")
-        on_platform = self.tip_frame == "M"
-        tool_M = self._mechanism.tip0_M * (1.0 if on_platform else tool)
-        tip_P = self._mechanism.tip0_P * tool if on_platform else posture[1:] @ (tool_M - posture[0])
-        tip_M = homogeneous(tip_P) @ posture if on_platform else tool_M
-        return Settled(scale_mm, posture, supports_M, self._frame.plate_M(self._warm), balls, tip_M, tip_P)
-
-    def _forces(self, posture: Posture, base_M: Floats, joints_P: Floats) -> tuple[Floats, Floats]:
-        machine = self._mechanism
-        tip_P = machine.tip0_P
-        if self.tip_frame == "P":
-            tip_P = posture[1:] @ (machine.tip0_M - posture[0])
-        loads = [(machine.weight_M, machine.weight_at_P), (self.force_M_N, tip_P)]
-        return machine.closure.forces(posture, base_M, joints_P, loads)
+    def _show(self) -> dict[str, float]:
+        settled, warm = self._settled, self._warm
+        scale_mm = settled.scale_mm
+        joint_mm = self._sensors.joints_mm(settled.balls)
+        frame_mm = self._frame.comparators_mm(settled.supports_M, settled.plate_M, warm)
+        for cause in self._causes:
+            scale_mm, joint_mm = cause.scale_seen(scale_mm), cause.joint_seen(joint_mm)
+            frame_mm = cause.frame_seen(frame_mm, warm)
+        return {
+            **self._sensors.show(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
+            "pressure_hPa": self._weather.pressure_hPa(warm.time_s),
+            "humidity_pct": self._weather.humidity_pct(warm.time_s),
+            **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", self.force_M_N, strict=True)},
+        }
 
     def _checked(self, scale_mm: Sequence[float]) -> Floats:
         values = np.array(scale_mm, dtype=float)

@@ -1,0 +1,64 @@
+"""`compd campaign`: a recording from a machine that does not exist, as a measuring campaign would bring home."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class ReferenceKind(StrEnum):
+    """What measures beside the gauges."""
+
+    tracker = "tracker"
+    interferometer = "interferometer"
+    ball_plate = "ball_plate"
+
+
+def campaign(
+    config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
+    out: Annotated[Path, typer.Option(help="NAME.csv; NAME.yaml is written beside it.")],
+    seed: Annotated[int, typer.Option(min=0, help="Machine, weather, points and noise follow from it.")] = 1,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="A cause that the gauges do not see: id=strength, or id alone for three times the noise."),
+    ] = None,
+    hidden: Annotated[
+        int | None, typer.Option(min=0, help="Hide a cause that follows from this number, under seal.")
+    ] = None,
+    reference: Annotated[ReferenceKind, typer.Option(help="The instrument beside it.")] = ReferenceKind.tracker,
+    other_days: Annotated[
+        int, typer.Option(min=0, help="Another campaign on the same machine: other points, weather and loads.")
+    ] = 0,
+    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+) -> None:
+    """Simulate a measuring campaign: about 600 rows in four sessions, repeats, loads, passes, 1 % outliers.
+
+    Two disturbances of a fifth of the noise are always in it. What was hidden, and how strong, is written to
+    NAME.answer.json; who wants to diagnose leaves that file shut.
+    """
+    from rich.console import Console
+
+    from compd.configuration import load
+    from compd.simulation.hidden import asked, drawn, seal
+    from compd.simulation.mechanism import Mechanism
+    from compd.simulation.recorded import record
+    from compd.workbench.write import write_recording
+
+    configuration = load(config)
+    path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
+    wanted = asked(effect or [])
+    if hidden is not None:
+        wanted.append(drawn(hidden, Mechanism(configuration.geometry)))
+    plate = path.with_name(f"{path.stem}.plate.csv")
+    recorded = record(configuration, seed, wanted, reference.value, plate.name, other_days)
+    write_recording(path, recorded.columns, recorded.sidecar, overwrite)
+    if recorded.balls_M is not None:
+        lines = [f"{k},{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(recorded.balls_M, 1)]
+        plate.write_text("\n".join(["ball,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
+    answer = path.with_name(f"{path.stem}.answer.json")
+    seal(answer, [one.cause for one in recorded.hidden], [one.floors for one in recorded.hidden], recorded.weak, seed)
+    rows = len(recorded.columns["time_s"])
+    Console().print(f"{path}: {rows} rows, {len(recorded.columns)} columns; under seal: {answer}", soft_wrap=True)
