@@ -169,7 +169,7 @@ def _keys_beside(kind: Any, loc: Location) -> list[str]:
     for part in loc[:-1]:
         kind = _step(kind, part)
     models = _models(kind)
-    return list(models[0].model_fields) if models else []
+    return [field.alias or name for name, field in models[0].model_fields.items()] if models else []
 
 
 def _step(kind: Any, part: str | int) -> Any:
