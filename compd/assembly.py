@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from compd.model import arrangement
 from compd.model.arrangement import Contact
 from compd.model.jit import Floats
 from compd.model.machine import MachineModel, machine_model
+from compd.model.observe import Details, constants
 from compd.model.rotation import rotation_matrix
 from compd.model.transform import to_outer
 
@@ -31,7 +33,7 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
     origin_M_mm = np.array(base.origin_B0_in_M_mm)
     attitude_rad = np.array(geometry.tool.zero_rotation_P_in_M_rad)
     tool, contact = _tool(geometry.tool)
-    return machine_model(
+    model = machine_model(
         supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm)),
         plate_points_M_mm=geometry.plate_points_M_mm,
         base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.joints_B_mm)),
@@ -45,6 +47,13 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
         weight_N=geometry.platform.weight_N,
         weight_at_P_mm=geometry.platform.weight_at_P_mm,
     )
+    return replace(model, constants=constants(model, details(geometry)))
+
+
+def details(geometry: Geometry) -> Details:
+    """What effects ask of a geometry beyond the kinematics; nan where it says nothing."""
+    unknown = float("nan")
+    return Details(geometry.plate_thickness_mm or unknown, geometry.scale_signal_period_mm or unknown)
 
 
 def joint_weights(wiring: Wiring, links: int) -> Floats:

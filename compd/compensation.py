@@ -6,47 +6,59 @@ nothing of joints and frame would send to bring the tip to its target.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.errors import KinematicsError, Problem
-from compd.model.arrangement import Contact
+from compd.model.acting import Remembered, Sight, act
+from compd.model.arrangement import Contact, ToolOnPlate
 from compd.model.frame import Frame, solve_frame
 from compd.model.jit import Floats, Ints
 from compd.model.kinematics import Pose, forward_kinematics, inverse_kinematics
 from compd.model.links import joint_shortening, link_length_mm, scale_for_length_mm
 from compd.model.machine import MachineModel
+from compd.model.prediction import Altered
 from compd.model.rotation import compose, rotation_matrix
 from compd.model.transform import to_inner
 
+_Parts = TypeVar("_Parts", Frame, Pose, Contact)
 Sources: TypeAlias = Mapping[str, Floats]
+
+# An effect is looked up where the scales will stand, which effects themselves shift. What is wrong after the first look
+# is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
+_LOOKS = 2
 
 
 class GaugeValues(NamedTuple):
     """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
 
     scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6.
-    quantities : anything else by its name with unit (temperatures, forces), each (...); may be empty.
+    quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
+    time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
     """
 
     scale_mm: Floats
     joint_mm: Floats
     frame_mm: Floats
     quantities: Mapping[str, Floats]
+    time_s: Floats | float = math.nan
 
 
 class WarmStart(NamedTuple):
     """Where the last cycle ended and the next one's Newton starts; rows that failed keep what they came with.
 
     supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
+    effects : what the model's effects remember; of N rows after the last one.
     """
 
     supports_M_mm: Floats
     origin_M_mm: Floats
     rotation_M_P: Floats
+    effects: Remembered = Remembered()
 
     @classmethod
     def at_zero(cls, model: MachineModel) -> WarmStart:
@@ -98,7 +110,7 @@ def compensate_machine_tool(
     target_mm : (..., 3), in {B0}; with the tool on the plate the place on the work, in {P}.
     target_rotation_B0_rad : (..., 3), hexapod only, rotation vector of the attitude wanted for {P} in {B0}; None
         for machine zero's attitude.
-    values : the scales are not used and may be nan.
+    values : the scales are not used and may be nan; effects see them where they shall be.
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     Raises KinematicsError for an attitude asked of a tripod.
     """
@@ -111,7 +123,16 @@ def compensate_machine_tool(
     nominal_scale_mm = nominal.link_length_mm - model.zero.link_length_mm
     command = _command(model, nominal, nominal_scale_mm, needed, shortening_mm)
     reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, needed.reason))
-    return _result(model, frame, needed, wanted, wanted, command, reason, warm)
+    after = WarmStart(frame.supports_M_mm, needed.origin_M_mm, needed.rotation_M_P, warm.effects)
+    found = _Found(frame, needed, wanted, wanted, command, reason)
+    if model.acting:
+        plain = found
+        for _ in range(_LOOKS):
+            scale_mm = found.command.scale_setpoint_mm
+            machine, remembered = act(model, _sight(values, scale_mm, frame, needed, wanted), warm.effects, True)
+            found = _with_effects(model, plain, machine, attitude)
+        after = after._replace(effects=remembered)
+    return _result(model, found, warm, after)
 
 
 def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) -> tuple[Compensation, WarmStart]:
@@ -136,7 +157,20 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     reason = np.maximum(
         np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, needed.reason))
     )
-    return _result(model, frame, pose, model.arrangement.made(pose), wanted, command, reason, warm)
+    after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P, warm.effects)
+    found = _Found(frame, pose, model.arrangement.made(pose), wanted, command, reason)
+    if model.acting:
+        machine, remembered = act(model, _sight(values, values.scale_mm, frame, pose, found.made), warm.effects, False)
+        corrected = _with_effects(model, found, machine, nominal.rotation_M_P)
+        altered_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm)
+        each = forward_kinematics(
+            machine.mechanism, altered_mm + machine.reading_to_length_mm, warm.origin_M_mm, warm.rotation_M_P
+        )
+        there = _whole(each, pose)
+        made = _whole(type(model.arrangement)(machine.tool_mm).made(each), found.made)
+        found = corrected._replace(pose=there, made=made, reason=np.maximum(corrected.reason, there.reason))
+        after = after._replace(effects=remembered)
+    return _result(model, found, warm, after)
 
 
 class _Command(NamedTuple):
@@ -148,6 +182,17 @@ class _Command(NamedTuple):
     sources: Sources
 
 
+class _Found(NamedTuple):
+    """What a cycle has found; `made` is where the tip is, `wanted` where the command would have it."""
+
+    frame: Frame
+    pose: Pose
+    made: Contact
+    wanted: Contact
+    command: _Command
+    reason: Ints
+
+
 def _command(
     model: MachineModel, nominal: Pose, nominal_scale_mm: Floats, needed: Pose, joint_shortening_mm: Floats
 ) -> _Command:
@@ -155,6 +200,41 @@ def _command(
     setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, needed.link_length_mm, joint_shortening_mm)
     sources = {"joints": joint_shortening_mm, "frame": needed.link_length_mm - nominal.link_length_mm}
     return _Command(nominal_scale_mm, setpoint_mm, setpoint_mm - nominal_scale_mm, sources)
+
+
+def _sight(values: GaugeValues, scale_mm: Floats, frame: Frame, pose: Pose, at: Contact) -> Sight:
+    return Sight(scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, at.tip_M_mm)
+
+
+def _with_effects(model: MachineModel, found: _Found, machine: Altered, attitude: Floats) -> _Found:
+    """The command that reaches the target on the machine that the effects make; an effect's share is what it adds to
+    those before it."""
+    before = found.command
+    tool_on_plate = isinstance(model.arrangement, ToolOnPlate)
+    contact = Contact(machine.tool_mm, found.wanted.tip_P_mm) if tool_on_plate else Contact(
+        found.wanted.tip_M_mm, machine.tool_mm
+    )  # fmt: skip
+    each = inverse_kinematics(machine.mechanism, *contact, attitude)
+    setpoints_mm = scale_for_length_mm(
+        model.zero.link_length_mm, each.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
+    )
+    shares_mm = np.diff(setpoints_mm, axis=0, prepend=before.scale_setpoint_mm[None])
+    ids = [one.effect.id for one in model.acting]
+    setpoint_mm = setpoints_mm[-1]
+    command = _Command(
+        before.nominal_scale_mm, setpoint_mm, setpoint_mm - before.nominal_scale_mm,
+        {**before.sources, **dict(zip(ids, shares_mm, strict=True))},
+    )  # fmt: skip
+    pose = _whole(each, found.pose)
+    reasons = (np.maximum(machine.reason, each.reason) + np.zeros(setpoints_mm.shape[:-1], dtype=np.int64)).max(axis=0)
+    return found._replace(
+        frame=_whole(machine.frame, found.frame), pose=pose, command=command, reason=np.maximum(found.reason, reasons)
+    )
+
+
+def _whole(each: _Parts, like: _Parts) -> _Parts:
+    """With all effects: the last entry of every array that has one for each of them, one axis more than `like` has."""
+    return type(like)._make(a[-1] if a.ndim > b.ndim else a for a, b in zip(each, like, strict=True))
 
 
 def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> Floats:
@@ -171,17 +251,9 @@ def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, war
     return np.asarray(compose(model.frame.zero_rotation_M_B, rotation_matrix(target_rotation_B0_rad)))
 
 
-def _result(
-    model: MachineModel,
-    frame: Frame,
-    pose: Pose,
-    made: Contact,
-    wanted: Contact,
-    command: _Command,
-    reason: Ints,
-    warm: WarmStart,
-) -> tuple[Compensation, WarmStart]:
+def _result(model: MachineModel, found: _Found, warm: WarmStart, after: WarmStart) -> tuple[Compensation, WarmStart]:
     """Everything together; where a row failed, all its numbers nan and its warm start as it was."""
+    frame, pose, made, wanted, command, reason = found
     result = Compensation(
         tip_M_mm=made.tip_M_mm,
         tip_B0_mm=to_inner(model.frame.zero_rotation_M_B, model.frame.zero_origin_M_mm, made.tip_M_mm),
@@ -196,13 +268,13 @@ def _result(
         sources=command.sources,
         reason=reason,
     )
-    after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P)
     if not reason.any():
         return result, after
     kept = WarmStart(
         _where(reason, warm.supports_M_mm, after.supports_M_mm, 2),
         _where(reason, warm.origin_M_mm, after.origin_M_mm, 1),
         _where(reason, warm.rotation_M_P, after.rotation_M_P, 2),
+        after.effects,
     )
     return _blanked(result), kept
 

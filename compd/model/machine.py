@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.errors import KinematicsError, Problem
 from compd.model.arrangement import Arrangement, Contact
+from compd.model.effect import Fitted
 from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_frame
 from compd.model.jit import Floats, Ints
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
 from compd.model.reason import require
 from compd.model.rotation import compose
+from compd.model.rows import Constants
 from compd.model.transform import to_inner
 
 
@@ -42,6 +45,8 @@ class MachineModel:
     revolute_axes_P : (3, 3) unit vectors for the tripod, (0, 3) for the hexapod.
     arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.links`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
+    effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
+    constants : what effects ask of the description beyond the kinematics; None where nothing was given.
     """
 
     frame: FrameGeometry
@@ -52,6 +57,9 @@ class MachineModel:
     weight_N: float
     weight_at_P_mm: Floats
     zero: AtZero
+    effects: tuple[Fitted, ...] = ()
+    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    constants: Constants | None = None
 
     @property
     def links(self) -> int:
@@ -62,6 +70,20 @@ class MachineModel:
     def attitude_is_free(self) -> bool:
         """Whether a target has an attitude of its own; a tripod's follows from its tip."""
         return len(self.revolute_axes_P) == 0
+
+    @cached_property
+    def acting(self) -> tuple[Fitted, ...]:
+        """The effects that belong to the machine; those at the reference instrument never act on it."""
+        return tuple(one for one in self.effects if one.effect.live)
+
+    @cached_property
+    def watches_motion(self) -> bool:
+        """Whether an effect asks how the links move."""
+        return any({"direction", "motion"} & set(one.effect.needs) for one in self.acting)
+
+    def fading(self, weight: float) -> Self:
+        """The same machine with its effects counting `weight`, 0 to 1."""
+        return replace(self, effects=tuple(replace(one, theta=one.theta * weight) for one in self.effects))
 
     def mechanism(self, base_joints_M_mm: Floats) -> Mechanism:
         """The links with the base joints (..., n, 3) where they are now."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from compd.model.frame import solve_frame
 from compd.model.jit import Floats
-from compd.model.kinematics import forward_kinematics
+from compd.model.kinematics import Pose, forward_kinematics
 from compd.model.links import joint_shortening, link_length_mm
 from compd.model.machine import MachineModel
 from compd.model.rows import Constants, Rows
@@ -104,24 +104,47 @@ def observe(
     pose = forward_kinematics(
         model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
     )
-    joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], model.platform_joints_P_mm)
+    return rows_at(
+        common, frame.base_joints_M_mm, pose, model.arrangement.made(pose).tip_M_mm,
+        scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm, quantities=quantities,
+        time_s=np.asarray(time_s, dtype=np.float64), session_start=session_start, movement=movement,
+    )  # fmt: skip
+
+
+def rows_at(
+    common: Constants,
+    base_joints_M_mm: Floats,
+    pose: Pose,
+    tip_M_mm: Floats,
+    *,
+    scale_mm: Floats,
+    joint_mm: Floats,
+    frame_mm: Floats,
+    quantities: Mapping[str, Floats],
+    time_s: Floats,
+    session_start: NDArray[Any],
+    movement: Movement,
+) -> Rows:
+    """N rows whose base joints (N, n, 3), pose and tip (N, 3) are known; the rest as in `observe`."""
+    joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], common.platform_joints_P_mm)
     return Rows(
         constants=common,
         scale_mm=scale_mm,
         joint_mm=joint_mm,
         frame_mm=frame_mm,
         quantities=quantities,
-        time_s=np.asarray(time_s, dtype=np.float64),
+        time_s=time_s,
         session_start=session_start,
         direction=movement.direction,
         velocity_mm_per_s=movement.velocity_mm_per_s,
         joint_velocity_mm_per_s=movement.joint_velocity_mm_per_s,
         link_mm=pose.link_length_mm,
-        directions_M=(joints_M - frame.base_joints_M_mm) / pose.link_length_mm[:, :, None],
-        base_joints_M_mm=frame.base_joints_M_mm,
+        directions_M=(joints_M - base_joints_M_mm) / pose.link_length_mm[:, :, None],
+        base_joints_M_mm=base_joints_M_mm,
         origin_M_mm=pose.origin_M_mm,
         rotation_M_P=pose.rotation_M_P,
-        tip_M_mm=model.arrangement.made(pose).tip_M_mm,
+        # a tool that stands on the plate is at the same place in every row
+        tip_M_mm=np.broadcast_to(tip_M_mm, pose.origin_M_mm.shape),
     )
 
 

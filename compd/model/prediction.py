@@ -73,7 +73,7 @@ def altered(
 ) -> Altered:
     """The machine as the gauges and `deltas` have it; forward and inverse kinematics both start here.
 
-    joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  deltas : (N, size) per port, in mm (rad for
+    joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port, in mm (rad for
     directions); a port left out gets nothing.
     """
     geometry = model.frame._replace(plate_points_M_mm=_points(model.frame.plate_points_M_mm, "plate", deltas))
@@ -232,8 +232,8 @@ def _added(value: Floats, port: Port, deltas: Deltas) -> Floats:
 
 
 def _points(points: Floats, port: Port, deltas: Deltas) -> Floats:
-    """Points (..., m, 3) and their deltas (N, 3 m)."""
-    return points + deltas[port].reshape(-1, *points.shape[-2:]) if port in deltas else points
+    """Points (..., m, 3) and their deltas (..., 3 m)."""
+    return points + deltas[port].reshape(*deltas[port].shape[:-1], -1, 3) if port in deltas else points
 
 
 def _base_joints_by(model: MachineModel, rows: Rows, port: Port) -> Floats:

@@ -1,0 +1,130 @@
+"""A model's effects at work beside its kinematics: what they see, what they remember, and the machine that they make.
+
+One definition for a single snapshot and for N of them: a row's memory is what the rows before it left behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.model.effect import Deltas, Memories, deltas
+from compd.model.frame import Frame
+from compd.model.jit import Floats
+from compd.model.kinematics import Pose
+from compd.model.machine import MachineModel
+from compd.model.observe import Movement, rows_at
+from compd.model.prediction import Altered, altered
+from compd.model.rows import Motion, Rows, moved
+
+
+class Remembered(NamedTuple):
+    """What effects hand from one snapshot to the next; nothing in it is ever changed in place.
+
+    motion : of the links, where an effect asks for it; None before the first snapshot.
+    memories : by effect id.
+    commanded : whether that motion is of commanded scales (machine-tool mode) and not of scales as read.
+    """
+
+    motion: Motion | None = None
+    memories: Memories = MappingProxyType({})
+    commanded: bool = False
+
+
+class Sight(NamedTuple):
+    """What there is to see in one snapshot, or in N of them.
+
+    scale_mm (..., n), joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  quantities : (...) each.
+    time_s (...): monotonic.  frame, pose, tip_M_mm (..., 3): by the kinematics alone.
+    """
+
+    scale_mm: Floats
+    joint_mm: Floats
+    frame_mm: Floats
+    quantities: Mapping[str, Floats]
+    time_s: Floats | float
+    frame: Frame
+    pose: Pose
+    tip_M_mm: Floats
+
+
+def see(model: MachineModel, sight: Sight, before: Remembered, commanded: bool) -> tuple[Rows, Remembered]:
+    """The rows that effects see, N = 1 for a single snapshot; and the motion after them, memories as they were.
+
+    commanded : the scales are where they shall be, not where they are.
+    """
+    assert model.constants is not None, "a model with effects has its constants"
+    count = 1 if sight.scale_mm.ndim == 1 else len(sight.scale_mm)
+    scale_mm, joint_mm, frame_mm = (
+        np.broadcast_to(part, (count, part.shape[-1])) for part in (sight.scale_mm, sight.joint_mm, sight.frame_mm)
+    )
+    time_s = np.broadcast_to(np.asarray(sight.time_s, dtype=np.float64), (count,))
+    motion = before.motion
+    start = np.zeros(count, dtype=bool)
+    start[0] = motion is None and not before.memories
+    movement, motion = _movement(model, before, commanded, time_s, scale_mm, joint_mm)
+    n, pose = model.links, sight.pose
+    rows = rows_at(
+        model.constants,
+        np.broadcast_to(sight.frame.base_joints_M_mm, (count, n, 3)),
+        pose._replace(
+            origin_M_mm=np.broadcast_to(pose.origin_M_mm, (count, 3)),
+            rotation_M_P=np.broadcast_to(pose.rotation_M_P, (count, 3, 3)),
+            link_length_mm=np.broadcast_to(pose.link_length_mm, (count, n)),
+        ),
+        sight.tip_M_mm, scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
+        quantities={name: np.broadcast_to(value, (count,)) for name, value in sight.quantities.items()},
+        time_s=time_s, session_start=start, movement=movement,
+    )  # fmt: skip
+    return rows, Remembered(motion, before.memories, commanded)
+
+
+def act(model: MachineModel, sight: Sight, before: Remembered, commanded: bool) -> tuple[Altered, Remembered]:
+    """The machine as the effects alter it, one after the other, and what they remember.
+
+    Every array that an effect alters has one more axis in front, (K, ...): its k-th entry holds effects 0 to k.
+    """
+    rows, after = see(model, sight, before, commanded)
+    each, memories = deltas(model.acting, rows, before.memories)
+    added = one_after_another(list(each.values()))
+    if sight.scale_mm.ndim == 1:
+        added = {port: values[:, 0] for port, values in added.items()}
+    machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame.supports_M_mm)
+    return machine, after._replace(memories=memories)
+
+
+def one_after_another(each: Sequence[Deltas]) -> Deltas:
+    """(K, N, size) per port: what the first k + 1 of K effects add together."""
+    found: Deltas = {}
+    for k, one in enumerate(each):
+        for port, values in one.items():
+            if port not in found:
+                found[port] = np.zeros((len(each), *values.shape))
+            found[port][k:] += values
+    return found
+
+
+def _movement(
+    model: MachineModel, before: Remembered, commanded: bool, time_s: Floats, scale_mm: Floats, joint_mm: Floats
+) -> tuple[Movement, Motion | None]:
+    """How the links move at each row, and the motion after the last; unknown where no effect asks."""
+    if not model.watches_motion:
+        unknown = np.full(scale_mm.shape, np.nan)
+        return Movement(np.zeros(scale_mm.shape), unknown, np.full(joint_mm.shape, np.nan)), None
+    motion = before.motion
+    if motion is not None and before.commanded != commanded:
+        # a command is not where the scale stands: going over from one to the other is no motion
+        motion = motion._replace(scale_mm=scale_mm[0], turning_mm=scale_mm[0])
+    found = []
+    for k, time in enumerate(time_s.tolist()):
+        if motion is None or (np.isfinite(scale_mm[k]).all() and np.isfinite(joint_mm[k]).all()):
+            motion = moved(motion, time, scale_mm[k], joint_mm[k])
+        found.append(motion)
+    return Movement(
+        np.array([one.direction for one in found]),
+        np.array([one.velocity_mm_per_s for one in found]),
+        np.array([one.joint_velocity_mm_per_s for one in found]),
+    ), motion
