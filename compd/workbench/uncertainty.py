@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.model.effect import Deltas, Fitted, Port, by_port, together
+from compd.model.frame import solve_frame
+from compd.model.prediction import STEP_MM
 from compd.model.rows import Rows
 from compd.workbench.noise import repeat_scatter
 from compd.workbench.observed import Observed
@@ -89,15 +91,30 @@ def first_order(
     shape = seen.measured_mm.shape
     variance = np.full(shape, np.nan) if noise is None else np.zeros(shape)
     if noise is not None:
-        by = seen.sensitivity(GAUGE_PORTS)
+        by = seen.sensitivity(["scale", "joint", "base_joint"])
         for port in GAUGE_PORTS:
-            sensitivity = by[port].link_length if seen.of_links else by[port].tip
-            variance += (sensitivity[:, list(seen.axes)] ** 2) @ noise.at(port) ** 2
+            at = by["base_joint" if port == "frame" else port]
+            sensitivity = (at.link_length if seen.of_links else at.tip)[:, list(seen.axes)]
+            if port == "frame":
+                sensitivity = sensitivity @ _base_joints_by_frame(seen)
+            variance += sensitivity**2 @ noise.at(port) ** 2
     parameters = np.zeros(shape)
     if fitted:
         G = np.concatenate([seen.columns(one.effect, one.shape) for one in fitted], axis=2)
         parameters = np.sqrt(np.maximum((G @ covariance * G).sum(axis=2), 0.0))
     return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM)
+
+
+def _base_joints_by_frame(seen: Observed) -> FloatArray:
+    """(3 n, 9) by how much the base joints move with the frame's distances; by central differences.
+
+    The frame moves by micrometres in a metre: its middle state serves for every row.
+    """
+    assert seen.model is not None
+    distances_mm = seen.model.zero.distances_mm + np.nanmedian(seen.rows.frame_mm, axis=0)
+    step = STEP_MM * np.eye(9)
+    ends = [solve_frame(seen.model.frame, distances_mm + signed).base_joints_M_mm for signed in (step, -step)]
+    return np.asarray((ends[0] - ends[1]).reshape(9, -1).T / (2 * STEP_MM))
 
 
 def monte_carlo(

@@ -1,0 +1,116 @@
+"""What `compd compare` costs, from the files to the answer: `python -m tests.benchmarks.bench_compare`.
+
+Beside it, the same forward kinematics row by row with SciPy's `least_squares`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from compd.model.kinematics import closure_at
+from compd.workbench.observed import Observed
+from tests.benchmarks.figures import show
+from tests.measured import gauges, hidden, record, seen
+
+ROWS = (1_000, 10_000, 100_000)
+BUDGET_S = 20.0
+BUDGET_MB = 2048.0
+SCIPY_ROWS = 300
+COMMAND = "import sys; from compd.cli import main; sys.argv[0] = 'compd'; main()"
+
+
+class Cost(NamedTuple):
+    """Wall time, and the process's largest resident memory."""
+
+    seconds: float
+    largest_MB: float
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as temporary:
+        directory = Path(temporary)
+        rows = []
+        before = float("nan")
+        start = command(["--version"]).seconds
+        for count in ROWS:
+            path = record(directory, gauges(count, 1), [hidden("link_expansion", 1.1)], name=f"rows{count}")
+            bare = command(["compare", str(path), "--json"])
+            page = command(["compare", str(path), "--json", "--html", str(directory / "page.html")])
+            work = bare.seconds - start
+            rows.append([
+                f"{count}", f"{bare.seconds:.2f}", f"{work / count * 1e6:.1f}", f"{work / before:.1f}",
+                f"{bare.largest_MB:.0f}", f"{page.seconds:.2f}", f"{page.seconds / BUDGET_S:.2f}",
+                f"{page.largest_MB / BUDGET_MB:.2f}",
+            ])  # fmt: skip
+            before = work
+        show(
+            f"compd compare, start of Python included; budget {BUDGET_S:g} s, {BUDGET_MB:g} MB at {ROWS[-1]} rows",
+            ["rows", "s", "us/row beyond the start", "times the line above", "MB", "with --html, s", "/ budget",
+             "memory / budget"],
+            rows,
+        )  # fmt: skip
+        compare_with_scipy(seen(directory / f"rows{ROWS[0]}.csv"))
+
+
+def command(arguments: list[str]) -> Cost:
+    """Run `compd` in a process of its own."""
+    begin = time.perf_counter()
+    process = subprocess.Popen([sys.executable, "-c", COMMAND, *arguments], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    output = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.perf_counter() - begin
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0, arguments
+    if "--json" in arguments:
+        assert json.loads(output)["rows_used"] > 0
+    return Cost(seconds, usage.ru_maxrss / 1024.0)
+
+
+def compare_with_scipy(one: Observed) -> None:
+    """One pose at a time, from machine zero, against the kernels over all rows."""
+    assert one.model is not None
+    zero = one.model.zero
+    begin = time.perf_counter()
+    for row in range(SCIPY_ROWS):
+        mechanism = one.model.mechanism(one.rows.base_joints_M_mm[row])
+        wanted_mm = one.rows.link_mm[row]
+
+        def miss(x, mechanism=mechanism, wanted_mm=wanted_mm):  # type: ignore[no-untyped-def]
+            R = Rotation.from_rotvec(x[3:]).as_matrix() @ zero.rotation_M_P
+            closed = closure_at(mechanism, zero.platform_origin_M_mm + x[:3], R)
+            return np.concatenate([closed.length_mm - wanted_mm, closed.offset_mm])
+
+        found = least_squares(
+            miss, np.zeros(6), x_scale=[1, 1, 1, 0.01, 0.01, 0.01], xtol=1e-14, ftol=1e-14, gtol=1e-14
+        )
+        assert np.abs(zero.platform_origin_M_mm + found.x[:3] - one.rows.origin_M_mm[row]).max() < 1e-6
+    by_scipy_s = (time.perf_counter() - begin) / SCIPY_ROWS
+    begin = time.perf_counter()
+    repeats = 20
+    for _ in range(repeats):
+        one.predicted_mm({})
+    by_compd_s = (time.perf_counter() - begin) / (repeats * len(one.rows))
+    show(
+        "Forward kinematics, one row",
+        ["", "us/row", "ratio"],
+        [
+            ["compd, frame and links, all rows at once", f"{by_compd_s * 1e6:.2f}", "1"],
+            ["scipy.optimize.least_squares, links alone", f"{by_scipy_s * 1e6:.0f}", f"{by_scipy_s / by_compd_s:.0f}"],
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()
