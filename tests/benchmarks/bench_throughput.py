@@ -23,6 +23,7 @@ from compd.gauge import Gauge
 from compd.lines import open_line
 from compd.lines.modbus_rtu import crc16
 from compd.live.acquisition import Acquisition
+from compd.live.realtime import sharpen_timers
 from compd.planning import plan_line, serial_pace
 from compd.plugins import GAUGES, load
 from compd.readings import Latest
@@ -37,6 +38,7 @@ FIFO_CHARACTERS = 16  # a UART hands over so many at a time
 def slave(fd: int, baud: int, turnaround_s: float) -> None:
     """Answer every read request with counting registers, at the wire's pace, until killed."""
     character_s = serial_pace(baud, FORMAT, rtu=True).character_s
+    print("listening", flush=True)
     while True:
         request = b""
         while len(request) < 8:
@@ -93,14 +95,17 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.benchmarks.bench_throughput", "slave", str(master), str(baud),
          str(pace.turnaround_s)],
-        pass_fds=[master],
+        pass_fds=[master], stdout=subprocess.PIPE,
     )  # fmt: skip
+    assert process.stdout is not None
+    process.stdout.readline()  # it is listening
     settings = line.model_copy(update={"port": os.ttyname(far)})
     try:
         rate_hz = _through_thread(settings, polled) if threaded else _polled(settings, polled)
     finally:
         process.kill()
         process.wait()
+        process.stdout.close()
         os.close(master)
         os.close(far)
     return rate_hz, 1 / ideal_s
@@ -140,6 +145,7 @@ def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> f
 
 
 def main() -> None:
+    sharpen_timers()  # as the daemon's line threads do
     rows = [
         (kind, baud, turnaround_s, False)
         for kind in ("int16", "float32", "units")
