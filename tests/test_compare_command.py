@@ -88,7 +88,7 @@ def test_all_problems_of_all_recordings_come_at_once(recording: Path, tmp_path: 
 def test_compare_add_compare_again(recording: Path, tmp_path: Path) -> None:
     other = record(tmp_path, gauges(300, 24), [hidden("link_expansion", 1.1)], name="other", seed=5)
     model = tmp_path / "tripod.model.yaml"
-    said = run("add", "link_expansion", recording, "--model", model)
+    said = run("add", "link_expansion", "--recording", recording, "--model", model)
     assert "link_expansion" in said
     found = json.loads(run("compare", other, "--model", model, "--json"))
     assert found["floor_ratio"] < 1.1
@@ -97,11 +97,18 @@ def test_compare_add_compare_again(recording: Path, tmp_path: Path) -> None:
     assert found["prediction_std_um"]["parameters"] > 0
 
 
+def test_a_dry_run_shows_the_fall_and_writes_nothing(recording: Path, tmp_path: Path) -> None:
+    model = tmp_path / "tripod.model.yaml"
+    said = run("add", "link_expansion", "--recording", recording, "--model", model, "--dry-run")
+    assert "would have added link_expansion" in said
+    assert not model.exists()
+
+
 def test_every_step_is_in_the_ledger_and_can_be_undone(recording: Path, tmp_path: Path) -> None:
     model = tmp_path / "tripod.model.yaml"
-    run("add", "link_expansion", recording, "--model", model)
+    run("add", "link_expansion", "--recording", recording, "--model", model)
     with_one = yaml.safe_load(model.read_text())["effects"]
-    run("add", "tool_offset", recording, "--model", model)
+    run("add", "tool_offset", "--recording", recording, "--model", model)
     run("undo", "--model", model)
     assert yaml.safe_load(model.read_text())["effects"] == with_one
     run("undo", "--model", model)
@@ -117,17 +124,17 @@ def test_every_step_is_in_the_ledger_and_can_be_undone(recording: Path, tmp_path
 
 def test_remove_fits_the_rest_again(recording: Path, tmp_path: Path) -> None:
     model = tmp_path / "tripod.model.yaml"
-    run("add", "link_expansion", recording, "--model", model)
+    run("add", "link_expansion", "--recording", recording, "--model", model)
     alone = yaml.safe_load(model.read_text())["effects"]
-    run("add", "link_zero", recording, "--model", model)
-    run("remove", "link_zero", recording, "--model", model)
+    run("add", "link_zero", "--recording", recording, "--model", model)
+    run("remove", "link_zero", "--recording", recording, "--model", model)
     left = yaml.safe_load(model.read_text())["effects"]
     assert left[0]["parameters"][0]["value"] == pytest.approx(alone[0]["parameters"][0]["value"], rel=1e-6)
-    run("fit", recording, "--model", model)
+    run("fit", "--recording", recording, "--model", model)
     with pytest.raises(StateError, match="not in the model"):
-        run("remove", "backlash", recording, "--model", model)
+        run("remove", "backlash", "--recording", recording, "--model", model)
     with pytest.raises(StateError, match="in the model already"):
-        run("add", "link_expansion", recording, "--model", model)
+        run("add", "link_expansion", "--recording", recording, "--model", model)
 
 
 def test_a_formula_of_ones_own(tmp_path: Path) -> None:
@@ -147,7 +154,7 @@ def test_a_formula_of_ones_own(tmp_path: Path) -> None:
         text[k] = ",".join(cells)
     path.write_text("\n".join(text) + "\n")
     model = tmp_path / "m.yaml"
-    run("add", written, path, "--model", model)
+    run("add", written, "--recording", path, "--model", model)
     (effect,) = yaml.safe_load(model.read_text())["effects"]
     assert effect["parameters"][0]["value"] == pytest.approx(0.1, abs=0.01)
     assert json.loads(run("compare", path, "--model", model, "--json"))["floor_ratio"] < 1.1
@@ -156,7 +163,7 @@ def test_a_formula_of_ones_own(tmp_path: Path) -> None:
 def test_a_failed_step_writes_nothing(recording: Path, tmp_path: Path) -> None:
     model = tmp_path / "m.yaml"
     with pytest.raises(CompdError, match="no such effect"):
-        run("add", "link_expantion", recording, "--model", model)
+        run("add", "link_expantion", "--recording", recording, "--model", model)
     with pytest.raises(RecordingError):
-        run("add", "link_expansion", tmp_path / "none.csv", "--model", model)
+        run("add", "link_expansion", "--recording", tmp_path / "none.csv", "--model", model)
     assert not model.exists()

@@ -18,15 +18,17 @@ ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add
 MachineOption = Annotated[
     Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
 ]
-RecordingArgument = Annotated[Path, typer.Argument(metavar="RECORDING", help="What to fit on: NAME.csv.")]
+RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
 EFFECT_HELP = "An id from `compd effect list`, /absolute/file.py:NAME, or a YAML file with a formula."
 
 
 def add(
     effect: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
-    recording: RecordingArgument,
+    recording: RecordingOption,
     model: ModelOption,
     machine: MachineOption = None,
+    dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.cli.compare import open_recording
@@ -36,30 +38,33 @@ def add(
     declared, found = declaration_of(effect)
     seen, _ = open_recording(recording, machine)
     file = _opened(model, seen) if model.exists() else ModelFile(seen.recording.machine)
-    _finish(model, added(file, declared, found, seen, _now()), f"added {found.id}")
+    _finish(model, added(file, declared, found, seen, _now()), f"added {found.id}", dry_run)
 
 
 def remove(
     effect: Annotated[str, typer.Argument(metavar="EFFECT", help="The id of an effect in the model.")],
-    recording: RecordingArgument,
+    recording: RecordingOption,
     model: ModelOption,
     machine: MachineOption = None,
+    dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.cli.compare import open_recording
     from compd.workbench.ledger import remove as removed
 
     seen, _ = open_recording(recording, machine)
-    _finish(model, removed(_opened(model, seen), effect, seen, _now()), f"removed {effect}")
+    _finish(model, removed(_opened(model, seen), effect, seen, _now()), f"removed {effect}", dry_run)
 
 
-def fit(recording: RecordingArgument, model: ModelOption, machine: MachineOption = None) -> None:
+def fit(
+    recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
+) -> None:
     """Fit all effects of a model again, on another recording."""
     from compd.cli.compare import open_recording
     from compd.workbench.ledger import refit
 
     seen, _ = open_recording(recording, machine)
-    _finish(model, refit(_opened(model, seen), seen, _now()), "fitted again")
+    _finish(model, refit(_opened(model, seen), seen, _now()), "fitted again", dry_run)
 
 
 def undo(model: ModelOption) -> None:
@@ -98,15 +103,18 @@ def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def _finish(path: Path, change: Change, done: str) -> None:
-    """Write the file, then say what the step did."""
+def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
+    """Write the file, unless it is a dry run, then say what the step did."""
     from rich.console import Console
     from rich.table import Table
 
     from compd.model_file import numbers_of, write_model_file
 
     links = change.after.seen.rows.links
-    write_model_file(path, change.file, links)
+    if dry_run:
+        done = f"not written: would have {done}"
+    else:
+        write_model_file(path, change.file, links)
     before, after = change.before, change.after
     console = Console(highlight=False)
     console.print(
