@@ -93,7 +93,7 @@ def print_comparisons(found: list[Comparison]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.workbench.report import name_of, summary
+    from compd.workbench.report import name_of, nothing_found, summary
 
     console = Console(highlight=False)
     numbers = summary(found)
@@ -109,6 +109,8 @@ def print_comparisons(found: list[Comparison]) -> None:
             console.print(f"[bold]{name_of(one)}[/]")
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
+        if not one.findings:
+            console.print(f"Where it fails: {nothing_found(one)}.")
         for finding in one.findings[:MOST_SENTENCES]:
             console.print(f"  - {finding.text}")
         if len(one.findings) > MOST_SENTENCES:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from plotly.graph_objects import Figure
 
 from compd.model_file import ModelFile, Stored, numbers_of
 from compd.workbench.compare import Comparison
@@ -50,6 +51,13 @@ def name_of(comparison: Comparison) -> str:
     """The recording's file, with its folder: `train.csv` alone says nothing."""
     path = comparison.seen.recording.path.resolve()
     return f"{path.parent.name}/{path.name}"
+
+
+def nothing_found(one: Comparison) -> str:
+    """What to say where the residual follows nothing in a straight line."""
+    if one.at_floor:
+        return "nowhere: what is left is noise"
+    return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
 
 
 def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
@@ -121,12 +129,13 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in found if name not in placed]
     vectors, enlarged = arrows(one)
-    said = [finding.text for finding in one.findings] or ["nothing that the residual follows was found"]
+    said = [finding.text for finding in one.findings] or [nothing_found(one)]
     sentences = Table(("",), [[text] for text in said])
     panels = [
         Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
         Panel("What each part does", "The error that is left with one part switched off.", switched_off(one)),
-        Panel("Residual vectors", f"Measured minus modelled at the tip, enlarged {enlarged:g} times.", vectors),
+        Panel("Residual vectors", "Measured minus modelled at the tip"
+              + (f", enlarged {enlarged:g} times." if isinstance(vectors, Figure) else "."), vectors),
         *(
             Panel(f"Residual against {group}", HOW_TO_READ, against(one, [found[name] for name in names]))
             for group, names in groups.items()

@@ -22,7 +22,7 @@ COLUMNS = 3
 # The typical arrow is drawn as long as this share of the workspace.
 ARROW_SHARE = 0.12
 SERIES_COLOURS = (COLOURS["worst"], COLOURS["best"], COLOURS["plain"], COLOURS["middle"], "#cc79a7", "#56b4e9")
-NOT_RECORDED = Table(("", ""), [("not recorded", "-")])
+NOT_RECORDED = Table(("",), [("not recorded, or it never changed",)])
 
 
 def thinned(rows: IntArray, most: int) -> IntArray:
