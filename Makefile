@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help demo test long lint wheel bench clean
+.PHONY: help demo test long lint wheel bench scoreboard clean
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make long    the tests that take minutes"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make wheel   build the wheel, install it in a clean environment, run it"
+	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; goes on where it was)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 
 $(STAMP): pyproject.toml
@@ -52,6 +53,10 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.bench_loop
 	$(BIN)/python -m tests.benchmarks.bench_latency
 	$(BIN)/python -m tests.benchmarks.bench_throughput
+
+# More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
+scoreboard: $(STAMP)
+	$(BIN)/python -m tests.scoreboard $(OPTIONS)
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

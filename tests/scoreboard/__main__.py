@@ -1,0 +1,84 @@
+"""`python -m tests.scoreboard`: run what is not in the results yet, on all cores; then print the tables.
+
+Every result is a line of --out, written when its case is done: a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from tests.scoreboard.cases import KINDS, NOTHING, OUTSIDE, PAIRS, SEEDS, STRENGTHS, Case, cases, named
+from tests.scoreboard.table import report
+from tests.scoreboard.trial import run
+
+
+def main() -> None:
+    options = _options()
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    wanted = named(options.case) if options.case else cases(
+        options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs
+    )  # fmt: skip
+    failed = _run_all(_missing(wanted, options.out)[: options.most], options.out, options.jobs)
+    results = [json.loads(line) for line in options.out.read_text(encoding="utf-8").splitlines()]
+    names = {case.name for case in wanted}
+    results = [one for one in results if one["case"] in names]
+    print(f"\n{len(results)} of {len(wanted)} cases, {len(failed)} failed\n")
+    print(report(results))
+    for name, why in failed:
+        print(f"\nfailed: {name}: {why}")
+    raise SystemExit(bool(failed))
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.scoreboard", description=__doc__)
+    add = parser.add_argument
+    add("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    add("--strengths", nargs="+", type=float, default=list(STRENGTHS), help="times the floor")
+    add("--seeds", type=int, default=SEEDS, help="machines per effect and strength")
+    add("--nothing", type=int, default=NOTHING, help="machines with nothing hidden")
+    add("--outside", type=int, default=OUTSIDE, help="machines per cause outside the library")
+    add("--pairs", type=int, default=PAIRS, help="machines with two effects")
+    add("--case", action="append", help="this case alone, as the results name it; may be given again")
+    add("--most", type=int, default=None, help="run so many cases at most")
+    add("--jobs", type=int, default=os.cpu_count(), help="side by side")
+    add("--out", type=Path, default=Path("out/scoreboard.jsonl"))
+    return parser.parse_args()
+
+
+def _missing(wanted: Sequence[Case], out: Path) -> list[Case]:
+    out.touch()
+    done = {json.loads(line)["case"] for line in out.read_text(encoding="utf-8").splitlines()}
+    return [case for case in wanted if case.name not in done]
+
+
+def _run_all(missing: Sequence[Case], out: Path, jobs: int) -> list[tuple[str, str]]:
+    """What failed, and why: a case that fails is reported, and not counted as anything."""
+    failed: list[tuple[str, str]] = []
+    columns = (TextColumn("scoreboard"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with (
+        out.open("a", encoding="utf-8") as file,
+        ProcessPoolExecutor(jobs) as pool,
+        Progress(*columns, transient=True) as progress,
+    ):
+        bar = progress.add_task("", total=len(missing))
+        running = {pool.submit(run, case): case for case in missing}
+        for future in as_completed(running):
+            error = future.exception()
+            if error is None:
+                file.write(json.dumps(future.result()) + "\n")
+                file.flush()
+            else:
+                failed.append((running[future].name, str(error)))
+            progress.advance(bar)
+    return failed
+
+
+if __name__ == "__main__":
+    main()

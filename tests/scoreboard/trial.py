@@ -1,0 +1,70 @@
+"""One case from the sealed machine to the score, by the commands that a person would use."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from compd.configuration import load
+from compd.simulation.hidden import Hidden, seal
+from compd.simulation.recorded import record
+from compd.workbench.write import write_recording
+from tests.scoreboard.cases import Case
+
+CONFIG = Path(__file__).parents[2] / "config" / "tripod-cmm.yaml"
+TIMEOUT_S = 300.0
+
+
+def run(case: Case) -> dict[str, Any]:
+    """A line of the results: what was hidden, what the diagnosis said, and how well the model then does elsewhere."""
+    with tempfile.TemporaryDirectory(prefix="compd-score-") as temporary:
+        directory = Path(temporary)
+        hide(case, directory, "train", 0)
+        hide(case, directory, "other", 1)
+        start_s = time.perf_counter()
+        verdict = json.loads(compd(directory, "diagnose", "train.csv", "--json"))
+        took_s = time.perf_counter() - start_s
+        ratio, fitted = add_all(directory, [step["effect"] for step in verdict["steps"]])
+        secret = json.loads((directory / "train.answer.json").read_text(encoding="utf-8"))
+    return {"case": case.name, "kind": case.kind, "verdict": verdict, "took_s": took_s, "other_floor_ratio": ratio,
+            "fitted": fitted, "secret": secret}  # fmt: skip
+
+
+def hide(case: Case, directory: Path, name: str, other_days: int) -> None:
+    """A campaign with the case's causes in it; NAME.answer.json is for the scorer."""
+    hidden = [Hidden(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
+    recorded = record(load(CONFIG), case.seed, hidden, other_days=other_days)
+    write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar)
+    seal(directory / f"{name}.answer.json", [one.cause for one in recorded.hidden],
+         [one.floors for one in recorded.hidden], recorded.weak, case.seed)  # fmt: skip
+
+
+def add_all(directory: Path, effects: list[str]) -> tuple[float, list[dict[str, Any]]]:
+    """Floor ratio on the other days with the named effects in the model, and the numbers that were fitted."""
+    model = ["--model", "model.yaml"] if effects else []
+    for effect in effects:
+        compd(directory, "effect", "add", effect, "--recording", "train.csv", *model)
+    compared = json.loads(compd(directory, "compare", "other.csv", "--json", *model))
+    fitted = yaml.safe_load((directory / "model.yaml").read_text(encoding="utf-8"))["effects"] if effects else []
+    return float(compared["floor_ratio"]), fitted
+
+
+def compd(directory: Path, *arguments: str) -> str:
+    """What one command prints. Raises RuntimeError, with its own words, where it fails."""
+    # one thread each: cases run side by side
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "compd", *arguments], cwd=directory, env=environment, timeout=TIMEOUT_S,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"compd {' '.join(arguments)}: {done.stderr or done.stdout}")
+    return done.stdout
