@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
     from compd.configuration import Configuration
     from compd.simulation.server import Simulation
+    from compd.simulation.sizing import Sized
 
 LOOK_EVERY_S = 0.25
+SEALED = "hidden.answer.json"
 
 
 def simulate(
@@ -30,6 +32,10 @@ def simulate(
         float, typer.Option(min=0, help="Seconds at machine zero, before switch-on, to take machine zero in.")
     ] = 60.0,
     seconds: Annotated[float | None, typer.Option(min=0, help="Stop after so many seconds.")] = None,
+    hidden: Annotated[
+        int | None,
+        typer.Option(min=0, help="Hide a cause that follows from this number, in a machine whose gauges see all else."),
+    ] = None,
 ) -> None:
     """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol."""
     import contextlib
@@ -43,11 +49,17 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
+    from compd.simulation.hidden import seal
     from compd.simulation.server import Simulation
+    from compd.simulation.strengths import SEEN
     from compd.simulation.world import World
 
     configuration = load(config)
-    world = World(configuration.geometry, configuration.wiring, seed, speedup, zero_hold)
+    hid = [] if hidden is None else [_hidden(configuration, seed, hidden)]
+    world = World(
+        configuration.geometry, configuration.wiring, seed, speedup, zero_hold,
+        strengths=SEEN if hid else None, causes=[one.cause for one in hid],
+    )  # fmt: skip
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -59,6 +71,8 @@ def simulate(
         directory.mkdir(parents=True, exist_ok=True)
         simulation = Simulation(configuration, world, directory.resolve(), clock)
         stack.callback(simulation.stop)
+        if hid:
+            seal(directory / SEALED, [one.cause for one in hid], [one.floors for one in hid], [], seed)
         daemon = simulation.start()
         console.print(_lines(simulation))
         console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
@@ -67,6 +81,14 @@ def simulate(
             while not clock.wait(stop, LOOK_EVERY_S) and clock.monotonic() < end_s:
                 if console.is_terminal:
                     live.update(_status(simulation), refresh=True)
+
+
+def _hidden(configuration: Configuration, seed: int, number: int) -> Sized:
+    from compd.simulation.hidden import drawn
+    from compd.simulation.sizing import Sizing
+
+    sizing = Sizing(configuration.geometry, configuration.wiring, seed)
+    return sizing.cause(drawn(number, sizing.mechanism))
 
 
 def _lines(simulation: Simulation) -> Table:
@@ -99,7 +121,7 @@ def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
         f"    compd run {daemon.path}\n"
         f"    compd zero {daemon.sockets.unix.path}    (it stands at machine zero for the next {hold_s:.0f} s)\n"
         f"    compd watch {daemon.sockets.unix.path}\n"
-        f"Truth, commands and faults: {simulation.directory / 'control.sock'}. Ctrl-C ends."
+        f"Truth, a laser tracker, commands and faults: {simulation.directory / 'control.sock'}. Ctrl-C ends."
     )
 
 

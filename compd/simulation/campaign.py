@@ -16,7 +16,7 @@ from compd.simulation.closure import Floats, Posture
 from compd.simulation.instruments import Kind, noisy
 from compd.simulation.mechanism import Mechanism
 from compd.simulation.motion import ACCELERATION_MM_PER_S2, Move
-from compd.simulation.plan import PASS_MM, PASS_ROWS, REPEAT_AFTER_S, VISIT_S, Item, Plan
+from compd.simulation.plan import PASS_MM, PASS_ROW_EVERY_S, PASS_ROWS, REPEAT_AFTER_S, VISIT_S, Item, Plan
 from compd.simulation.strengths import Strengths
 from compd.simulation.world import World
 
@@ -129,8 +129,9 @@ class Campaign:
         for end in (start + out, start + out / 2):
             move = Move(self._world.scale_mm, end, item.speed_mm_per_s)
             self._direction = np.sign(end - self._world.scale_mm)
-            ramp_s = min(item.speed_mm_per_s / ACCELERATION_MM_PER_S2, move.duration_s / 2)
-            times = np.linspace(ramp_s, move.duration_s - ramp_s, PASS_ROWS)
+            steady_s = move.duration_s - 2 * item.speed_mm_per_s / ACCELERATION_MM_PER_S2
+            every_s = min(PASS_ROW_EVERY_S, steady_s / PASS_ROWS)
+            times = move.duration_s / 2 + every_s * (np.arange(PASS_ROWS) - (PASS_ROWS - 1) / 2)
             before_s = 0.0
             for time_s in [*times.tolist(), move.duration_s + 0.1]:
                 step_s = time_s - before_s

@@ -12,6 +12,8 @@ from compd.simulation.warm_up import WarmUp
 
 # A comparator's holder of 0.1 kg warms up by conduction from the part that it is screwed to.
 HOLDER_TAU_S = 120.0
+# A rod hangs in the air around the frame; this share of its warmth is its own column's.
+OWN_COLUMN_SHARE = 0.25
 # Which columns' supports a distance's rod ends at: t1 = b1 b2, t2 = b2 b3, t3 = b3 b1, then u1 .. u6.
 _COLUMNS = ((0, 1), (1, 2), (2, 0), (0,), (0,), (1,), (1,), (2,), (2,))
 
@@ -52,7 +54,7 @@ class FrameComparatorGain(Cause):
 
 
 class FrameRodExpansion(Cause):
-    """Rods clipped to the columns grow as the columns are warm where the rods run: each by its own temperature."""
+    """The rods grow, each by its own temperature: that of the frame as a whole, and some of its own column's."""
 
     id, unit, most = "frame_rod_expansion", "ppm/K", 12.0
 
@@ -62,7 +64,8 @@ class FrameRodExpansion(Cause):
 
     def frame_seen(self, frame_mm: Floats, warm: WarmUp) -> Floats:
         columns_K = warm.columns_K.mean(axis=(1, 2))
-        rods_K = np.array([columns_K[list(ends)].mean() for ends in _COLUMNS])
+        own_K = np.array([columns_K[list(ends)].mean() for ends in _COLUMNS])
+        rods_K = columns_K.mean() + OWN_COLUMN_SHARE * (own_K - columns_K.mean())
         return np.asarray(frame_mm - self.strength * PPM * self._distances0_mm * rods_K)
 
 

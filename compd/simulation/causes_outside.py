@@ -9,8 +9,9 @@ from compd.simulation.closure import Floats
 from compd.simulation.mechanism import Mechanism
 from compd.simulation.weather import MIDDLE_HUMIDITY_pct, STANDARD_PRESSURE_hPa
 
-# A force field of a cable or magnet is stated at this distance from machine zero.
-STATED_AT_MM = 100.0
+# A cable comes taut this far from machine zero; its drag is stated this much farther.
+TAUT_AT_MM = 10.0
+STATED_AFTER_MM = 100.0
 
 
 class HumiditySwelling(Cause):
@@ -45,13 +46,13 @@ class AirPressure(Cause):
 
 
 class CableDrag(Cause):
-    """A cable that hangs from the wall tightens as the platform goes away along x, more than in proportion."""
+    """A cable from the wall hangs slack; it comes taut as the platform goes away along x, and drags at the tool."""
 
     id, unit, most, in_library, follows = "cable_drag", "um", 20.0, False, ("position",)
 
     def tool(self, now: Now) -> Floats:
-        away = max(0.0, 0.5 + float(now.tip_M[0] - self.machine.tip0_M[0]) / (2 * STATED_AT_MM))
-        return np.array([-self.strength * UM * away**3, 0.0, 0.3 * self.strength * UM * away**3])
+        away = max(0.0, float(now.tip_M[0] - self.machine.tip0_M[0]) - TAUT_AT_MM) / STATED_AFTER_MM
+        return self.strength * UM * away * np.array([-1.0, 0.0, 0.3])
 
 
 class CollisionStep(Cause):

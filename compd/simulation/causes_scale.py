@@ -70,8 +70,8 @@ class ScaleCyclic(Cause):
 
     def link_mm(self, now: Now) -> Floats:
         phase = 2 * np.pi * now.scale_mm / self._period_mm
-        cosine = np.cos(phase) + self._offsets[0]
-        sine = (1 + self._unequal) * np.sin(phase + self._skew_rad) + self._offsets[1]
+        cosine = np.cos(phase - self._skew_rad / 2) + self._offsets[0]
+        sine = (1 + self._unequal) * np.sin(phase + self._skew_rad / 2) + self._offsets[1]
         shown = np.arctan2(sine, cosine)
         wrong_rad = (shown - phase + np.pi) % (2 * np.pi) - np.pi
         return np.asarray(-wrong_rad * self._period_mm / (2 * np.pi))

@@ -1,13 +1,14 @@
 """The simulated machine's own controller panel: one JSON object per line on a Unix socket.
 
     {"class": "TRUTH"}                                where the tip truly is, and what the machine does
+    {"class": "MEASURE"}                              what a laser tracker shows of the tip, with its noise
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
     {"class": "TOUR"}                                 go on visiting points
     {"class": "TIP_FOR", "scale_mm": [..]}            where the tip would be, were the scales there now
     {"class": "LOAD", "force_M_N": [x, y, z]}         load on the tool's tip
     {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null mends it
 
-Every request gets one answer: TRUTH, TIP, or ERROR with code and text.
+Every request gets one answer: TRUTH, MEASURED, TIP, or ERROR with code and text.
 """
 
 from __future__ import annotations

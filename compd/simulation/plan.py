@@ -22,6 +22,7 @@ PASSES_PER_SESSION = 3
 PASS_MM = 24.0
 PASS_SPEEDS_MM_PER_S = (2.0, 5.0, 10.0, 20.0)
 PASS_ROWS = 4
+PASS_ROW_EVERY_S = 0.2
 VISIT_S = 25.0
 REPEAT_AFTER_S = 2.0
 REPEAT_SHARE = 0.25
@@ -32,7 +33,7 @@ LOADED_SHARE = 0.45
 # Loads on the tip, N: sideways either way, down and a little up.
 LOAD_LOW_N, LOAD_HIGH_N = np.array([-30.0, -30.0, -60.0]), np.array([30.0, 30.0, 10.0])
 # Upper ends of the heat that is drawn: drives at work, electronics, cabinet, a spindle, sun and lamps; W.
-DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 5.0, 40.0, 25.0, 4.0, 0.2, 60.0
+DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0, 0.2, 60.0
 
 OFF = Heat(np.zeros(1), 0.0, np.zeros(COLUMNS), 0.0, 0.0, 0.0)
 

@@ -15,6 +15,7 @@ from compd.configuration import Configuration
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.control import Answer, ControlSocket, Handler
 from compd.simulation.daemon_configuration import Port, daemon_configuration, daemon_path
+from compd.simulation.instruments import TRACKER_SIGMA_UM, noisy
 from compd.simulation.sensing import Sensing
 from compd.simulation.wire import SimulatedLine
 from compd.simulation.world import World
@@ -22,6 +23,8 @@ from compd.simulation.world import World
 # The world moves on this often: far below the 25 ms in which the fastest scale display answers.
 STEP_S = 0.02
 CONTROL_SOCKET = "control.sock"
+# The tracker's noise is its own, whatever the machine does.
+TRACKER_SEED = 17
 
 
 class Simulation:
@@ -39,6 +42,7 @@ class Simulation:
         self.directory = directory
         self.ports: Mapping[str, Port] = {}
         self._clock = clock
+        self._tracker_rng = np.random.default_rng(TRACKER_SEED)
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="world", daemon=True)
@@ -59,6 +63,7 @@ class Simulation:
         }
         self._handlers: Mapping[str, Handler] = {
             "TRUTH": lambda _: self.truth(),
+            "MEASURE": lambda _: self.measure(),
             "DRIVE": self._drive,
             "TOUR": self._tour,
             "TIP_FOR": self._tip_for,
@@ -120,6 +125,25 @@ class Simulation:
                 "tip_frame": world.tip_frame,
                 "tip_mm": tip_mm.tolist(),
                 "scale_mm": world.scale_mm.tolist(),
+            }
+
+    def measure(self) -> Answer:
+        """What a laser tracker on the surface plate shows of the tip now: the MEASURED message.
+
+        `monotonic_s`: on the clock by which the gauges' readings are stamped too.
+        """
+        with self._lock:
+            world = self.world
+            shown_mm = noisy(world.shown_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
+            return {
+                "class": "MEASURED",
+                "instrument": "laser tracker",
+                "time_s": round(world.time_s, 6),
+                "monotonic_s": self._clock.monotonic(),
+                "moving": world.phase == "moving",
+                "tip_frame": world.tip_frame,
+                "reference_mm": [round(value, 6) for value in shown_mm.tolist()],
+                "sigma_um": TRACKER_SIGMA_UM,
             }
 
     def _drive(self, message: Mapping[str, Any]) -> Answer:
