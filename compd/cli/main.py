@@ -23,6 +23,7 @@ from compd.cli.recording import recording
 from compd.cli.replay import replay
 from compd.cli.run import run
 from compd.cli.simulate import simulate
+from compd.cli.tracker import tracker
 from compd.cli.watch import watch
 from compd.cli.zero import zero
 
@@ -47,7 +48,7 @@ def _options(
     """Live error compensation for parallel kinematic machines: joints, links and frame."""
 
 
-for command in (demo, check, simulate, campaign, run, watch, zero, record, replay, join, compare, ledger):
+for command in (demo, check, simulate, tracker, campaign, run, watch, zero, record, replay, join, compare, ledger):
     app.command()(command)
 for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
     effect.command()(change)
