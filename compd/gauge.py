@@ -143,6 +143,10 @@ class GaugeOptions(BaseModel):
         default=None, gt=0, allow_inf_nan=False,
         description="a reading older than this is stale; the loop's own stale_after_s if left out",
     )  # fmt: skip
+    noise_um: float | None = Field(
+        default=None, gt=0, allow_inf_nan=False,
+        description="standard deviation of one reading of a length, um; where it is missing nobody knows the tip's",
+    )  # fmt: skip
 
 
 LineT = TypeVar("LineT", ByteLine, RegisterLine)

@@ -303,6 +303,8 @@ def test_an_unusable_thermometer_is_nan_and_stops_nothing(tripod):
     tripod.settle()
     tripod.faults["cabinet.room"] = Quality.SENSOR_FAULT
     assert tripod.step().state is State.OK
-    found = tripod.wires.quantities(tripod.latest.snapshot(tripod.now_s))
-    assert math.isnan(found["temperature_room_degC"])
-    assert found["temperature_link_1_degC"] == 20.0
+    wires = tripod.wires.quantity_wires(["temperature_room_degC", "temperature_link_1_degC"])
+    found = wires.read(tripod.latest.snapshot(tripod.now_s), np.zeros(2))
+    assert math.isnan(found.change_mm[0])
+    assert found.change_mm[1] == 20.0
+    assert "temperature_room_degC (cabinet.room): sensor_fault" in found.lost

@@ -63,8 +63,8 @@ class Configuration:
 
     @property
     def zero_hash(self) -> str:
-        """Of what machine zero depends on: geometry, gauges and wiring, but no port, rate or limit."""
-        return _hash(self, ("machine", "geometry", "gauges", "wiring"))
+        """Of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
+        return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))
 
 
 def load(path: Path) -> Configuration:
@@ -193,11 +193,13 @@ def _line_number(where: str) -> int:
     return int(head[1]) if len(head) == 2 and head[1].isdigit() else 0
 
 
-def _hash(configuration: Configuration, fields: tuple[str, ...]) -> str:
+def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            return value.model_dump(mode="json")
-        return {k: plain(v) for k, v in value.items()} if isinstance(value, Mapping) else value
+            value = value.model_dump(mode="json")
+        if isinstance(value, Mapping):
+            return {k: plain(v) for k, v in value.items() if k not in without}
+        return [plain(v) for v in value] if isinstance(value, list) else value
 
     text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

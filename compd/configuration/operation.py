@@ -48,6 +48,7 @@ class QuantityWire(Section):
         description="name with its unit, as a recording's column: temperature_link_1_degC"
     )
     gauge: GaugeChannel
+    noise: Positive | None = Field(default=None, description="standard deviation of one reading, in the name's unit")
 
 
 class Wiring(Section):
@@ -120,6 +121,9 @@ class Sockets(Section):
 
 
 class State(Section):
-    """What the daemon keeps across restarts."""
+    """What the daemon keeps across restarts, and what it starts with."""
 
     directory: str = Field(pattern=r"^/", description="absolute directory for machine zero")
+    model_file: str | None = Field(
+        default=None, pattern=r"^/", description="absolute path of the model file to start with; without: no effects"
+    )

@@ -8,17 +8,21 @@ from typing import Any, NamedTuple
 from compd.assembly import build_model
 from compd.configuration import Configuration
 from compd.gauge import Gauge
+from compd.live.certainty import declared_noise
 from compd.live.cycle import Cycle
+from compd.live.models import ModelShelf
 from compd.live.wiring import MachineWires
 from compd.readings import Latest
 
 
 class Chain(NamedTuple):
-    """Readings go into `latest`; `wires` say what they measure; `cycle` makes setpoints of its snapshots."""
+    """Readings go into `latest`; `wires` say what they measure; `cycle` makes setpoints of its snapshots, with the
+    models that `shelf` reads."""
 
     latest: Latest
     wires: MachineWires
     cycle: Cycle
+    shelf: ModelShelf
 
 
 def build_chain(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) -> Chain:
@@ -28,6 +32,6 @@ def build_chain(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) 
     model = build_model(configuration.geometry, configuration.wiring)
     cycle = Cycle(
         model, wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s,
-        configuration.geometry.link_length_mm,
+        configuration.geometry.link_length_mm, declared_noise(configuration),
     )  # fmt: skip
-    return Chain(latest, wires, cycle)
+    return Chain(latest, wires, cycle, ModelShelf(model, configuration.machine, wires))

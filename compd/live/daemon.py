@@ -14,8 +14,10 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.live.acquisition import Acquisition
+from compd.live.adopting import ModelAdopter
 from compd.live.chain import build_chain
 from compd.live.loop import Loop, Orders
+from compd.live.models import Models, ModelShelf
 from compd.live.notify import Notifier
 from compd.live.packets import PacketSender
 from compd.live.protocol import PROTOCOL, TargetKeys
@@ -43,8 +45,9 @@ class Daemon:
         self.configuration = configuration
         self._notifier = notifier or Notifier.from_environment()
         gauges = configuration.gauge_objects()
-        self.latest, self._wires, cycle = build_chain(configuration, gauges)
-        self.orders = Orders(self._zero_on_disk())
+        self.latest, self._wires, cycle, shelf = build_chain(configuration, gauges)
+        self.orders = Orders(self._zero_on_disk(), models=_first_models(configuration, shelf))
+        self._model_adopter = ModelAdopter(shelf, self.orders)
         by_line = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
@@ -77,7 +80,7 @@ class Daemon:
         )
         self._requests = Requests(
             version, keys, self.orders, report.message, self._zero_taker.take,
-            Transcript(self._wires, self.latest.channels),
+            Transcript(self._wires, self.latest.channels), self._model_adopter.take,
         )  # fmt: skip
         self._state: State | None = None
 
@@ -96,6 +99,7 @@ class Daemon:
         self._notifier.stopping()
         self.loop.stop()
         self._zero_taker.stop()
+        self._model_adopter.stop()
         self.publisher.stop()
         self.acquisition.stop()
         if self._packets is not None:
@@ -154,6 +158,16 @@ def run(configuration: Configuration) -> bool:
         )
     daemon.stop()
     return not healthy
+
+
+def _first_models(configuration: Configuration, shelf: ModelShelf) -> Models:
+    """Those of the configuration. Raises CompdError for a model file that cannot be used: it was asked for."""
+    file = configuration.state.model_file
+    if file is None:
+        return Models(shelf.bare)
+    model = shelf.read(Path(file))
+    _log.info("model", file=file, hash=model.hash, effects=[one.effect.id for one in model.machine.acting])
+    return Models(model)
 
 
 def _directory(configuration: Configuration) -> Path:

@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 from compd.compensation import WarmStart
 from compd.errors import StateError
+from compd.live.models import Models
 from compd.live.protocol import Target
 from compd.live.setpoint import Array
 from compd.live.stale import Comparators
 from compd.live.zero import MachineZero
+from compd.model.acting import Remembered
 from compd.readings import Snapshot
 
 
@@ -20,6 +22,8 @@ class Carried(NamedTuple):
     warm : where Newton starts. correction_mm (n) : the correction that stands, from which the next one slews.
     last_good : the newest complete set of comparators; None before the first.
     scales_seen : whether the scales have ever been good: lost ones are then `stop`, not `starting`.
+    shadow : what the shadow's effects remember.  adopting : the correction is on its way to a new model's.
+    u_tip_um (3) : the tip's standard uncertainty; None where it has not been computed.
     """
 
     zero: MachineZero | None
@@ -27,6 +31,9 @@ class Carried(NamedTuple):
     correction_mm: Array
     last_good: Comparators | None
     scales_seen: bool
+    shadow: Remembered = Remembered()
+    adopting: bool = False
+    u_tip_um: Array | None = None
 
 
 class Inputs(NamedTuple):
@@ -36,3 +43,4 @@ class Inputs(NamedTuple):
     zero: MachineZero | StateError
     target: Target | None
     carried: Carried
+    models: Models | None = None

@@ -14,6 +14,7 @@ from compd.clock import Clock
 from compd.configuration.operation import Loop as LoopSettings
 from compd.errors import StateError
 from compd.live import realtime
+from compd.live.models import Models
 from compd.live.notify import Notifier
 from compd.live.protocol import Target
 from compd.live.setpoint import Setpoint
@@ -30,10 +31,12 @@ class Orders:
 
     zero : written by whoever takes machine zero; StateError says why there is none.
     target : written by the publisher for the controller; None is CMM mode.
+    models : written by whoever adopts models; None is the machine without effects.
     """
 
     zero: MachineZero | StateError
     target: Target | None = None
+    models: Models | None = None
 
 
 class Computes(Protocol):

@@ -27,6 +27,7 @@ class ErrorCode(StrEnum):
     UNIX_ONLY = "unix_only"  # asked over TCP for what only the Unix socket allows
     BUSY = "busy"
     ZERO_REFUSED = "zero_refused"
+    MODEL_REFUSED = "model_refused"
     TOO_MANY_CLIENTS = "too_many_clients"
 
 
@@ -61,6 +62,14 @@ class Target:
 
     tip_mm: tuple[float, ...]
     rotation_B0_rad: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class ModelOrder:
+    """Which model file to adopt, or to run as a shadow; file "" is none."""
+
+    file: str
+    shadow: bool
 
 
 def line(message: Mapping[str, Any]) -> bytes:
@@ -108,6 +117,19 @@ def parse_target(message: Mapping[str, Any], keys: TargetKeys) -> Target:
     return Target(
         _vector(message[keys.tip], keys.tip), None if rotation is None else _vector(rotation, "rotation_B0_rad")
     )
+
+
+def parse_model(message: Mapping[str, Any]) -> ModelOrder | None:
+    """MODEL with an order; None for the bare question."""
+    _only(message, ("file", "shadow"))
+    if set(message) == {"class"}:
+        return None
+    file, shadow = message.get("file"), message.get("shadow", False)
+    if not isinstance(file, str) or not isinstance(shadow, bool):
+        raise ProtocolError(ErrorCode.BAD_MESSAGE, "needs file, a text (shadow: true or false)")
+    if file and not file.startswith("/"):
+        raise ProtocolError(ErrorCode.BAD_MESSAGE, f'file is {file[:200]!r}, allowed: an absolute path, or "" for none')
+    return ModelOrder(file, shadow)
 
 
 def parse_bare(message: Mapping[str, Any]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.live.chain import Chain, build_chain
 from compd.live.loop import Orders
+from compd.live.models import LiveModel, Models
 from compd.live.recording_part import CYCLES_SUFFIX, Message
 from compd.live.transcript import RecordedCycle, parse_readings
 
@@ -78,20 +79,28 @@ class Transcripts:
                 yield where, message
 
 
-def replay(configuration: Configuration, transcripts: Transcripts) -> Iterator[ReplayedCycle]:
+def replay(
+    configuration: Configuration, transcripts: Transcripts, model_files: Sequence[Path] = ()
+) -> Iterator[ReplayedCycle]:
     """Every recorded cycle, computed anew by the daemon's own cycle from what it computed from then.
 
-    Time is the recording's. Raises RecordingError for a damaged line, or readings of another machine.
+    `model_files`: those that were applied or ran as a shadow, in any order. Time is the recording's.
+    Raises RecordingError for a damaged line, readings of another machine or a model that is not given, StateError
+    for a model file that cannot be used.
     """
     chain = build_chain(configuration, configuration.gauge_objects())
+    models = {model.hash: model for model in map(chain.shelf.read, model_files)} | {"": chain.shelf.bare}
     for where, message in transcripts.cycles():
         recorded = _parsed(where, message, chain, configuration)
         inputs = recorded.inputs
+        applied = _model(where, message.get("model", ""), models)
+        shadow = _model(where, message["shadow"], models) if "shadow" in message else None
+        used = Models(applied, shadow)
         for slot, reading in enumerate(inputs.snapshot.readings):
             chain.latest.put(slot, reading)
-        chain.cycle.resume(inputs.carried)
+        chain.cycle.resume(inputs.carried, used)
         snapshot = chain.latest.snapshot(inputs.snapshot.time_s)
-        setpoint = chain.cycle.run(recorded.tick, snapshot, Orders(inputs.zero, inputs.target))
+        setpoint = chain.cycle.run(recorded.tick, snapshot, Orders(inputs.zero, inputs.target, used))
         yield ReplayedCycle(where, recorded.tick, recorded.setpoint_line, setpoint.to_json())
 
 
@@ -110,6 +119,15 @@ def _parsed(where: str, message: Message, chain: Chain, configuration: Configura
     except (KeyError, TypeError, ValueError) as error:
         raise _damaged(where, f"{type(error).__name__}: {error}") from error
     return recorded
+
+
+def _model(where: str, hash_: str, models: Mapping[str, LiveModel]) -> LiveModel:
+    if hash_ not in models:
+        raise RecordingError(
+            Problem(where, "was computed with a model file that is not given", hash_,
+                    ", ".join(filter(None, models)) or "none is given", "give it with `--model`")
+        )  # fmt: skip
+    return models[hash_]
 
 
 def _damaged(where: str, what: str) -> RecordingError:

@@ -1,4 +1,4 @@
-"""What clients ask for, and who may: watching, the controller role, status, machine zero."""
+"""What clients ask for, and who may: watching, the controller role, status, machine zero, models."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from typing import Any
 from compd.live.loop import Orders
 from compd.live.protocol import (
     ErrorCode,
+    ModelOrder,
     ProtocolError,
     TargetKeys,
     line,
     parse,
     parse_bare,
+    parse_model,
     parse_target,
     parse_watch,
 )
@@ -22,6 +24,7 @@ from compd.live.transcript import Transcript
 
 # Takes a function that answers the client later, from any thread. Raises ProtocolError (busy).
 TakeZero = Callable[[Callable[[bytes], None]], None]
+TakeModel = Callable[[ModelOrder, Callable[[bytes], None]], None]
 
 
 class Requests:
@@ -35,14 +38,19 @@ class Requests:
         status: Callable[[], Mapping[str, Any]],
         take_zero: TakeZero,
         transcript: Transcript | None = None,
+        take_model: TakeModel | None = None,
     ) -> None:
-        """`version`: the VERSION message; `status`: makes the STATUS message; `transcript`: READINGS messages."""
+        """`version`: the VERSION message; `status`: makes the STATUS message; `transcript`: READINGS messages.
+
+        `take_model`: adopts a model file, or runs it as a shadow.
+        """
         self.version = line(version)
         self._target_keys = target_keys
         self._orders = orders
         self._status = status
         self._take_zero = take_zero
         self._transcript = transcript
+        self._take_model = take_model
         self._controller: Session | None = None
 
     def answer(self, session: Session, data: bytes, later: Callable[[bytes], None]) -> bytes:
@@ -79,10 +87,12 @@ class Requests:
                     raise ProtocolError(ErrorCode.UNIX_ONLY, "machine zero is taken over the Unix socket only")
                 self._take_zero(later)
                 return b""
+            case "MODEL":
+                return self._model(session, message, later)
             case unknown:
                 raise ProtocolError(
                     ErrorCode.UNKNOWN_CLASS,
-                    f"class {unknown[:40]!r}, allowed: WATCH, TARGET, RELEASE, STATUS, VERSION, ZERO",
+                    f"class {unknown[:40]!r}, allowed: WATCH, TARGET, RELEASE, STATUS, VERSION, ZERO, MODEL",
                 )
 
     def _watch(self, session: Session, message: Mapping[str, Any]) -> bytes:
@@ -96,6 +106,17 @@ class Requests:
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         session.watch(rate_hz, self._transcript.line, MAX_READINGS_BEHIND_BYTES)
         return line(answer | {"columns": self._transcript.columns})
+
+    def _model(self, session: Session, message: Mapping[str, Any], later: Callable[[bytes], None]) -> bytes:
+        order = parse_model(message)
+        if not session.local or self._take_model is None:
+            # an order names a file of this computer, and so does the answer
+            raise ProtocolError(ErrorCode.UNIX_ONLY, "models are asked for and adopted over the Unix socket only")
+        if order is None:
+            models = self._orders.models
+            return line({"class": "MODEL", **({} if models is None else models.summary)})
+        self._take_model(order, later)
+        return b""
 
     def left(self, session: Session) -> None:
         """A client has gone or gives its role back: without a controller the mode is CMM."""

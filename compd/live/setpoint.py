@@ -48,6 +48,8 @@ _DECIMALS_MM = 7
 # 0.1 nrad on a 1 m lever is 0.1 nm.
 _DECIMALS_RAD = 10
 _DECIMALS_S = 6
+# An uncertainty is known to two digits.
+_DECIMALS_UM = 4
 
 # magic, version, size, seq, time, valid_until, age, flags, state, mode, links, 3 spare bytes, tip 3, frame
 # displacement 3, frame rotation 3, then link length, scale setpoint and correction for 6 links, configuration hash;
@@ -64,6 +66,20 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 _NO_NUMBERS = (math.nan,) * (9 + 3 * _LINKS)
 
 
+class Shadow(NamedTuple):
+    """What a model that is not applied asks for in the same cycle.
+
+    model : hash of its file.  reason : why it has no numbers; "" when it has.
+    correction_mm (n) before limits, tip_M_mm (3); tip_P_mm (3) with the tool on the plate.
+    """
+
+    model: str
+    reason: str
+    correction_mm: Array | None = None
+    tip_M_mm: Array | None = None
+    tip_P_mm: Array | None = None
+
+
 class Numbers(NamedTuple):
     """What a valid setpoint says; n links.
 
@@ -72,6 +88,8 @@ class Numbers(NamedTuple):
     frame_displacement_M_mm (3), frame_rotation_M_rad (3): displacement and rotation vector of {B} since machine zero.
     link_length_mm, scale_setpoint_mm, correction_mm (n): the correction is what is added to the command,
     after its limits. sources_mm: how much joints, frame and each effect ask for, before the limits.
+    u_tip_um (3): standard uncertainty of the tip in {M}, with the tool on the plate of the place in {P}; None unknown.
+    shadow: what another model asks for.
     """
 
     tip_M_mm: Array
@@ -84,6 +102,8 @@ class Numbers(NamedTuple):
     scale_setpoint_mm: Array
     correction_mm: Array
     sources_mm: Mapping[str, Array]
+    u_tip_um: Array | None = None
+    shadow: Shadow | None = None
 
 
 class Setpoint(NamedTuple):
@@ -95,6 +115,7 @@ class Setpoint(NamedTuple):
     reason : why the state is not ok; "" when it is.
     numbers : None unless valid, so that no number looks alive that is not.
     inputs : what it was computed from, for whoever watches the readings; no part of a SETPOINT message.
+    model : hash of the model file that was applied; "" without effects.
     """
 
     seq: int
@@ -106,6 +127,7 @@ class Setpoint(NamedTuple):
     mode: Mode
     numbers: Numbers | None
     inputs: Inputs | None = None
+    model: str = ""
 
     @property
     def valid(self) -> bool:
@@ -123,6 +145,8 @@ class Setpoint(NamedTuple):
             "valid_until": round(self.valid_until_s, _DECIMALS_S),
             "mode": self.mode,
         }
+        if self.model:
+            message["model"] = self.model
         if math.isfinite(self.age_s):
             message["age_s"] = round(self.age_s, _DECIMALS_S)
         if self.numbers is not None:
@@ -169,7 +193,7 @@ def _plain(numbers: Numbers) -> dict[str, Any]:
     frame = {"origin_M_mm": numbers.frame_origin_M_mm, "displacement_M_mm": numbers.frame_displacement_M_mm}
     # one call on one long array costs what one call on three numbers does
     plain = _rounded([*lengths.values(), *frame.values(), *numbers.sources_mm.values()])
-    return {
+    return _known(numbers) | {
         **dict(zip(lengths, plain, strict=False)),
         "frame": {
             **dict(zip(frame, plain, strict=False)),
@@ -177,6 +201,20 @@ def _plain(numbers: Numbers) -> dict[str, Any]:
         },
         "sources_mm": dict(zip(numbers.sources_mm, plain, strict=True)),
     }
+
+
+def _known(numbers: Numbers) -> dict[str, Any]:
+    """What not every machine has: the uncertainty, another model's correction."""
+    found: dict[str, Any] = {}
+    if numbers.u_tip_um is not None and math.isfinite(numbers.u_tip_um.sum()):
+        found["u_tip_um"] = numbers.u_tip_um.round(_DECIMALS_UM).tolist()
+    if numbers.shadow is not None:
+        parts = numbers.shadow._asdict().items()
+        found["shadow"] = {
+            name: part if isinstance(part, str) else part.round(_DECIMALS_MM).tolist()
+            for name, part in parts if part is not None
+        }  # fmt: skip
+    return found
 
 
 def _rounded(vectors: list[Array]) -> Iterator[list[float]]:

@@ -45,6 +45,7 @@ class StatusReport:
             "time_s": round(now_s, 6),
             "mode": "cmm" if self.orders.target is None else "machine_tool",
             "zero": self._zero(),
+            "model": {} if self.orders.models is None else self.orders.models.summary,
             "loop": self.loop.timing.summary(),
             "realtime": {name: granted._asdict() for name, granted in self.loop.permissions.items()},
             "publisher": published,

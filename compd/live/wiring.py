@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -133,12 +133,11 @@ class MachineWires:
         """ "" when every length gauge can be used; otherwise which cannot, and why."""
         return ", ".join(filter(None, (self.scale.lost(snapshot), self.comparators.lost(snapshot))))
 
-    def quantities(self, snapshot: Snapshot) -> Mapping[str, Array]:
-        """Temperatures, forces and the rest by name; nan where the reading is not good. They have no zero."""
-        now_s, readings = snapshot
-        found: dict[str, Array] = {}
-        for name, wire in self._quantities.items():
-            value, time_s, quality, _ = readings[wire.slot]
-            good = quality is Quality.OK and now_s - time_s <= wire.stale_after_s
-            found[name] = np.float64(value if good else math.nan)  # type: ignore[assignment]
-        return found
+    @property
+    def quantity_names(self) -> tuple[str, ...]:
+        """Temperatures, forces and the rest."""
+        return tuple(self._quantities)
+
+    def quantity_wires(self, names: Sequence[str]) -> Wires:
+        """The wires of some quantities, in this order. They have no zero. Raises KeyError for one not wired."""
+        return Wires([self._quantities[name] for name in names])

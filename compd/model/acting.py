@@ -6,7 +6,6 @@ One definition for a single snapshot and for N of them: a row's memory is what t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +19,8 @@ from compd.model.observe import Movement, rows_at
 from compd.model.prediction import Altered, altered
 from compd.model.rows import Motion, Rows, moved
 
+_NOTHING: Memories = {}
+
 
 class Remembered(NamedTuple):
     """What effects hand from one snapshot to the next; nothing in it is ever changed in place.
@@ -30,7 +31,7 @@ class Remembered(NamedTuple):
     """
 
     motion: Motion | None = None
-    memories: Memories = MappingProxyType({})
+    memories: Memories = _NOTHING
     commanded: bool = False
 
 
@@ -94,6 +95,17 @@ def act(model: MachineModel, sight: Sight, before: Remembered, commanded: bool) 
         added = {port: values[:, 0] for port, values in added.items()}
     machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame.supports_M_mm)
     return machine, after._replace(memories=memories)
+
+
+def kept(remembered: Remembered, old: MachineModel, new: MachineModel) -> Remembered:
+    """What of it holds for another model: the motion, and what the very same effects left with the same constants."""
+    before = {one.effect.id: one for one in old.acting}
+    memories = {
+        name: remembered.memories[name]
+        for name, one in ((one.effect.id, one) for one in new.acting)
+        if name in remembered.memories and before[name].effect is one.effect and before[name].shape == one.shape
+    }
+    return remembered._replace(memories=memories)
 
 
 def one_after_another(each: Sequence[Deltas]) -> Deltas:

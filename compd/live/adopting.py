@@ -1,0 +1,58 @@
+"""Adopting a model file, or running it as a shadow: read and tried on a thread of its own, then handed to the loop."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import structlog
+
+from compd.errors import CompdError
+from compd.live.loop import Orders
+from compd.live.models import LiveModel, Models, ModelShelf
+from compd.live.protocol import ErrorCode, ModelOrder, ProtocolError, line
+
+_log = structlog.get_logger()
+
+
+class ModelAdopter:
+    """Takes one order at a time, and is the only writer of `orders.models`: neither loop nor publisher waits."""
+
+    def __init__(self, shelf: ModelShelf, orders: Orders) -> None:
+        self._shelf = shelf
+        self._orders = orders
+        self._thread: threading.Thread | None = None
+
+    def take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
+        """Start; `answer` gets the MODEL or ERROR line when it is done. Raises ProtocolError while one is running."""
+        if self._thread is not None and self._thread.is_alive():
+            raise ProtocolError(ErrorCode.BUSY, "another model is being read")
+        self._thread = threading.Thread(target=self._take, args=(order, answer), name="model", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Returns when the thread has ended."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
+        try:
+            model = self._shelf.read(Path(order.file)) if order.file else None
+        except CompdError as error:
+            _log.warning("model refused", file=order.file, reason=str(error))
+            answer(ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json())
+            return
+        models = self._changed(order, model)
+        self._orders.models = models
+        _log.info("shadow" if order.shadow else "model adopted", file=order.file or "none")
+        answer(line({"class": "MODEL", **models.summary}))
+
+    def _changed(self, order: ModelOrder, model: LiveModel | None) -> Models:
+        applied, shadow = self._orders.models or Models(self._shelf.bare)
+        if order.shadow:
+            return Models(applied, model)
+        if model is not None and shadow is not None and model.hash == shadow.hash:
+            # the very object that ran as a shadow: its effects keep what they remember
+            return Models(shadow)
+        return Models(model or self._shelf.bare, shadow)

@@ -1,0 +1,80 @@
+"""How sure the live tip is: gauges' declared noise and fitted numbers' errors, to first order (GUM, 5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.model.effect import Deltas, Memories, Port, deltas, together
+from compd.model.jit import Floats
+from compd.model.machine import MachineModel
+from compd.model.prediction import Sensitivity, columns, sensitivities
+from compd.model.rows import Rows
+
+
+class GaugeNoise(NamedTuple):
+    """Standard deviation of one reading: scale_mm (n,), joint_mm (k,), frame_mm (9,); quantities in their own unit.
+
+    A quantity that is not named has a noise that is not known.
+    """
+
+    scale_mm: Floats
+    joint_mm: Floats
+    frame_mm: Floats
+    quantities: Mapping[str, float]
+
+
+def tip_uncertainty_mm(model: MachineModel, rows: Rows, noise: GaugeNoise, memories: Memories) -> Floats:
+    """Standard uncertainty of the tip (N, 3): in {M}, with the tool on the plate of the touched place in {P}.
+
+    Errors of different gauges have nothing to do with each other; those of fitted numbers have the model's covariance.
+    How an effect at the scales' port changes with their noise is left out: at most a few per cent of that noise.
+    nan where a fitted number's error or a needed quantity's noise is not known.
+    """
+    readings: tuple[tuple[Port, Floats], ...] = (
+        ("scale", noise.scale_mm), ("joint", noise.joint_mm), ("frame", noise.frame_mm)
+    )  # fmt: skip
+    ports = {port for one in model.acting for port in one.effect.ports}
+    by = sensitivities(model, rows, {*ports, "scale", "joint", "frame"})
+    variance = sum(((by[port].tip ** 2) @ sigma_mm**2 for port, sigma_mm in readings), start=np.zeros((len(rows), 3)))
+    variance = variance + _by_parameters(model, rows, by, memories)
+    for name in rows.quantities:
+        variance = variance + _by_quantity(model, rows, by, memories, name, noise.quantities.get(name, np.nan)) ** 2
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _by_parameters(model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivity], memories: Memories) -> Floats:
+    """(N, 3) variance, mm2, by the errors of the numbers of the effects that act."""
+    parts: list[Floats] = []
+    used: list[int] = []
+    begin = 0
+    for one in model.effects:
+        end = begin + len(one.theta)
+        if one.effect.live:
+            basis, _ = one.effect.basis(rows, one.shape, memories.get(one.effect.id))
+            parts.append(columns(one.effect, rows, basis, by).tip)
+            used += range(begin, end)
+        begin = end
+    if not parts:
+        return np.zeros((len(rows), 3))
+    G = np.concatenate(parts, axis=2)
+    covariance = model.covariance[np.ix_(used, used)] if len(model.covariance) else np.full((len(used),) * 2, np.nan)
+    return np.asarray((G @ covariance * G).sum(axis=2))
+
+
+def _by_quantity(
+    model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
+) -> Floats:
+    """(N, 3) by how many mm the tip moves when one quantity shows more by its standard deviation."""
+    more = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
+    before, after = (_added(model, seen, memories) for seen in (rows, more))
+    moved = (by[port].tip @ (after[port] - before[port])[:, :, None] for port in after)
+    return np.asarray(sum(moved, start=np.zeros((len(rows), 3, 1)))[:, :, 0])
+
+
+def _added(model: MachineModel, rows: Rows, memories: Memories) -> Deltas:
+    each, _ = deltas(model.acting, rows, memories)
+    return together(list(each.values()))
