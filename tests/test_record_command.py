@@ -171,6 +171,19 @@ def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, ca
 
 
 @pytest.mark.usefixtures("drifting")
+def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_nothing(tmp_path):
+    with daemon_at(tmp_path) as (_, daemon, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
+        lines = slow.readings()
+        next(lines)
+        seqs = [next(lines)[1]["seq"]]
+        newest = [setpoint["seq"] for _, setpoint in zip(range(200), client.watch(), strict=False)][-1]
+        while seqs[-1] < newest:
+            seqs.append(next(lines)[1]["seq"])
+        assert newest - seqs[0] + 1 - len(seqs) <= client.status()["loop"]["missed_cycles"]
+        assert daemon.publisher.dropped_clients == 0
+
+
+@pytest.mark.usefixtures("drifting")
 def test_readings_are_for_the_unix_socket_and_say_what_went_into_the_setpoint(tmp_path):
     with daemon_at(tmp_path) as (_, daemon, client):
         with (

@@ -11,16 +11,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from compd.compensation import WarmStart
 from compd.configuration.crosscheck import DISTANCES
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading
 from compd.live.inputs import Carried, Inputs
 from compd.live.protocol import Target, line
 from compd.live.setpoint import Setpoint
-from compd.live.stale import Comparators
+from compd.live.state_json import from_plain, to_plain
 from compd.live.wiring import MachineWires
 from compd.live.zero import MachineZero
 from compd.readings import Snapshot
@@ -58,6 +55,8 @@ class Transcript:
             message["no_zero"] = {"where": problem.where, "what": problem.what, "next_step": problem.next_step}
         if inputs.target is not None:
             message["target"] = _target(inputs.target)
+        if inputs.models is not None:
+            message |= inputs.models.hashes
         message["carried"] = _carried(inputs)
         return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
 
@@ -121,26 +120,12 @@ def _target(target: Target) -> dict[str, Any]:
     return found
 
 
-def _carried(inputs: Inputs) -> dict[str, Any]:
+def _carried(inputs: Inputs) -> Any:
     """What was carried over; of its zero only whether it is this cycle's, since of another nothing is used."""
     carried = inputs.carried
-    found: dict[str, Any] = {
-        "same_zero": carried.zero is inputs.zero,
-        "supports_M_mm": carried.warm.supports_M_mm.tolist(),
-        "origin_M_mm": carried.warm.origin_M_mm.tolist(),
-        "rotation_M_P": carried.warm.rotation_M_P.tolist(),
-        "correction_mm": carried.correction_mm.tolist(),
-        "scales_seen": carried.scales_seen,
-    }
-    if carried.last_good is not None:
-        good = carried.last_good
-        found["last_good"] = {"change_mm": good.change_mm.tolist(), "time_s": good.time_s, "oldest_s": good.oldest_s}
-    return found
+    return to_plain(carried._replace(zero=None)) | {"zero": carried.zero is inputs.zero}
 
 
 def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> Carried:
-    warm = WarmStart(np.array(data["supports_M_mm"]), np.array(data["origin_M_mm"]), np.array(data["rotation_M_P"]))
-    good = data.get("last_good")
-    last_good = None if good is None else Comparators(np.array(good["change_mm"]), good["time_s"], good["oldest_s"])
-    same = zero if data["same_zero"] and isinstance(zero, MachineZero) else None
-    return Carried(same, warm, np.array(data["correction_mm"]), last_good, data["scales_seen"])
+    carried: Carried = from_plain(data)
+    return carried._replace(zero=zero if carried.zero and isinstance(zero, MachineZero) else None)
