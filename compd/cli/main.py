@@ -18,6 +18,7 @@ from compd.cli.effect import effect
 from compd.cli.gauge import app as gauge
 from compd.cli.join import join
 from compd.cli.ledger import ledger
+from compd.cli.paper import app as paper
 from compd.cli.record import record
 from compd.cli.recording import recording
 from compd.cli.replay import replay
@@ -52,5 +53,6 @@ for command in (demo, check, simulate, tracker, campaign, run, watch, zero, reco
     app.command()(command)
 for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
     effect.command()(change)
-for name, group in (("gauge", gauge), ("driver", driver), ("effect", effect), ("recording", recording)):
+GROUPS = {"gauge": gauge, "driver": driver, "effect": effect, "recording": recording, "paper": paper}
+for name, group in GROUPS.items():
     app.add_typer(group, name=name)

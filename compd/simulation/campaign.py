@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
@@ -14,10 +13,10 @@ from compd.simulation.apparent import Apparent
 from compd.simulation.cause import Cause
 from compd.simulation.closure import Floats, Posture
 from compd.simulation.instruments import Kind, noisy
-from compd.simulation.mechanism import Mechanism
 from compd.simulation.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.plan import PASS_MM, PASS_ROW_EVERY_S, PASS_ROWS, REPEAT_AFTER_S, VISIT_S, Item, Plan
 from compd.simulation.strengths import Strengths
+from compd.simulation.touch import TOUCH_STEP_S, approach, posture_at_scales
 from compd.simulation.world import World
 
 # Between sessions time passes in steps, for causes that remember.
@@ -65,7 +64,7 @@ class Campaign:
         self._balls_M = balls_M
         self._direction = np.ones(self._mechanism.links)
         self._apparent = Apparent(self._mechanism, wiring) if sigma_um == 0 else None
-        self._postures = [_posture(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
+        self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
         self._rows = Rows()
 
@@ -100,24 +99,15 @@ class Campaign:
         guess = self._postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
         if self._balls_M is not None:
-            self._touch(self._balls_M[item.point - 1], guess)
+            ball_M = noisy(self._balls_M[item.point - 1], self._sigma_um, self._rng, self._outlier_share)
+            for scale_mm in approach(self._world, ball_M, guess):
+                self._move(scale_mm, guess, TOUCH_STEP_S)
 
     def _move(self, scale_mm: Floats, guess: Posture, time_s: float) -> None:
         moved = scale_mm - self._world.scale_mm
         self._direction = np.where(moved != 0, np.sign(moved), self._direction)
         travel_s = Move(self._world.scale_mm, scale_mm).duration_s
         self._world.carry(scale_mm, guess, max(time_s, travel_s), travel_s)
-
-    def _touch(self, ball_M: Floats, guess: Posture) -> None:
-        """Feel the way to a ball: the links are moved until the instrument's place and the ball's are one."""
-        ball_M = noisy(ball_M, self._sigma_um, self._rng, self._outlier_share)
-        turned = _turn_rad(self._mechanism, guess)
-        for _ in range(3):
-            wrong = self._world.shown_mm() - ball_M
-            aim = self._mechanism.posture_at(ball_M - wrong, turned)
-            here = self._mechanism.posture_at(ball_M, turned)
-            step = self._mechanism.lengths(aim) - self._mechanism.lengths(here)
-            self._move(self._world.scale_mm + step, guess, 0.5)
 
     def _pass(self, item: Item) -> None:
         """Out towards another point and half the way back, with rows at rest and at constant speed."""
@@ -174,17 +164,3 @@ class Campaign:
             return {f"reference_link_{i + 1}_mm": round(value, 6) for i, value in enumerate(changes.tolist())}
         tip = noisy(self._world.shown_mm(), self._sigma_um, self._rng, self._outlier_share)
         return {f"reference_{axis}_mm": round(value, 6) for axis, value in zip("xyz", tip.tolist(), strict=True)}
-
-
-def _posture(mechanism: Mechanism, scale_mm: Floats) -> Posture:
-    """The drawing's posture at scale values, in small steps from machine zero."""
-    posture = mechanism.posture0
-    for share in np.linspace(0.0, 1.0, 9)[1:]:
-        lengths_mm = mechanism.lengths0_mm + share * scale_mm
-        posture = mechanism.closure.by_lengths(mechanism.joints0_M, mechanism.joints_P, lengths_mm, posture)
-    return posture
-
-
-def _turn_rad(mechanism: Mechanism, posture: Posture) -> Floats:
-    """(3,) rotation vector in {M} from the attitude at machine zero."""
-    return np.asarray(Rotation.from_matrix((mechanism.posture0[1:].T @ posture[1:]).T).as_rotvec())

@@ -26,7 +26,8 @@ class Settled:
     """The machine in equilibrium at one instant; mm, N.
 
     link_mm : (n,) true distances of each link's joint centres, as equation (1) means them.
-    shown_M : (3,) where a reference instrument without noise shows the tip; in {P} with the tool on the plate.
+    axial_N : (n,) link forces beyond those at machine zero, tension positive.
+    shown : (3,) where a reference instrument without noise shows the tip; in {P} with the tool on the plate.
     """
 
     scale_mm: Floats
@@ -35,6 +36,7 @@ class Settled:
     plate_M: Floats
     balls: Balls
     link_mm: Floats
+    axial_N: Floats
     tip_M: Floats
     tip_P: Floats
     shown: Floats
@@ -107,7 +109,7 @@ class Equilibrium:
         tip_M, tip_P = self._tip(posture, _sum((cause.tool(now) for cause in causes), 3))
         shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum((cause.reference(now) for cause in causes), 3)
         plate_M = self._frame.plate_M(warm)
-        return Settled(scale_mm, posture, supports_M, plate_M, balls, link_mm, tip_M, tip_P, shown)
+        return Settled(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
 
     def _tip(self, posture: Posture, displaced: Floats | float = 0.0) -> tuple[Floats, Floats]:
         """The tip in {M} and in {P}."""

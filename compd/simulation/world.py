@@ -157,6 +157,10 @@ class World:
         """(n,) by which the true distances of each link's joints have changed since machine zero."""
         return self._settled.link_mm - self._mechanism.lengths0_mm
 
+    def axial_N(self) -> Floats:
+        """(n,) link forces beyond those at machine zero, tension positive."""
+        return self._settled.axial_N
+
     @property
     def mechanism(self) -> Mechanism:
         return self._mechanism

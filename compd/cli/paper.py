@@ -1,0 +1,101 @@
+"""`compd paper`: the paper's experiments again, on the simulated machine; nothing is tuned to hit its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from compd.cli.paper_reading import Reduction
+    from compd.workbench.page import Panel
+
+Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")]
+Seed = Annotated[int, typer.Option(min=0, help="Joints, weather and noise follow from it.")]
+
+app = typer.Typer(
+    no_args_is_help=True, help="The paper's experiments (T. Oiwa, figures 18, 20, 21) on the simulated machine."
+)
+
+_FOOTER = (
+    "Simulated machine with joints, frame and weather of its usual strengths; it shares no code with the model that "
+    "reads its gauges. The paper: T. Oiwa, Accuracy improvement of parallel kinematic machine."
+)
+
+
+@app.command()
+def fig18(
+    config: Config = None,
+    page: Annotated[Path, typer.Option(help="Where the page with the picture goes.")] = Path("out/fig18.html"),
+    seed: Seed = 1,
+) -> None:
+    """One link under load and temperature: scale against laser interferometer, compensated or not."""
+    from compd.cli import paper_link
+    from compd.configuration import load
+
+    experiment = paper_link.run(load(_machine(config)), seed)
+    _tell(page, "Figure 18: scale unit against laser interferometer", paper_link.reductions(experiment),
+          paper_link.panels(experiment))  # fmt: skip
+
+
+@app.command()
+def fig20(
+    config: Config = None,
+    page: Annotated[Path, typer.Option(help="Where the page with the picture goes.")] = Path("out/fig20.html"),
+    seed: Seed = 1,
+) -> None:
+    """Distances between the 17 balls of a 3D ball plate, joints compensated or not."""
+    from compd.cli import paper_plate
+    from compd.configuration import load
+
+    experiment = paper_plate.run(load(_machine(config)), seed)
+    _tell(page, "Figure 20: distances between the balls of a 3D ball plate", paper_plate.reductions(experiment),
+          paper_plate.panels(experiment))  # fmt: skip
+
+
+@app.command()
+def fig21(
+    config: Config = None,
+    page: Annotated[Path, typer.Option(help="Where the page with the picture goes.")] = Path("out/fig21.html"),
+    seed: Seed = 1,
+) -> None:
+    """A reference ball on the surface plate, measured again and again while the machine warms up."""
+    from compd.cli import paper_drift
+    from compd.configuration import load
+
+    experiment = paper_drift.run(load(_machine(config)), seed)
+    _tell(page, "Figure 21: a ball on the surface plate during warm-up", paper_drift.reductions(experiment),
+          paper_drift.panels(experiment))  # fmt: skip
+
+
+def _machine(config: Path | None) -> Path:
+    from compd.shipped import shipped_configuration
+
+    return config or shipped_configuration("tripod-cmm.yaml")
+
+
+def _tell(page: Path, title: str, reductions: Sequence[Reduction], panels: Sequence[Panel]) -> None:
+    """The table on the terminal, and the same with the picture on a page."""
+    from rich.console import Console
+    from rich.table import Table as TerminalTable
+
+    from compd.cli.paper_reading import HEAD, row
+    from compd.workbench.page import Panel, Table, write_page
+
+    table = TerminalTable(*HEAD, title=title, title_justify="left")
+    for reduction in reductions:
+        table.add_row(*row(reduction))
+    console = Console()
+    console.print(table)
+    first = reductions[0]
+    verdict = (
+        f"{first.what}: {first.without_um:.2f} um without compensation, {first.with_um:.2f} um with it, "
+        f"{first.percent:.0f} % less. The paper: {first.paper}."
+    )
+    page.parent.mkdir(parents=True, exist_ok=True)
+    numbers = Panel("In numbers", "What was measured here, beside what the paper states.",
+                    Table(HEAD, [row(reduction) for reduction in reductions]))  # fmt: skip
+    write_page(page, title, verdict, [*panels, numbers], _FOOTER)
+    console.print(f"The same as a picture: {page}")
