@@ -53,6 +53,7 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.bench_loop
 	$(BIN)/python -m tests.benchmarks.bench_latency
 	$(BIN)/python -m tests.benchmarks.bench_throughput
+	$(BIN)/python -m tests.benchmarks.bench_compare
 
 # More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
 scoreboard: $(STAMP)
