@@ -77,9 +77,9 @@ def panels(found: Distances) -> list[Panel]:
                            marker={"color": COLOURS[colour], "symbol": symbol, "size": 7})  # fmt: skip
     figure.add_hline(y=0, line={"color": COLOURS["quiet"], "width": 1})
     return [
-        Panel("Deflection of measured distances", "One dot for each of the 136 pairs of balls, measured less certified. Here the joints are most of the error; "
-              "the paper's machine kept errors of its geometry, which no comparator sees, and so gained less.",
-              styled(figure, "distance between balls, mm", "deflection, um", 440)),
+        Panel("Deflection of measured distances", "One dot for each of the 136 pairs of balls, measured less certified. "
+              "How much is gained depends on how much of the error is the joints'; of the paper's machine it is not "
+              "known.", styled(figure, "distance between balls, mm", "deflection, um", 440)),
     ]  # fmt: skip
 
 
