@@ -33,8 +33,11 @@ def simulate(
     ] = 60.0,
     seconds: Annotated[float | None, typer.Option(min=0, help="Stop after so many seconds.")] = None,
     hidden: Annotated[
-        int | None,
-        typer.Option(min=0, help="Hide a cause that follows from this number, in a machine whose gauges see all else."),
+        list[int] | None,
+        typer.Option(
+            min=0,
+            help="Hide a cause that follows from this number, in a machine whose gauges see all else; again for two.",
+        ),
     ] = None,
 ) -> None:
     """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol."""
@@ -55,7 +58,7 @@ def simulate(
     from compd.simulation.world import World
 
     configuration = load(config)
-    hid = [] if hidden is None else [_hidden(configuration, seed, hidden)]
+    hid = [_hidden(configuration, seed, number) for number in hidden or ()]
     world = World(
         configuration.geometry, configuration.wiring, seed, speedup, zero_hold,
         strengths=SEEN if hid else None, causes=[one.cause for one in hid],

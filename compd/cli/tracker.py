@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -16,16 +17,14 @@ _REST_S = 0.5
 def tracker(
     simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in.")],
     out: Annotated[Path, typer.Option(help="The export, a CSV for `compd join`.")],
-    seconds: Annotated[float, typer.Option(min=1, help="How long it looks.")] = 90.0,
-    rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Looks per second.")] = 10.0,
+    seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
+    rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Looks per second.")] = 20.0,
 ) -> None:
     """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
 
     Its clock begins at 0, as a real one's does: `compd join` finds the offset from the motion.
     """
     import numpy as np
-    from rich.console import Console
-    from rich.progress import track
 
     from compd.cli.demo_session import MachineController
     from compd.client import connect
@@ -33,27 +32,32 @@ def tracker(
 
     if not out.parent.is_dir():
         raise CompdError(Problem(str(out), "its directory does not exist", str(out.parent), next_step="make it"))
-    console = Console(highlight=False)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     looks, apart_mm, at_rest = [], [], 0
     with (
         MachineController(simulation / "control.sock") as machine,
         connect(simulation / "compd.sock", _ANSWER_TIMEOUT_S) as daemon,
     ):
-        setpoints = daemon.watch(rate_hz)
-        for _ in track(range(round(seconds * rate_hz)), "the tracker looks", console=console, transient=True):
-            setpoint, seen = next(setpoints), machine.ask("MEASURE")
-            looks.append([seen["monotonic_s"], *seen["reference_mm"]])
-            at_rest = 0 if seen["moving"] else at_rest + 1
-            if at_rest > _REST_S * rate_hz and setpoint["valid"] and seen["tip_frame"] == "M":
-                apart_mm.append(np.subtract(setpoint["tip_M_mm"], seen["reference_mm"]))
+        typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")
+        try:
+            for setpoint in daemon.watch(rate_hz):
+                seen = machine.ask("MEASURE")
+                looks.append([seen["monotonic_s"], *seen["reference_mm"]])
+                at_rest = 0 if seen["moving"] else at_rest + 1
+                if at_rest > _REST_S * rate_hz and setpoint["valid"] and seen["tip_frame"] == "M":
+                    apart_mm.append(np.subtract(setpoint["tip_M_mm"], seen["reference_mm"]))
+                if seconds is not None and seen["monotonic_s"] - looks[0][0] >= seconds:
+                    break
+        except KeyboardInterrupt:
+            pass  # the usual end
     table = np.array(looks)
     table[:, 0] -= table[0, 0]
     lines = [",".join(f"{value:.6f}" for value in row) for row in table]
     out.write_text("\n".join(["time_s,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
-    console.print(f"{out}: {len(looks)} looks in {table[-1, 0]:.0f} s", soft_wrap=True)
+    typer.echo(f"{len(looks)} looks in {table[-1, 0]:.0f} s")
     if apart_mm:
         rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * _UM_PER_MM
-        console.print(
-            f"At rest the daemon's tip and the tracker's differ by {rms_um:.2f} um, rms per coordinate "
-            f"({len(apart_mm)} looks; the tracker's own noise is {seen['sigma_um']:g} um)."
+        typer.echo(
+            f"at rest the daemon's tip and the tracker's differ by {rms_um:.2f} um, rms per coordinate; "
+            f"{seen['sigma_um']:g} um of it is the tracker's own noise"
         )
