@@ -121,6 +121,15 @@ class Client:
         """
         return self._ask({"class": "ZERO"}, "ZERO")
 
+    def model(self, file: str | None = None, shadow: bool = False) -> Message:
+        """The models that the daemon runs with, as it tells them (Unix socket only).
+
+        file : a model file to adopt first, or to run as a shadow; an absolute path on the daemon's computer, "" for
+        none. Raises DaemonError where the daemon cannot use it.
+        """
+        order = {} if file is None else {"file": file, "shadow": shadow}
+        return self._ask({"class": "MODEL", **order}, "MODEL")
+
     def close(self) -> None:
         self._lines.close()
         self._connection.close()

@@ -8,6 +8,7 @@ from pathlib import Path
 from compd.assembly import build_model
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, bad, good
+from compd.live.certainty import declared_noise
 from compd.live.cycle import Cycle
 from compd.live.loop import Orders
 from compd.live.setpoint import State
@@ -34,7 +35,10 @@ class Machine:
         self.wires = MachineWires(configuration, self.latest)
         self.model = build_model(configuration.geometry, configuration.wiring)
         stroke_mm = configuration.geometry.link_length_mm
-        self.cycle = Cycle(self.model, self.wires, configuration.loop, configuration.limits, 0.1, stroke_mm)
+        self.cycle = Cycle(
+            self.model, self.wires, configuration.loop, configuration.limits, 0.1, stroke_mm,
+            declared_noise(configuration),
+        )  # fmt: skip
         zero = dict.fromkeys(self.wires.length_channels, RAW_AT_ZERO_MM)
         self.orders = Orders(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
         self.now_s = 1000.0

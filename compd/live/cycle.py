@@ -108,9 +108,9 @@ class Cycle:
                 tick, now_s, now_s, math.nan, why.state, why.reason, mode, None, inputs, models.applied.hash
             )
 
-    def resume(self, carried: Carried, models: Models) -> None:
-        """Go on as if the cycle before, with the same models, had left this behind."""
-        self._models = models
+    def resume(self, carried: Carried, models: Models | None = None) -> None:
+        """Go on as if the cycle before, with the same models, had left this behind; None is without effects."""
+        self._models = models or self._bare
         (self._zero, self._warm, self._correction_mm, self._last_good, self._scales_seen, self._shadow,
          self._adopting, self._u_tip_um) = carried  # fmt: skip
         self._zero_vectors = None if carried.zero is None else self._vectors(carried.zero)
