@@ -1,4 +1,4 @@
-"""Drivers and their simulators, found by entry point or by path: there is no central list."""
+"""Drivers, their simulators and effects, found by entry point or by path: there is no central list."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from compd.errors import PluginError, Problem
 
 GAUGES = "compd.gauges"
 SIMULATED_GAUGES = "compd.simulated_gauges"
+EFFECTS = "compd.effects"
+_KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effect"}
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
 
 
@@ -23,17 +25,17 @@ def names(group: str) -> list[str]:
 
 
 def load(group: str, name: str, where: str) -> Any:
-    """The class that `name` stands for: an entry point's name, or /absolute/file.py:ClassName.
+    """What `name` stands for, a class or an effect: an entry point's name, or /absolute/file.py:Name.
 
     Raises PluginError, which names `where` and lists what there is.
     """
     if match := _PATH.match(name):
-        return _load_file(Path(match["file"]), match["name"], where)
+        return _load_file(Path(match["file"]), match["name"], where, _KIND[group])
     points: dict[str, EntryPoint] = {point.name: point for point in entry_points(group=group)}
     if name not in points:
         raise PluginError(
-            Problem(where, "no such driver", name, ", ".join(sorted(points)) or "none installed",
-                    "choose one of these, or write /absolute/file.py:ClassName")
+            Problem(where, f"no such {_KIND[group]}", name, ", ".join(sorted(points)) or "none installed",
+                    "choose one of these, or write /absolute/file.py:Name")
         )  # fmt: skip
     try:
         return points[name].load()
@@ -44,16 +46,16 @@ def load(group: str, name: str, where: str) -> Any:
         ) from error  # fmt: skip
 
 
-def _load_file(file: Path, class_name: str, where: str) -> Any:
-    """A class from a person's own file; a file that others may write could run anything as the daemon."""
-    value = f"{file}:{class_name}"
+def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
+    """From a person's own file; a file that others may write could run anything as the daemon."""
+    value = f"{file}:{name}"
     try:
         mode = file.stat().st_mode
     except OSError as error:
-        raise PluginError(Problem(where, f"cannot read the driver's file: {error.strerror}", value)) from error
+        raise PluginError(Problem(where, f"cannot read the {kind}'s file: {error.strerror}", value)) from error
     if mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise PluginError(
-            Problem(where, "the driver's file may be written by group or others", value,
+            Problem(where, f"the {kind}'s file may be written by group or others", value,
                     "mode 644 or stricter", f"chmod go-w {file}")
         )  # fmt: skip
     # one name per path: its classes look their own module up by it (pydantic resolves annotations there)
@@ -65,6 +67,6 @@ def _load_file(file: Path, class_name: str, where: str) -> Any:
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
-        return getattr(module, class_name)
+        return getattr(module, name)
     except (ImportError, SyntaxError, AttributeError) as error:
-        raise PluginError(Problem(where, f"the driver's file cannot be loaded: {error}", value)) from error
+        raise PluginError(Problem(where, f"the {kind}'s file cannot be loaded: {error}", value)) from error

@@ -65,15 +65,13 @@ def _card(one: Effect, configuration: Configuration) -> RenderableType:
     from rich.table import Table
 
     from compd.assembly import build_model
-    from compd.cli.effect_page import details_of
     from compd.model.effect import PORTS, missing
-    from compd.model.observe import constants
     from compd.model.rows import settings
 
-    geometry = configuration.geometry
-    model = build_model(geometry, configuration.wiring)
+    model = build_model(configuration.geometry, configuration.wiring)
+    assert model.constants is not None
     measured = {wire.name for wire in configuration.wiring.quantities}
-    lacking = missing(one, measured | settings(constants(model, details_of(geometry))), model.links)
+    lacking = missing(one, measured | settings(model.constants), model.links)
 
     card = Table.grid(padding=(0, 2))
     card.add_row("[bold]effect", one.id)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Cone, Figure, Scatter, Scatter3d
 
-from compd.assembly import build_model
+from compd.assembly import build_model, details
 from compd.cli.effect_signature import (
     ASIDE_MM,
     FORCE_N,
@@ -19,24 +19,16 @@ from compd.cli.effect_signature import (
     signature,
 )
 from compd.configuration import Configuration
-from compd.configuration.geometry import Geometry
 from compd.model.effect import Constant, Effect, Parameter
-from compd.model.observe import Details
 from compd.workbench.page import COLOURS, Panel, Table, styled, write_page
 
 AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain"]}
 
 
-def details_of(geometry: Geometry) -> Details:
-    """What effects ask of a configuration's geometry beyond the kinematics."""
-    nothing = float("nan")
-    return Details(geometry.plate_thickness_mm or nothing, geometry.scale_signal_period_mm or nothing)
-
-
 def write_signature(path: Path, effect: Effect, configuration: Configuration) -> None:
     """Write the page. Raises CompdError where the machine lacks a setting that the effect needs."""
     model = build_model(configuration.geometry, configuration.wiring)
-    found = signature(effect, model, details_of(configuration.geometry))
+    found = signature(effect, model, details(configuration.geometry))
     largest_um = float(np.linalg.norm(found.tip_um, axis=1).max())
     numbers = ", ".join(f"{name} = {value}" for name, value in found.taken.items())
     verdict = (

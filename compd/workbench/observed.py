@@ -11,11 +11,10 @@ import numpy as np
 
 from compd.assembly import build_model
 from compd.configuration import Configuration
-from compd.configuration.geometry import Geometry
 from compd.errors import CompdError, Problem, RecordingError
 from compd.model.effect import Deltas, Effect, Fitted, Port, Shape, deltas, missing, together
 from compd.model.machine import MachineModel
-from compd.model.observe import Details, Movement, constants, observe, observe_tip
+from compd.model.observe import Movement, observe, observe_tip
 from compd.model.prediction import Sensitivity, columns, predict, sensitivities
 from compd.model.reason import MEANING, Reason
 from compd.model.rotation import compose, rotation_matrix, rotation_vector
@@ -132,7 +131,7 @@ def observed(recording: Recording, configuration: Configuration | None) -> Obser
         rows = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, _starts(recording))
     else:
         model = build_model(configuration.geometry, configuration.wiring)
-        rows = _rows(recording, model, details(configuration.geometry))
+        rows = _rows(recording, model)
     measured = recording.reference_link_mm if recording.reference_link_mm is not None else recording.reference_mm
     if measured is None:
         raise RecordingError(Problem(where, "has no column of the reference"))
@@ -161,14 +160,9 @@ def added_by(fitted: Sequence[Fitted], rows: Rows) -> tuple[dict[str, Deltas], D
     return each, together(list(each.values()))
 
 
-def details(geometry: Geometry) -> Details:
-    """What effects ask of a configuration's geometry beyond the kinematics."""
-    unknown = float("nan")
-    return Details(geometry.plate_thickness_mm or unknown, geometry.scale_signal_period_mm or unknown)
-
-
-def _rows(recording: Recording, model: MachineModel, more: Details) -> Rows:
+def _rows(recording: Recording, model: MachineModel) -> Rows:
     """Every row of the recording as effects see it; comparators that were not recorded count as unmoved."""
+    assert model.constants is not None
     count = recording.rows
     scale_mm = recording.scale_mm
     if scale_mm is None:
@@ -185,7 +179,7 @@ def _rows(recording: Recording, model: MachineModel, more: Details) -> Rows:
         approach, np.full_like(scale_mm, np.nan) if velocity is None else velocity, _velocity(joint_mm, recording)
     )
     return observe(
-        model, constants(model, more), scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
+        model, model.constants, scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
         quantities=recording.quantities, time_s=recording.time_s, session_start=_starts(recording), movement=movement,
     )  # fmt: skip
 

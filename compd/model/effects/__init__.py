@@ -10,9 +10,7 @@ from compd.errors import PluginError, Problem
 from compd.model.effect import Effect
 from compd.model.effects import base_joint, frame, joint, link, platform_joint, reference, scale, tool
 from compd.model.written import formula_effect
-from compd.plugins import load, names
-
-ENTRY_POINTS = "compd.effects"
+from compd.plugins import EFFECTS, load, names
 
 # Along the way of the datum: readings, links, joints, tool, and what the reference instrument adds.
 BUNDLED: tuple[Effect, ...] = (
@@ -27,9 +25,9 @@ def library() -> dict[str, Effect]:
     Raises PluginError where a package's effect cannot be loaded, is no Effect, or takes an id that is in use.
     """
     found = {effect.id: effect for effect in BUNDLED}
-    for name in names(ENTRY_POINTS):
-        where = f"entry point {name} in {ENTRY_POINTS}"
-        effect = _checked(load(ENTRY_POINTS, name, where), where)
+    for name in names(EFFECTS):
+        where = f"entry point {name} in {EFFECTS}"
+        effect = _checked(load(EFFECTS, name, where), where)
         if effect.id in found:
             raise PluginError(
                 Problem(where, "this id is taken", effect.id, "an id of its own", "rename it, or remove the package")
@@ -46,7 +44,7 @@ def find(declaration: str | Mapping[str, Any], where: str) -> Effect:
     if not isinstance(declaration, str):
         return formula_effect(declaration, where)
     if ":" in declaration:
-        return _checked(load(ENTRY_POINTS, declaration, where), where)
+        return _checked(load(EFFECTS, declaration, where), where)
     known = library()
     if declaration not in known:
         raise PluginError(
