@@ -77,7 +77,7 @@ def panels(found: Distances) -> list[Panel]:
                            marker={"color": COLOURS[colour], "symbol": symbol, "size": 7})  # fmt: skip
     figure.add_hline(y=0, line={"color": COLOURS["quiet"], "width": 1})
     return [
-        Panel("Deflection of measured distances", "One dot for each of the 136 pairs of balls, measured less certified. "
+        Panel("Deflection of measured distances", "Each dot is one of the 136 pairs of balls, measured less certified. "
               "How much is gained depends on how much of the error is the joints'; of the paper's machine it is not "
               "known.", styled(figure, "distance between balls, mm", "deflection, um", 440)),
     ]  # fmt: skip
