@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace as changed
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,14 +12,17 @@ import pytest
 from compd.cli.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop import Orders
-from compd.live.replay import Transcripts, replay
+from compd.live.models import Models, ModelShelf
+from compd.live.replay import Transcripts
+from compd.live.replay import replay as replay_cycles
 from compd.live.setpoint import State
 from compd.live.state_json import from_plain, to_plain
 from compd.live.transcript import parse_readings
 from compd.model.acting import Remembered
 from compd.model.rows import Motion
 from tests.live_machine import CONFIG, machine
-from tests.recorded_run import Run
+from tests.recorded_run import ROOMY, Run
+from tests.test_live_effects import file_with
 
 CYCLES = 400
 
@@ -41,7 +44,7 @@ def record(run, name, cycles, every=1):
 def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
     run = Run(machine(name, on_stale=on_stale, on_limit=on_limit), seed=11)
     sent = record(run, tmp_path / "run", CYCLES)
-    replayed = list(replay(run.machine.configuration, Transcripts(tmp_path / "run")))
+    replayed = list(replay_cycles(run.machine.configuration, Transcripts(tmp_path / "run")))
     assert [cycle.sent for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
     assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
     lost = {"hold": State.HOLD, "fade": State.FADE, "stop": State.STOP}[on_stale]
@@ -53,7 +56,7 @@ def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
 def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):
     run = Run(machine(), seed=5)
     sent = record(run, tmp_path / "run", CYCLES, every=20)
-    replayed = list(replay(run.machine.configuration, Transcripts(tmp_path / "run")))
+    replayed = list(replay_cycles(run.machine.configuration, Transcripts(tmp_path / "run")))
     assert len(replayed) == CYCLES / 20
     assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
 
@@ -105,6 +108,52 @@ def test_a_cycle_without_zero_reads_back_as_it_was():
     assert again.to_json() == setpoint.to_json()
 
 
+def with_models(tmp_path):
+    """A run in which a model with memory is adopted and another shadows it; its cycles' messages and setpoints."""
+    run = Run(machine())
+    shelf = ModelShelf(run.machine.model, run.machine.configuration.machine, run.machine.wires)
+    lag = file_with(tmp_path / "lag.yaml", "link_expansion_lag", "friction_hysteresis")
+    backlash = file_with(tmp_path / "backlash.yaml", "backlash")
+    adopted = [None, Models(shelf.read(lag)), Models(shelf.read(lag), shelf.read(backlash))]
+    cycles = []
+    for models in adopted:
+        run.machine.orders.models = models
+        cycles += run.eventful(60)
+    return run, cycles, (lag, backlash)
+
+
+def test_models_are_kept_with_the_recording_whatever_becomes_of_their_files(tmp_path, capsys):
+    run, cycles, files = with_models(tmp_path)
+    with run.recorder(tmp_path / "run", replace(ROOMY, part_bytes=300_000)) as recorder:
+        for line, message, _ in cycles:
+            recorder.put(line, message)
+    for file in files:
+        file.unlink()
+    assert len(list(tmp_path.glob("run-*.csv"))) > 1
+    replayed = list(replay_cycles(run.machine.configuration, Transcripts(tmp_path / "run")))
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for _, _, setpoint in cycles]
+    assert any(b'"shadow":{' in cycle.replayed for cycle in replayed)
+
+
+def test_a_model_file_that_has_changed_since_is_told_and_may_be_given_later(tmp_path):
+    run, cycles, (lag, backlash) = with_models(tmp_path)
+    said, adopted = [], lag.read_bytes()
+    lag.write_bytes(adopted + b"# fitted again\n")
+    backlash.unlink()
+    with run.recorder(tmp_path / "run", say=said) as recorder:
+        for line, message, _ in cycles:
+            recorder.put(line, message)
+    assert f"{lag} has changed since the daemon read it: it is not kept" in "\n".join(said)
+    assert f"{backlash} cannot be read: No such file or directory" in "\n".join(said)
+    with pytest.raises(RecordingError, match="give it with `--model`"):
+        list(replay_cycles(run.machine.configuration, Transcripts(tmp_path / "run")))
+    given = [tmp_path / "saved.yaml", file_with(tmp_path / "backlash.yaml", "backlash")]
+    given[0].write_bytes(adopted)
+    replayed = list(replay_cycles(run.machine.configuration, Transcripts(tmp_path / "run"), given))
+    assert len(replayed) == len(cycles)
+    assert not [cycle for cycle in replayed if cycle.differs]
+
+
 def altered(path, number, change):
     """The file with `change` applied to the message in line `number`, counted from 0."""
     lines = path.read_bytes().splitlines(keepends=True)
@@ -134,13 +183,13 @@ def change_time(message):
 @pytest.mark.parametrize("change", [change_reading, change_carried, change_setpoint, change_time])
 def test_one_changed_number_is_found_and_its_place_is_told(tmp_path, capsys, change):
     run = Run(machine())
-    configuration = changed(run.machine.configuration, path=CONFIG / "tripod-cmm.yaml")
+    configuration = replace(run.machine.configuration, path=CONFIG / "tripod-cmm.yaml")
     with run.recorder(tmp_path / "run") as recorder:
         for line, message, _ in run.quiet(30):
             recorder.put(line, message)
     path = tmp_path / "run-0001.cycles.jsonl"
     altered(path, 21, change)  # two lines of opening, so the 20th cycle
-    found = [cycle for cycle in replay(configuration, Transcripts(path)) if cycle.differs]
+    found = [cycle for cycle in replay_cycles(configuration, Transcripts(path)) if cycle.differs]
     assert [(cycle.tick, cycle.where) for cycle in found] == [(20, f"{path}:22")]
 
 
@@ -214,14 +263,14 @@ def test_a_damaged_line_is_named(tmp_path, damage):
     lines[7] = damage
     path.write_bytes(b"".join(lines))
     with pytest.raises(RecordingError, match=r"run-0001\.cycles\.jsonl:8"):
-        list(replay(run.machine.configuration, Transcripts(path)))
+        list(replay_cycles(run.machine.configuration, Transcripts(path)))
 
 
 def test_a_recording_of_another_machine_is_refused(tmp_path):
     shipped_run(tmp_path)
     hexapod = machine("hexapod.yaml")
     with pytest.raises(RecordingError, match="has no reading of"):
-        list(replay(hexapod.configuration, Transcripts(tmp_path / "run")))
+        list(replay_cycles(hexapod.configuration, Transcripts(tmp_path / "run")))
 
 
 def test_what_is_not_there_is_told_with_what_would_be_right(tmp_path):

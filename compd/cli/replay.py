@@ -11,6 +11,10 @@ import typer
 def replay(
     name: Annotated[Path, typer.Argument(help="As given to `compd record` (all parts), or one part.")],
     machine: Annotated[Path, typer.Option("--machine", help="The configuration with which the daemon ran.")],
+    model: Annotated[
+        list[Path] | None,
+        typer.Option("--model", help="A model file that was used but is not kept beside it."),
+    ] = None,
     setpoints: Annotated[bool, typer.Option(help="Print the setpoints that come out, one per line.")] = False,
 ) -> None:
     """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
@@ -28,7 +32,7 @@ def replay(
                    f"{configuration.config_hash}): setpoints may differ by that", err=True)  # fmt: skip
     cycles = differing = 0
     first: ReplayedCycle | None = None
-    for cycle in replay_cycles(configuration, transcripts):
+    for cycle in replay_cycles(configuration, transcripts, model or ()):
         cycles += 1
         if cycle.differs:
             differing += 1

@@ -71,6 +71,11 @@ class Models(NamedTuple):
         return found if self.shadow is None else found | {"shadow": self.shadow.hash}
 
     @property
+    def files(self) -> dict[str, str]:
+        """For READINGS: where each model file was read, by its hash; for whoever must keep a copy."""
+        return {model.hash: model.file for model in self if model is not None and model.hash}
+
+    @property
     def summary(self) -> dict[str, Any]:
         """For MODEL and STATUS."""
         found: dict[str, Any] = {"applied": self.applied.summary}

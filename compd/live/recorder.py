@@ -8,7 +8,8 @@ A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itse
 
     NAME-0001.csv           a row per instant, as the recording format says: readings less machine zero
     NAME-0001.yaml          its sidecar; `provenance` holds machine zero and signs: raw = zero + sign * column
-    NAME-0001.cycles.jsonl  what the daemon said, line for line and bit for bit: what `compd replay` needs
+    NAME-0001.cycles.jsonl  what the daemon said, line for line and bit for bit: what `compd replay` needs, with
+    NAME-0001.model-*.yaml  copies of the model files that were applied or ran as a shadow
 
 A machine zero that is taken anew begins a new part, since the columns of a part have one zero. Whole lines are
 written and synchronised twice a second: what a power cut or SIGKILL costs is less than a second.
@@ -158,6 +159,9 @@ class Recorder:
             line, message = self._waiting.popleft()
             part = self._part_for(message)
             part.add(line, message)
+            for hash_, file in message.get("model_files", {}).items():
+                if fault := part.keep_model(hash_, Path(file)):
+                    self._say(f"the model file {file} {fault}: it is not kept, and replay will ask for it")
             self.rows += 1
             if self._bytes() > self._keeping.limit_bytes:
                 self._at_limit()

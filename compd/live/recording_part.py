@@ -1,7 +1,8 @@
-"""One part of a recording: three files that are whole lines at any time."""
+"""One part of a recording: files of whole lines at any time, and the models that the daemon computed with."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ import yaml
 Message = Mapping[str, Any]
 
 CYCLES_SUFFIX = ".cycles.jsonl"
+MODEL_MARK = ".model-"
 _UM_PER_MM = 1e3
 # A picometre and a microsecond, as the format's other writers do: no gauge is finer, and no conversion from
 # mm to um leaves digits of its own.
@@ -43,11 +45,10 @@ class RecordingPart:
         sidecar = yaml.safe_dump(self._sidecar(version, watch, started_at), sort_keys=False).encode()
         opened = b"".join(json.dumps(message, separators=(",", ":")).encode() + b"\n" for message in opening)
         header = ",".join(["time_s", *(column["column"] for column in self._columns)]).encode() + b"\n"
-        self._sidecar_size = len(sidecar)
-        with self._sidecar_path.open("xb") as file:
-            file.write(sidecar)
-            file.flush()
-            os.fsync(file.fileno())
+        self._stem = stem
+        self._models: dict[str, Path] = {}
+        self._whole_size = 0
+        self._write_whole(self._sidecar_path, sidecar)
         self._cycles = LinesFile(self._cycles_path)
         self._csv = LinesFile(self.csv_path)
         self._cycles.add(opened)
@@ -57,14 +58,29 @@ class RecordingPart:
 
     @property
     def size(self) -> int:
-        """Bytes of all three files, with what waits to be written."""
-        return self._sidecar_size + self._cycles.size + self._csv.size
+        """Bytes of all files, with what waits to be written."""
+        return self._whole_size + self._cycles.size + self._csv.size
 
     def add(self, line: bytes, message: Message) -> None:
         """One READINGS message and the line that it came in; `sync` writes it."""
         self._cycles.add(line)
         self._csv.add(self._row(message).encode() + b"\n")
         self.rows += 1
+
+    def keep_model(self, hash_: str, file: Path) -> str:
+        """Copy a model file beside the part, once; what is wrong with it, "" where nothing is. Raises OSError where
+        the copy cannot be written."""
+        if hash_ in self._models:
+            return ""
+        self._models[hash_] = self._stem.with_name(f"{self._stem.name}{MODEL_MARK}{hash_}.yaml")
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            return f"cannot be read: {error.strerror}"
+        if not hashlib.sha256(content).hexdigest().startswith(hash_):
+            return "has changed since the daemon read it"
+        self._write_whole(self._models[hash_], content)
+        return ""
 
     def sync(self) -> None:
         """What waits, onto the disk. Raises OSError; the files then end with the last line that is whole."""
@@ -81,8 +97,15 @@ class RecordingPart:
 
     def delete(self) -> None:
         """Remove the files; the sidecar last, so that what is left says what it was."""
-        for path in (self._cycles_path, self.csv_path, self._sidecar_path):
+        for path in (self._cycles_path, self.csv_path, *self._models.values(), self._sidecar_path):
             path.unlink(missing_ok=True)
+
+    def _write_whole(self, path: Path, content: bytes) -> None:
+        with path.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        self._whole_size += len(content)
 
     def _row(self, message: Message) -> str:
         now_s, readings = message["time_s"], message["readings"]

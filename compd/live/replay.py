@@ -12,7 +12,7 @@ from compd.errors import Problem, RecordingError
 from compd.live.chain import Chain, build_chain
 from compd.live.loop import Orders
 from compd.live.models import LiveModel, Models
-from compd.live.recording_part import CYCLES_SUFFIX, Message
+from compd.live.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
 from compd.live.transcript import RecordedCycle, parse_readings
 
 
@@ -56,6 +56,15 @@ class Transcripts:
                 break
         return found
 
+    def model_files(self) -> list[Path]:
+        """Copies of the models that the daemon computed with, kept beside the parts."""
+        stems = [path.name.removesuffix(CYCLES_SUFFIX) for path in self.paths]
+        return [
+            copy
+            for path, stem in zip(self.paths, stems, strict=True)
+            for copy in sorted(path.parent.glob(f"{stem}{MODEL_MARK}*.yaml"))
+        ]
+
     def cycles(self) -> Iterator[tuple[str, Message]]:
         """(file:line, READINGS). A line that was torn when the recorder was killed is the last; it is counted."""
         for path in self.paths:
@@ -84,12 +93,13 @@ def replay(
 ) -> Iterator[ReplayedCycle]:
     """Every recorded cycle, computed anew by the daemon's own cycle from what it computed from then.
 
-    `model_files`: those that were applied or ran as a shadow, in any order. Time is the recording's.
+    `model_files`: applied or shadow models that are not kept beside the recording. Time is the recording's.
     Raises RecordingError for a damaged line, readings of another machine or a model that is not given, StateError
     for a model file that cannot be used.
     """
     chain = build_chain(configuration, configuration.gauge_objects())
-    models = {model.hash: model for model in map(chain.shelf.read, model_files)} | {"": chain.shelf.bare}
+    files = [*transcripts.model_files(), *model_files]
+    models = {"": chain.shelf.bare} | {model.hash: model for model in map(chain.shelf.read, files)}
     for where, message in transcripts.cycles():
         recorded = _parsed(where, message, chain, configuration)
         inputs = recorded.inputs

@@ -57,6 +57,8 @@ class Transcript:
             message["target"] = _target(inputs.target)
         if inputs.models is not None:
             message |= inputs.models.hashes
+            if files := inputs.models.files:
+                message["model_files"] = files
         message["carried"] = _carried(inputs)
         return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
 
