@@ -13,6 +13,8 @@ PROTOCOL = 1
 MAX_LINE_BYTES = 4096
 # 1e9 mm is 1000 km: a number beyond it is not a coordinate, a rate or an angle.
 _LARGEST_NUMBER = 1e9
+# One encoder for all: json.dumps() makes a new one for every call that is not plain.
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
 
 class ErrorCode(StrEnum):
@@ -74,7 +76,7 @@ class ModelOrder:
 
 def line(message: Mapping[str, Any]) -> bytes:
     """One message as it goes over the wire."""
-    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+    return _encode(message).encode() + b"\n"
 
 
 def parse(data: bytes) -> dict[str, Any]:
