@@ -9,6 +9,7 @@ import typer
 
 from compd import __version__
 from compd.cli import model_commands
+from compd.cli.adopt import adopt, shadow
 from compd.cli.campaign import campaign
 from compd.cli.check import check
 from compd.cli.compare import compare
@@ -49,10 +50,24 @@ def _options(
     """Live error compensation for parallel kinematic machines: joints, links and frame."""
 
 
-for command in (demo, check, simulate, tracker, campaign, run, watch, zero, record, replay, join, compare, ledger):
-    app.command()(command)
+# `compd --help` shows the commands in these panels, in this order.
+PANELS = {
+    "Begin": (demo, check),
+    "The live machine": (run, watch, zero, adopt, shadow, record, replay),
+    "Learn from measurements": (join, compare, ledger),
+    "A machine that is not there": (simulate, tracker, campaign),
+}
+for panel, commands in PANELS.items():
+    for command in commands:
+        app.command(rich_help_panel=panel)(command)
 for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
     effect.command()(change)
-GROUPS = {"gauge": gauge, "driver": driver, "effect": effect, "recording": recording, "paper": paper}
-for name, group in GROUPS.items():
-    app.add_typer(group, name=name)
+GROUPS = {
+    "gauge": (gauge, "The live machine"),
+    "driver": (driver, "The live machine"),
+    "recording": (recording, "Learn from measurements"),
+    "effect": (effect, "Learn from measurements"),
+    "paper": (paper, "A machine that is not there"),
+}
+for name, (group, panel) in GROUPS.items():
+    app.add_typer(group, name=name, rich_help_panel=panel)
