@@ -91,8 +91,8 @@ def _tell(page: Path, title: str, reductions: Sequence[Reduction], panels: Seque
     console.print(table)
     first = reductions[0]
     verdict = (
-        f"{first.what[0].upper()}{first.what[1:]}: {first.without_um:.2f} um without compensation, {first.with_um:.2f} um with it, "
-        f"{first.percent:.0f} % less. The paper: {first.paper}."
+        f"{first.what[0].upper()}{first.what[1:]}: {first.without_um:.2f} um without compensation, "
+        f"{first.with_um:.2f} um with it, {first.percent:.0f} % less. The paper: {first.paper}."
     )
     page.parent.mkdir(parents=True, exist_ok=True)
     numbers = Panel("In numbers", "What was measured here, beside what the paper states.",
