@@ -100,10 +100,10 @@ class Recorder:
         for line, message in lines:
             if before is None:
                 start_s = message["time_s"]
+            elif for_s is not None and message["time_s"] - start_s >= for_s:
+                return
             elif self._every_cycle:
                 self.missing += message["seq"] - before - 1
-            if for_s is not None and message["time_s"] - start_s >= for_s:
-                return
             before = message["seq"]
             self.put(line, message)
 
