@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.errors import KinematicsError, Problem
-from compd.model.acting import Remembered, Sight, act
+from compd.model.acting import Remembered, Sight, act, whole, with_all
 from compd.model.arrangement import Contact, ToolOnPlate
 from compd.model.frame import Frame, solve_frame
 from compd.model.jit import Floats, Ints
@@ -25,7 +25,6 @@ from compd.model.prediction import Altered
 from compd.model.rotation import compose, rotation_matrix
 from compd.model.transform import to_inner
 
-_Parts = TypeVar("_Parts", Frame, Pose, Contact)
 Sources: TypeAlias = Mapping[str, Floats]
 
 # An effect is looked up where the scales will stand, which effects themselves shift. What is wrong after the first look
@@ -162,12 +161,12 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     if model.acting:
         machine, remembered = act(model, _sight(values, values.scale_mm, frame, pose, found.made), warm.effects, False)
         corrected = _with_effects(model, found, machine, nominal.rotation_M_P)
-        altered_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm)
-        each = forward_kinematics(
-            machine.mechanism, altered_mm + machine.reading_to_length_mm, warm.origin_M_mm, warm.rotation_M_P
+        each_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm) + machine.reading_to_length_mm
+        there = forward_kinematics(
+            whole(machine.mechanism, now), with_all(each_mm, length_mm), warm.origin_M_mm, warm.rotation_M_P
         )
-        there = _whole(each, pose)
-        made = _whole(type(model.arrangement)(machine.tool_mm).made(each), found.made)
+        tool_mm = wanted.tip_M_mm if isinstance(model.arrangement, ToolOnPlate) else wanted.tip_P_mm
+        made = type(model.arrangement)(with_all(machine.tool_mm, tool_mm)).made(there)
         found = corrected._replace(pose=there, made=made, reason=np.maximum(corrected.reason, there.reason))
         after = after._replace(effects=remembered)
     return _result(model, found, warm, after)
@@ -218,23 +217,19 @@ def _with_effects(model: MachineModel, found: _Found, machine: Altered, attitude
     setpoints_mm = scale_for_length_mm(
         model.zero.link_length_mm, each.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
     )
-    shares_mm = np.diff(setpoints_mm, axis=0, prepend=before.scale_setpoint_mm[None])
+    shares_mm = setpoints_mm - np.concatenate([before.scale_setpoint_mm[None], setpoints_mm[:-1]])
     ids = [one.effect.id for one in model.acting]
     setpoint_mm = setpoints_mm[-1]
     command = _Command(
         before.nominal_scale_mm, setpoint_mm, setpoint_mm - before.nominal_scale_mm,
         {**before.sources, **dict(zip(ids, shares_mm, strict=True))},
     )  # fmt: skip
-    pose = _whole(each, found.pose)
-    reasons = (np.maximum(machine.reason, each.reason) + np.zeros(setpoints_mm.shape[:-1], dtype=np.int64)).max(axis=0)
+    reasons = np.maximum(machine.reason, each.reason)
+    worst = reasons.max(axis=0) if reasons.ndim > found.reason.ndim else reasons
     return found._replace(
-        frame=_whole(machine.frame, found.frame), pose=pose, command=command, reason=np.maximum(found.reason, reasons)
-    )
-
-
-def _whole(each: _Parts, like: _Parts) -> _Parts:
-    """With all effects: the last entry of every array that has one for each of them, one axis more than `like` has."""
-    return type(like)._make(a[-1] if a.ndim > b.ndim else a for a, b in zip(each, like, strict=True))
+        frame=whole(machine.frame, found.frame), pose=whole(each, found.pose), command=command,
+        reason=np.maximum(found.reason, worst),
+    )  # fmt: skip
 
 
 def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> Floats:

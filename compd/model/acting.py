@@ -6,19 +6,21 @@ One definition for a single snapshot and for N of them: a row's memory is what t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compd.model.effect import Deltas, Memories, deltas
 from compd.model.frame import Frame
 from compd.model.jit import Floats
-from compd.model.kinematics import Pose
+from compd.model.kinematics import Mechanism, Pose
 from compd.model.machine import MachineModel
 from compd.model.observe import Movement, rows_at
 from compd.model.prediction import Altered, altered
 from compd.model.rows import Motion, Rows, moved
 
+_Parts = TypeVar("_Parts", Frame, Pose, Mechanism)
 _NOTHING: Memories = {}
 
 
@@ -59,25 +61,23 @@ def see(model: MachineModel, sight: Sight, before: Remembered, commanded: bool) 
     """
     assert model.constants is not None, "a model with effects has its constants"
     count = 1 if sight.scale_mm.ndim == 1 else len(sight.scale_mm)
-    scale_mm, joint_mm, frame_mm = (
-        np.broadcast_to(part, (count, part.shape[-1])) for part in (sight.scale_mm, sight.joint_mm, sight.frame_mm)
-    )
-    time_s = np.broadcast_to(np.asarray(sight.time_s, dtype=np.float64), (count,))
+    scale_mm, joint_mm, frame_mm = (_rows(part, count, 1) for part in (sight.scale_mm, sight.joint_mm, sight.frame_mm))
+    time_s = _rows(np.asarray(sight.time_s, dtype=np.float64), count, 0)
     motion = before.motion
     start = np.zeros(count, dtype=bool)
     start[0] = motion is None and not before.memories
     movement, motion = _movement(model, before, commanded, time_s, scale_mm, joint_mm)
-    n, pose = model.links, sight.pose
+    pose = sight.pose
     rows = rows_at(
         model.constants,
-        np.broadcast_to(sight.frame.base_joints_M_mm, (count, n, 3)),
+        _rows(sight.frame.base_joints_M_mm, count, 2),
         pose._replace(
-            origin_M_mm=np.broadcast_to(pose.origin_M_mm, (count, 3)),
-            rotation_M_P=np.broadcast_to(pose.rotation_M_P, (count, 3, 3)),
-            link_length_mm=np.broadcast_to(pose.link_length_mm, (count, n)),
+            origin_M_mm=_rows(pose.origin_M_mm, count, 1),
+            rotation_M_P=_rows(pose.rotation_M_P, count, 2),
+            link_length_mm=_rows(pose.link_length_mm, count, 1),
         ),
-        sight.tip_M_mm, scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
-        quantities={name: np.broadcast_to(value, (count,)) for name, value in sight.quantities.items()},
+        _rows(sight.tip_M_mm, count, 1), scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
+        quantities={name: _rows(np.asarray(value), count, 0) for name, value in sight.quantities.items()},
         time_s=time_s, session_start=start, movement=movement,
     )  # fmt: skip
     return rows, Remembered(motion, before.memories, commanded)
@@ -93,7 +93,7 @@ def act(model: MachineModel, sight: Sight, before: Remembered, commanded: bool) 
     added = one_after_another(list(each.values()))
     if sight.scale_mm.ndim == 1:
         added = {port: values[:, 0] for port, values in added.items()}
-    machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame.supports_M_mm)
+    machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame)
     return machine, after._replace(memories=memories)
 
 
@@ -108,6 +108,16 @@ def kept(remembered: Remembered, old: MachineModel, new: MachineModel) -> Rememb
     return remembered._replace(memories=memories)
 
 
+def whole(each: _Parts, like: _Parts) -> _Parts:
+    """What `act` has altered, with all effects: `with_all` for every array; `like` is the same without effects."""
+    return type(like)._make(map(with_all, each, like))
+
+
+def with_all(each: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
+    """The last entry where there is one for each effect: one axis more than `like` has."""
+    return each[-1] if each.ndim > like.ndim else each
+
+
 def one_after_another(each: Sequence[Deltas]) -> Deltas:
     """(K, N, size) per port: what the first k + 1 of K effects add together."""
     found: Deltas = {}
@@ -117,6 +127,13 @@ def one_after_another(each: Sequence[Deltas]) -> Deltas:
                 found[port] = np.zeros((len(each), *values.shape))
             found[port][k:] += values
     return found
+
+
+def _rows(part: Floats, count: int, core: int) -> Floats:
+    """(count, ...) of what has `core` axes of its own, or rows of them. Cheap for one row, as the live loop has."""
+    if count == 1:
+        return part if part.ndim > core else part[None]
+    return np.broadcast_to(part, (count, *part.shape[part.ndim - core :]))
 
 
 def _movement(

@@ -105,7 +105,9 @@ def observe(
         model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
     )
     return rows_at(
-        common, frame.base_joints_M_mm, pose, model.arrangement.made(pose).tip_M_mm,
+        common, frame.base_joints_M_mm, pose,
+        # a tool that stands on the plate is at the same place in every row
+        np.broadcast_to(model.arrangement.made(pose).tip_M_mm, pose.origin_M_mm.shape),
         scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm, quantities=quantities,
         time_s=np.asarray(time_s, dtype=np.float64), session_start=session_start, movement=movement,
     )  # fmt: skip
@@ -143,8 +145,7 @@ def rows_at(
         base_joints_M_mm=base_joints_M_mm,
         origin_M_mm=pose.origin_M_mm,
         rotation_M_P=pose.rotation_M_P,
-        # a tool that stands on the plate is at the same place in every row
-        tip_M_mm=np.broadcast_to(tip_M_mm, pose.origin_M_mm.shape),
+        tip_M_mm=tip_M_mm,
     )
 
 

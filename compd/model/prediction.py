@@ -69,16 +69,18 @@ class Altered(NamedTuple):
 
 
 def altered(
-    model: MachineModel, joint_mm: Floats, frame_mm: Floats, deltas: Deltas, guess_supports_M_mm: Floats | None = None
+    model: MachineModel, joint_mm: Floats, frame_mm: Floats, deltas: Deltas, unaltered: Frame | None = None
 ) -> Altered:
     """The machine as the gauges and `deltas` have it; forward and inverse kinematics both start here.
 
     joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port, in mm (rad for
-    directions); a port left out gets nothing.
+    directions); a port left out gets nothing.  unaltered : the frame without deltas, where it has been solved already.
     """
-    geometry = model.frame._replace(plate_points_M_mm=_points(model.frame.plate_points_M_mm, "plate", deltas))
-    distances_mm = model.zero.distances_mm + _added(frame_mm, "frame", deltas)
-    frame = solve_frame(geometry, distances_mm, guess_supports_M_mm)
+    frame = unaltered
+    if frame is None or "frame" in deltas or "plate" in deltas:
+        geometry = model.frame._replace(plate_points_M_mm=_points(model.frame.plate_points_M_mm, "plate", deltas))
+        distances_mm = model.zero.distances_mm + _added(frame_mm, "frame", deltas)
+        frame = solve_frame(geometry, distances_mm, None if unaltered is None else unaltered.supports_M_mm)
     shortening_mm, reason = joint_shortening(model.joint_weights, _added(joint_mm, "joint", deltas))
     mechanism = Mechanism(
         _points(frame.base_joints_M_mm, "base_joint", deltas),

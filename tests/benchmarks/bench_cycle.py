@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+
+import numpy as np
 
 from compd.gauge import good
+from compd.live.models import LiveModel, Models
 from compd.live.protocol import Target
+from compd.model.effect import Fitted, quantities
+from compd.model.effects import library
 from tests.benchmarks.figures import median_and_p99, show
 from tests.live_machine import RAW_AT_ZERO_MM, Machine, machine
 
 CYCLES = 5000
 BUDGET_US = 150.0  # the whole cycle with 18 comparators
+# All that the shipped machines' thermometers allow, of every port of a machine but one: cheap and dear, with memory.
+EFFECTS = (
+    "link_expansion_lag", "backlash", "tool_offset", "scale_gain", "scale_expansion", "joint_comparator_gain",
+    "frame_comparator_gain", "link_sag", "friction_hysteresis", "base_joint_position",
+)  # fmt: skip
 ARRIVING_MM = 1e-4  # every gauge shows something new in every cycle
 
 
@@ -21,13 +32,42 @@ def main() -> None:
             measured = machine(name)
             measured.settle()
             if mode == "machine_tool":
-                tip_B0_mm = measured.model.zero.contact.tip_M_mm - measured.model.frame.zero_origin_M_mm
-                measured.orders.target = Target(tuple(tip_B0_mm.tolist()))
+                measured.orders.target = _target(measured)
             rows += [
                 [f"{name.removesuffix('.yaml')}, {mode}: {part}", *_row(durations)]
                 for part, durations in _cycles(measured).items()
             ]
     show(f"Cycle cost over {CYCLES} cycles", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+    rows = []
+    for name in ("tripod-cmm.yaml", "hexapod.yaml"):
+        for mode in ("cmm", "machine_tool"):
+            for count in (0, 3, len(EFFECTS)):
+                measured = machine(name)
+                if mode == "machine_tool":
+                    measured.orders.target = _target(measured)
+                measured.orders.models = _with_effects(measured, count)
+                measured.settle()
+                durations = _cycles(measured)["snapshot to bytes"]
+                rows.append([f"{name.removesuffix('.yaml')}, {mode}, {count} effects", *_row(durations)])
+    show("Snapshot to bytes, with effects", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+
+
+def _target(measured: Machine) -> Target:
+    tip_B0_mm = measured.model.zero.contact.tip_M_mm - measured.model.frame.zero_origin_M_mm
+    return Target(tuple(tip_B0_mm.tolist()))
+
+
+def _with_effects(measured: Machine, count: int) -> Models:
+    """The first `count` effects, with numbers so small that no limit is reached."""
+    effects = [library()[name] for name in EFFECTS[:count]]
+    links = measured.model.links
+    fitted = tuple(
+        Fitted(effect, np.full(len(effect.columns(links)), 0.01), {c.name: c.grid[0] for c in effect.constants})
+        for effect in effects
+    )
+    names = tuple(dict.fromkeys(name for effect in effects for name in quantities(effect, links)))
+    applied = LiveModel(replace(measured.model, effects=fitted), "", "", names, measured.wires.quantity_wires(names))
+    return Models(applied)
 
 
 def _row(durations_s: list[float]) -> list[str]:
