@@ -14,7 +14,16 @@ from compd.simulation.cause import Cause
 from compd.simulation.closure import Floats, Posture
 from compd.simulation.instruments import Kind, noisy
 from compd.simulation.motion import ACCELERATION_MM_PER_S2, Move
-from compd.simulation.plan import PASS_MM, PASS_ROW_EVERY_S, PASS_ROWS, REPEAT_AFTER_S, VISIT_S, Item, Plan
+from compd.simulation.plan import (
+    PASS_MM,
+    PASS_ROW_EVERY_S,
+    PASS_ROWS,
+    REPEAT_AFTER_S,
+    VISIT_S,
+    Item,
+    Plan,
+    switched_off,
+)
 from compd.simulation.strengths import Strengths
 from compd.simulation.touch import TOUCH_STEP_S, approach, posture_at_scales
 from compd.simulation.world import World
@@ -70,7 +79,12 @@ class Campaign:
 
     def run(self) -> Rows:
         """Raises KinematicsError where a point cannot be reached."""
+        session = self._plan.items[0].session
         for item in self._plan.items:
+            if item.session != session:
+                session = item.session
+                self._world.heat(switched_off(self._mechanism.links))
+                self._world.force_M_N = np.zeros(3)
             self._wait_until(item.start_s)
             self._world.heat(item.heat)
             self._world.force_M_N = item.force_M_N

@@ -35,8 +35,6 @@ LOAD_LOW_N, LOAD_HIGH_N = np.array([-30.0, -30.0, -60.0]), np.array([30.0, 30.0,
 # Upper ends of the heat that is drawn: drives at work, electronics, cabinet, a spindle, sun and lamps; W.
 DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0, 0.2, 60.0
 
-OFF = Heat(np.zeros(1), 0.0, np.zeros(COLUMNS), 0.0, 0.0, 0.0)
-
 
 @dataclass(frozen=True)
 class Item:
@@ -92,15 +90,20 @@ def plan(
     return Plan(number, tuple(items), points_mm, weather)
 
 
+def switched_off(links: int) -> Heat:
+    """What a machine gives off between sessions."""
+    return Heat(np.zeros(links), 0.0, np.zeros(COLUMNS), 0.0, 0.0, 0.0)
+
+
 def _session(
     number: int, start_s: float, links: int, points: int, passes: int, rng: np.random.Generator
 ) -> Iterator[Item]:
     count = VISITS_PER_SESSION + passes
     every = count // passes if passes else count + 1
     order = _order(points, count, rng)
-    heat = OFF
+    heat = _heat(links, rng)
     for k in range(count):
-        if k % (count // HEATS_PER_SESSION) == 0:
+        if k > 0 and k % (count // HEATS_PER_SESSION) == 0:
             heat = _heat(links, rng)
         loaded = rng.uniform() < LOADED_SHARE
         force_M_N = np.round(rng.uniform(LOAD_LOW_N, LOAD_HIGH_N), 2) if loaded else np.zeros(3)

@@ -24,11 +24,12 @@ COLUMNS = 3
 PLATE_LAYERS = 5
 _FACES = ("inner", "outer")
 
-# Heat: a drive holding its link and moving it, near the base end; electronics on the base ring; the
+# Heat: a drive holding its link and moving it; electronics on the base ring; the
 # cabinet's radiation on a column's outer face (it stands beside column 1); lamps over the plate.
 _DRIVE_HOLDING_W = 0.3
 _DRIVE_MOVING_W = 1.2
-_DRIVE_PIECE = 1
+# The motor near the base end gives off a third of it; nut, screw and guides the rest, over the whole travel.
+_DRIVE_SHARES = np.array([2, 7, 2, 2, 2]) / 15
 _RING_W = 12.0
 _CABINET_W = (8.0, 3.0, 4.0)
 _PLATFORM_W = 0.4
@@ -78,7 +79,7 @@ class WarmUp:
         self._at_plate = np.array([index[name] for name in self._plate])
         self.heat = usual_heat(links, heat_share)
         self._moving_W: Floats = np.zeros(len(index))
-        self._moving_W[self._at_link[:, _DRIVE_PIECE]] = heat_share * _DRIVE_MOVING_W
+        self._moving_W[self._at_link] = heat_share * _DRIVE_MOVING_W * _DRIVE_SHARES
 
     def advance(self, time_s: float, moving_share: float) -> None:
         """Let `time_s` pass; the drives moved during `moving_share` of it."""
@@ -138,7 +139,7 @@ class WarmUp:
     def _standing_W(self) -> Floats:
         index, heat = self._network.index, self.heat
         heat_W = np.zeros(len(index))
-        heat_W[self._at_link[:, _DRIVE_PIECE]] = heat.drives_W
+        heat_W[self._at_link] = heat.drives_W[:, None] * _DRIVE_SHARES
         heat_W[self._at_column[:, 1, :]] = heat.cabinet_W[:, None] / COLUMN_STOREYS
         for body, watts in (
             ("base", heat.ring_W), ("platform", heat.platform_W), ("tool", heat.tool_W), (self._plate[0], heat.lamps_W)
