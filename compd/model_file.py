@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import yaml
 
+from compd import __version__
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Fitted
 from compd.model.effects import find
@@ -56,6 +57,7 @@ class Stored:
     machine: str
     state: State = field(default_factory=lambda: NOTHING)
     steps: tuple[Step, ...] = ()
+    geometry: str = ""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class ModelFile:
 
     declared : each effect as the person named it.  fitted : with numbers and their own covariance.
     covariance : (P, P) of all fitted numbers jointly, in the order of `fitted`.
+    geometry : hash of the geometry that it was fitted on; "" where that is not known.
     """
 
     machine: str
@@ -71,6 +74,7 @@ class ModelFile:
     fitted: tuple[Fitted, ...] = ()
     covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     steps: tuple[Step, ...] = ()
+    geometry: str = ""
 
     def state(self, links: int) -> State:
         """The effects as plain data, for the file."""
@@ -104,15 +108,21 @@ def read_stored(path: Path) -> Stored:
         raise StateError(Problem(where, "is no model file of this version", f"format: {found}", f"format: {FORMAT}"))
     try:
         steps = tuple(Step(**step) for step in data.get("steps") or ())
-    except TypeError as error:
+    except (TypeError, AttributeError) as error:
         raise StateError(Problem(where, f"a step cannot be read: {error}")) from error
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
-    return Stored(str(data.get("machine")), state, steps)
+    for key, value in state.items():
+        if not isinstance(value, list):
+            raise StateError(
+                Problem(f"{where}, {key}", "is no list", str(value)[:80], "as `compd effect add` writes it")
+            )
+    return Stored(str(data.get("machine")), state, steps, str(data.get("geometry") or ""))
 
 
-def read_model_file(path: Path, machine: str, links: int) -> ModelFile:
+def read_model_file(path: Path, machine: str, links: int, geometry: str = "") -> ModelFile:
     """Read a model file for the machine of this name with so many links (0 for an external model).
 
+    geometry : hash of the machine's geometry, where numbers that were fitted on another one are of no use.
     Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
     installed, numbers that are missing.
     """
@@ -121,6 +131,11 @@ def read_model_file(path: Path, machine: str, links: int) -> ModelFile:
         raise StateError(
             Problem(str(path), "belongs to another machine", stored.machine, machine,
                     "give this machine's model file, or begin a new one")
+        )  # fmt: skip
+    if geometry and stored.geometry and stored.geometry != geometry:
+        raise StateError(
+            Problem(str(path), "was fitted on another geometry of this machine", stored.geometry, geometry,
+                    "fit it again with `compd effect fit`")
         )  # fmt: skip
     return _opened(stored, links, str(path))
 
@@ -136,21 +151,26 @@ def _opened(stored: Stored, links: int, where: str) -> ModelFile:
             declared.append(entry["effect"])
         except CompdError as error:
             problems += error.problems
-        except (KeyError, TypeError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             problems.append(Problem(place, f"cannot be read: {error!r}", allowed="effect, shape, parameters"))
     count = sum(len(one.theta) for one in fitted)
-    covariance = np.array(stored.state["covariance"] or np.zeros((0, 0)), dtype=np.float64)
+    try:
+        covariance = np.array(stored.state["covariance"] or np.zeros((0, 0)), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise StateError([*problems, Problem(f"{where}, covariance", f"is no matrix of numbers: {error}")]) from error
     if not problems and covariance.shape != (count, count):
         problems.append(Problem(f"{where}, covariance", "has another size than the parameters",
                                 str(covariance.shape), f"({count}, {count})"))  # fmt: skip
     if problems:
         raise StateError(problems)
-    return ModelFile(stored.machine, tuple(declared), _each_its_own(fitted, covariance), covariance, stored.steps)
+    return ModelFile(
+        stored.machine, tuple(declared), _each_its_own(fitted, covariance), covariance, stored.steps, stored.geometry
+    )
 
 
 def write_model_file(path: Path, file: ModelFile, links: int) -> None:
     """Write a model whole or not at all. Raises StateError where the disk refuses."""
-    write_stored(path, Stored(file.machine, file.state(links), file.steps))
+    write_stored(path, Stored(file.machine, file.state(links), file.steps, file.geometry))
 
 
 def write_stored(path: Path, stored: Stored) -> None:
@@ -158,6 +178,8 @@ def write_stored(path: Path, stored: Stored) -> None:
     data = {
         "format": FORMAT,
         "machine": stored.machine,
+        **({"geometry": stored.geometry} if stored.geometry else {}),
+        "release": __version__,
         **stored.state,
         "steps": [{**asdict(step), "replaced": dict(step.replaced)} for step in stored.steps],
     }

@@ -46,7 +46,7 @@ def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Pat
 
 
 def shelf(live: Machine) -> ModelShelf:
-    return ModelShelf(live.model, live.configuration.machine, live.wires)
+    return ModelShelf(live.model, live.configuration.machine, live.configuration.geometry_hash, live.wires)
 
 
 @pytest.fixture
@@ -131,6 +131,24 @@ def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tri
         shelf(tripod).read(file_with(tmp_path / "other.yaml", "link_zero", name="hexapod", links=6))
     with pytest.raises(StateError, match="cannot be read"):
         shelf(tripod).read(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("value: 1.0", "value: one", "cannot be read"),
+        ("effects:", "effects: 5\nothers:", "is no list"),
+        ("covariance:", "covariance: [[1], [2, 3]]\nothers:", "is no matrix of numbers"),
+        ("machine: tripod-cmm", "machine: tripod-cmm\ngeometry: 0123", "another geometry of this machine"),
+    ],
+)
+def test_a_damaged_model_file_is_refused_in_words(tripod, tmp_path, old, new, told):
+    file = file_with(tmp_path / "m.yaml", "link_sag")
+    assert shelf(tripod).read(file).summary["effects"] == ["link_sag"]
+    assert old in file.read_text()
+    file.write_text(file.read_text().replace(old, new))
+    with pytest.raises(StateError, match=told):
+        shelf(tripod).read(file)
 
 
 def test_an_effect_of_faulty_code_is_refused_before_the_loop_meets_it(tripod, tmp_path):

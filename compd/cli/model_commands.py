@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from compd.configuration import Configuration
     from compd.model.effect import Effect
     from compd.model_file import Declaration, ModelFile
     from compd.workbench.ledger import Change
@@ -32,12 +34,11 @@ def add(
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.cli.compare import open_recording
-    from compd.model_file import ModelFile
     from compd.workbench.ledger import add as added
 
     declared, found = declaration_of(effect)
-    seen, _ = open_recording(recording, machine)
-    file = _opened(model, seen) if model.exists() else ModelFile(seen.recording.machine)
+    seen, configuration = open_recording(recording, machine)
+    file = _opened(model, seen, configuration) if model.exists() else _begun(seen, configuration)
     _finish(model, added(file, declared, found, seen, _now()), f"added {found.id}", dry_run)
 
 
@@ -52,8 +53,8 @@ def remove(
     from compd.cli.compare import open_recording
     from compd.workbench.ledger import remove as removed
 
-    seen, _ = open_recording(recording, machine)
-    _finish(model, removed(_opened(model, seen), effect, seen, _now()), f"removed {effect}", dry_run)
+    seen, configuration = open_recording(recording, machine)
+    _finish(model, removed(_opened(model, seen, configuration), effect, seen, _now()), f"removed {effect}", dry_run)
 
 
 def fit(
@@ -63,8 +64,8 @@ def fit(
     from compd.cli.compare import open_recording
     from compd.workbench.ledger import refit
 
-    seen, _ = open_recording(recording, machine)
-    _finish(model, refit(_opened(model, seen), seen, _now()), "fitted again", dry_run)
+    seen, configuration = open_recording(recording, machine)
+    _finish(model, refit(_opened(model, seen, configuration), seen, _now()), "fitted again", dry_run)
 
 
 def undo(model: ModelOption) -> None:
@@ -93,10 +94,22 @@ def declaration_of(text: str) -> tuple[Declaration, Effect]:
     return text, find(text, "compd effect add")
 
 
-def _opened(path: Path, seen: Observed) -> ModelFile:
+def _opened(path: Path, seen: Observed, configuration: Configuration | None) -> ModelFile:
+    """All its numbers are about to be fitted again, on this geometry."""
     from compd.model_file import read_model_file
 
-    return read_model_file(path, seen.recording.machine, seen.rows.links)
+    file = read_model_file(path, seen.recording.machine, seen.rows.links)
+    return replace(file, geometry=_geometry(configuration))
+
+
+def _begun(seen: Observed, configuration: Configuration | None) -> ModelFile:
+    from compd.model_file import ModelFile
+
+    return ModelFile(seen.recording.machine, geometry=_geometry(configuration))
+
+
+def _geometry(configuration: Configuration | None) -> str:
+    return "" if configuration is None else configuration.geometry_hash
 
 
 def _now() -> str:

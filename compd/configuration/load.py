@@ -62,6 +62,11 @@ class Configuration:
         return _hash(self, ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"))
 
     @property
+    def geometry_hash(self) -> str:
+        """Of what a model is fitted on: the geometry, without what only limits it."""
+        return _hash(self, ("geometry",), without=("link_length_mm",))
+
+    @property
     def zero_hash(self) -> str:
         """Of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
         return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))

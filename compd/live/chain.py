@@ -34,4 +34,4 @@ def build_chain(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) 
         model, wires, configuration.loop, configuration.limits, configuration.sockets.valid_for_s,
         configuration.geometry.link_length_mm, declared_noise(configuration),
     )  # fmt: skip
-    return Chain(latest, wires, cycle, ModelShelf(model, configuration.machine, wires))
+    return Chain(latest, wires, cycle, ModelShelf(model, configuration.machine, configuration.geometry_hash, wires))

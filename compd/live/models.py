@@ -85,10 +85,11 @@ class Models(NamedTuple):
 class ModelShelf:
     """Reads model files for one machine, and refuses those that it cannot use live."""
 
-    def __init__(self, bare: MachineModel, machine: str, wires: MachineWires) -> None:
-        """`bare`: without effects; `machine`: the name in its configuration."""
+    def __init__(self, bare: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
+        """`bare`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
         self.bare = LiveModel(bare, "", "", (), wires.quantity_wires(()))
         self._machine = machine
+        self._geometry = geometry
         self._wires = wires
 
     def read(self, path: Path) -> LiveModel:
@@ -98,7 +99,7 @@ class ModelShelf:
         """
         before = _hash(path)
         bare = self.bare.machine
-        file = read_model_file(path, self._machine, bare.links)
+        file = read_model_file(path, self._machine, bare.links, self._geometry)
         if problems := [*self._unusable(file.fitted), *_misnamed(file.fitted)]:
             raise StateError(problems)
         machine = replace(bare, effects=file.fitted, covariance=file.covariance)

@@ -71,7 +71,7 @@ def undo(stored: Stored, date: str, where: str) -> Stored:
     steps[standing[-1]] = replace(last, undone=True)
     taken_back = Step("undo", last.effect, date, last.recording, last.sha256, last.rms_after_um, last.rms_before_um,
                       last.noise_floor_um, {})  # fmt: skip
-    return Stored(stored.machine, last.replaced, (*steps, taken_back))
+    return Stored(stored.machine, last.replaced, (*steps, taken_back), stored.geometry)
 
 
 def _afresh(one: Fitted, links: int) -> Fitted:
