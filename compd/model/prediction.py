@@ -241,17 +241,11 @@ def _points(points: Floats, port: Port, deltas: Deltas) -> Floats:
 def _base_joints_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
     """Derivatives (N, 3 n, 9) of the base joints by the frame's distances or the plate's points."""
     distances_mm = model.zero.distances_mm + rows.frame_mm
-    found = np.empty((len(rows), 3 * rows.links, 9))
-    for i in range(9):
-        step = np.zeros(9)
-        step[i] = STEP_MM
-        ends = []
-        for signed in (step, -step):
-            if port == "frame":
-                frame = solve_frame(model.frame, distances_mm + signed)
-            else:
-                plate = model.frame.plate_points_M_mm + signed.reshape(3, 3)
-                frame = solve_frame(model.frame._replace(plate_points_M_mm=plate), distances_mm)
-            ends.append(frame.base_joints_M_mm.reshape(len(rows), -1))
-        found[:, :, i] = (ends[0] - ends[1]) / (2 * STEP_MM)
-    return found
+    steps = STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
+    if port == "frame":
+        frame = solve_frame(model.frame, distances_mm + steps[:, None])
+    else:
+        plates = model.frame.plate_points_M_mm + steps.reshape(18, 1, 3, 3)
+        frame = solve_frame(model.frame._replace(plate_points_M_mm=plates), distances_mm)
+    ends = frame.base_joints_M_mm.reshape(18, len(rows), -1)
+    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * STEP_MM), 0, 2))

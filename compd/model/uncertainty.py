@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from compd.model.effect import Deltas, Memories, Port, deltas, together
+from compd.model.effect import Deltas, Fitted, Memories, Port, deltas, quantities, together
 from compd.model.jit import Floats
 from compd.model.machine import MachineModel
 from compd.model.prediction import Sensitivity, columns, sensitivities
@@ -69,12 +69,13 @@ def _by_quantity(
     model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
 ) -> Floats:
     """(N, 3) by how many mm the tip moves when one quantity shows more by its standard deviation."""
+    using = [one for one in model.acting if name in quantities(one.effect, model.links)]
     more = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
-    before, after = (_added(model, seen, memories) for seen in (rows, more))
+    before, after = (_added(using, seen, memories) for seen in (rows, more))
     moved = (by[port].tip @ (after[port] - before[port])[:, :, None] for port in after)
     return np.asarray(sum(moved, start=np.zeros((len(rows), 3, 1)))[:, :, 0])
 
 
-def _added(model: MachineModel, rows: Rows, memories: Memories) -> Deltas:
-    each, _ = deltas(model.acting, rows, memories)
+def _added(effects: Sequence[Fitted], rows: Rows, memories: Memories) -> Deltas:
+    each, _ = deltas(effects, rows, memories)
     return together(list(each.values()))
