@@ -30,11 +30,11 @@ def load(group: str, name: str, where: str) -> Any:
     Raises PluginError, which names `where` and lists what there is.
     """
     if match := _PATH.match(name):
-        return _load_file(Path(match["file"]), match["name"], where, _KIND[group])
+        return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group))
     points: dict[str, EntryPoint] = {point.name: point for point in entry_points(group=group)}
     if name not in points:
         raise PluginError(
-            Problem(where, f"no such {_KIND[group]}", name, ", ".join(sorted(points)) or "none installed",
+            Problem(where, f"no such {_KIND.get(group, group)}", name, ", ".join(sorted(points)) or "none installed",
                     "choose one of these, or write /absolute/file.py:Name")
         )  # fmt: skip
     try:

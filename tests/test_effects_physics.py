@@ -254,7 +254,7 @@ def test_air_drift_and_registration_are_the_instruments() -> None:
     np.testing.assert_allclose(added("reference_air_index", rows, 0.8)[:, :3], 0.8 * wavelengths * rows.tip_M_mm)
     np.testing.assert_allclose(added("reference_drift", rows, 1.0, -2.0, 3.0)[:, 2], [0, 1.5e-3, 3e-3, 6e-3])
     theta = np.array([30.0, -20.0, 10.0, 200.0, -100.0, 50.0])
-    turned = Rotation.from_rotvec(1e-6 * theta[3:]).apply(rows.tip_M_mm) + UM * theta[:3]
+    turned = Rotation.from_rotvec(1e-6 * theta[3:]).apply(np.array(rows.tip_M_mm)) + UM * theta[:3]
     shown = predict(TRIPOD, rows, {"reference": added("reference_registration", rows, *theta)})
     np.testing.assert_allclose(shown.tip_mm, turned, atol=1e-5)  # second order: (200e-6)^2 * 230 mm
     attitude = Rotation.from_matrix(shown.rotation_M_P) * Rotation.from_matrix(rows.rotation_M_P).inv()

@@ -126,7 +126,7 @@ class Taking:
 
     def take(self):
         self.taker.take(self.answers.append)
-        self.taker._thread.join()
+        self.taker._errand.join()
         return json.loads(self.answers[-1])
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
 import structlog
 
 from compd.errors import CompdError
+from compd.live.errand import Errand
 from compd.live.loop import Orders
 from compd.live.models import LiveModel, Models, ModelShelf
 from compd.live.protocol import ErrorCode, ModelOrder, ProtocolError, line
@@ -22,31 +22,27 @@ class ModelAdopter:
     def __init__(self, shelf: ModelShelf, orders: Orders) -> None:
         self._shelf = shelf
         self._orders = orders
-        self._thread: threading.Thread | None = None
+        self._errand = Errand("model", "another model is being read")
 
     def take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
         """Start; `answer` gets the MODEL or ERROR line when it is done. Raises ProtocolError while one is running."""
-        if self._thread is not None and self._thread.is_alive():
-            raise ProtocolError(ErrorCode.BUSY, "another model is being read")
-        self._thread = threading.Thread(target=self._take, args=(order, answer), name="model", daemon=True)
-        self._thread.start()
+        self._errand.begin(lambda: self._taken(order), answer)
 
     def stop(self) -> None:
-        """Returns when the thread has ended."""
-        if self._thread is not None:
-            self._thread.join()
+        """Returns when nothing is being read."""
+        self._errand.join()
 
-    def _take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
+    def _taken(self, order: ModelOrder) -> bytes:
+        """Do it; the MODEL or ERROR line."""
         try:
             model = self._shelf.read(Path(order.file)) if order.file else None
         except CompdError as error:
             _log.warning("model refused", file=order.file, reason=str(error))
-            answer(ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json())
-            return
+            return ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json()
         models = self._changed(order, model)
         self._orders.models = models
         _log.info("shadow" if order.shadow else "model adopted", file=order.file or "none")
-        answer(line({"class": "MODEL", **models.summary}))
+        return line({"class": "MODEL", **models.summary})
 
     def _changed(self, order: ModelOrder, model: LiveModel | None) -> Models:
         applied, shadow = self._orders.models or Models(self._shelf.bare)

@@ -12,6 +12,7 @@ import structlog
 
 from compd.clock import Clock
 from compd.errors import Problem, StateError
+from compd.live.errand import Errand
 from compd.live.loop import Orders
 from compd.live.protocol import ErrorCode, ProtocolError, line
 from compd.live.wiring import MachineWires
@@ -40,33 +41,29 @@ class ZeroTaker:
         self._zero_hash = zero_hash
         self._clock = clock
         self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._errand = Errand("zero", "machine zero is being taken already")
 
     def take(self, answer: Callable[[bytes], None]) -> None:
         """Start; `answer` gets the ZERO or ERROR line when it is done. Raises ProtocolError while one is running."""
-        if self._thread is not None and self._thread.is_alive():
-            raise ProtocolError(ErrorCode.BUSY, "machine zero is being taken already")
-        self._thread = threading.Thread(target=self._take, args=(answer,), name="zero", daemon=True)
-        self._thread.start()
+        self._errand.begin(self._taken, answer)
 
     def stop(self) -> None:
-        """Give up what is running; returns when its thread has ended."""
+        """Give up what is running; returns when it has ended."""
         self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._errand.join()
 
-    def _take(self, answer: Callable[[bytes], None]) -> None:
+    def _taken(self) -> bytes:
+        """Do it; the ZERO or ERROR line."""
         try:
             zero = MachineZero(self._zero_hash, datetime.now(UTC).isoformat(timespec="seconds"), self.sample())
             path = zero.save(self._directory)
         except StateError as error:
             _log.warning("machine zero refused", reason=str(error))
-            answer(ProtocolError(ErrorCode.ZERO_REFUSED, str(error)).to_json())
-            return
+            return ProtocolError(ErrorCode.ZERO_REFUSED, str(error)).to_json()
         self._orders.zero = zero
         _log.info("machine zero taken", path=str(path))
-        answer(line({"class": "ZERO", "taken_at": zero.taken_at, "path": str(path),
-                     "readings_mm": dict(zero.readings_mm)}))  # fmt: skip
+        return line({"class": "ZERO", "taken_at": zero.taken_at, "path": str(path),
+                     "readings_mm": dict(zero.readings_mm)})  # fmt: skip
 
     def sample(self) -> dict[str, float]:
         """Mean raw reading (mm) of every length gauge over the window, each reading counted once.
