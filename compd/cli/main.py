@@ -10,7 +10,6 @@ import typer
 from compd import __version__
 from compd.cli import model_commands
 from compd.cli.adopt import adopt, shadow
-from compd.cli.adopt import adopt, shadow
 from compd.cli.campaign import campaign
 from compd.cli.check import check
 from compd.cli.compare import compare

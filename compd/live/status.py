@@ -45,7 +45,7 @@ class StatusReport:
             "time_s": round(now_s, 6),
             "mode": "cmm" if self.orders.target is None else "machine_tool",
             "zero": self._zero(),
-            "model": {} if self.orders.models is None else self.orders.models.summary,
+            "model": self._model(),
             "loop": self.loop.timing.summary(),
             "realtime": {name: granted._asdict() for name, granted in self.loop.permissions.items()},
             "publisher": published,
@@ -60,6 +60,11 @@ class StatusReport:
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
         return {"taken": True, "taken_at": zero.taken_at}
+
+    def _model(self) -> dict[str, Any]:
+        """Applied, and shadow if there is one; without their files, which are this computer's business."""
+        summary = {} if self.orders.models is None else self.orders.models.summary
+        return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
         """Every channel: raw value, before sign and zero, with its age; a stale one says so."""
