@@ -50,6 +50,8 @@ def tracker(
                     break
         except KeyboardInterrupt:
             pass  # the usual end
+    if not looks:
+        raise CompdError(Problem(str(out), "the tracker has not looked once", next_step="let it look for longer"))
     table = np.array(looks)
     table[:, 0] -= table[0, 0]
     lines = [",".join(f"{value:.6f}" for value in row) for row in table]

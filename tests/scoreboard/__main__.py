@@ -8,15 +8,17 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from tests.scoreboard.cases import KINDS, NOTHING, OUTSIDE, PAIRS, SEEDS, STRENGTHS, Case, cases, named
 from tests.scoreboard.table import report
-from tests.scoreboard.trial import run
+from tests.scoreboard.trial import prepare, run
 
 
 def main() -> None:
@@ -25,7 +27,11 @@ def main() -> None:
     wanted = named(options.case) if options.case else cases(
         options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs
     )  # fmt: skip
-    failed = _run_all(_missing(wanted, options.out)[: options.most], options.out, options.jobs)
+    if options.prepare:
+        failed = _in_parallel(prepare, wanted[: options.most], options, lambda _: None)
+        raise SystemExit(str(failed) if failed else 0)
+    with options.out.open("a+", encoding="utf-8") as file:
+        failed = _in_parallel(run, _missing(wanted, options.out)[: options.most], options, partial(_write, file))
     results = [json.loads(line) for line in options.out.read_text(encoding="utf-8").splitlines()]
     names = {case.name for case in wanted}
     results = [one for one in results if one["case"] in names]
@@ -48,32 +54,38 @@ def _options() -> argparse.Namespace:
     add("--case", action="append", help="this case alone, as the results name it; may be given again")
     add("--most", type=int, default=None, help="run so many cases at most")
     add("--jobs", type=int, default=os.cpu_count(), help="side by side")
+    add("--prepare", action="store_true", help="make the campaigns alone, and keep them")
+    add("--campaigns", type=Path, default=Path("out/campaigns"), help="where they are kept")
     add("--out", type=Path, default=Path("out/scoreboard.jsonl"))
     return parser.parse_args()
 
 
 def _missing(wanted: Sequence[Case], out: Path) -> list[Case]:
-    out.touch()
     done = {json.loads(line)["case"] for line in out.read_text(encoding="utf-8").splitlines()}
     return [case for case in wanted if case.name not in done]
 
 
-def _run_all(missing: Sequence[Case], out: Path, jobs: int) -> list[tuple[str, str]]:
-    """What failed, and why: a case that fails is reported, and not counted as anything."""
+def _write(file: TextIO, result: object) -> None:
+    file.write(json.dumps(result) + "\n")
+    file.flush()
+
+
+def _in_parallel(
+    work: Callable[[Case, Path], object],
+    todo: Sequence[Case],
+    options: argparse.Namespace,
+    done: Callable[[object], None],
+) -> list[tuple[str, str]]:
+    """`done` gets each result. What failed, and why: a case that fails is reported, and not counted as anything."""
     failed: list[tuple[str, str]] = []
     columns = (TextColumn("scoreboard"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with (
-        out.open("a", encoding="utf-8") as file,
-        ProcessPoolExecutor(jobs) as pool,
-        Progress(*columns, transient=True) as progress,
-    ):
-        bar = progress.add_task("", total=len(missing))
-        running = {pool.submit(run, case): case for case in missing}
+    with ProcessPoolExecutor(options.jobs) as pool, Progress(*columns, transient=True) as progress:
+        bar = progress.add_task("", total=len(todo))
+        running = {pool.submit(work, case, options.campaigns): case for case in todo}
         for future in as_completed(running):
             error = future.exception()
             if error is None:
-                file.write(json.dumps(future.result()) + "\n")
-                file.flush()
+                done(future.result())
             else:
                 failed.append((running[future].name, str(error)))
             progress.advance(bar)

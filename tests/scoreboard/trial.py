@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,28 +24,41 @@ CONFIG = Path(__file__).parents[2] / "config" / "tripod-cmm.yaml"
 TIMEOUT_S = 300.0
 
 
-def run(case: Case) -> dict[str, Any]:
+def prepare(case: Case, campaigns: Path) -> Path:
+    """The case's two campaigns, made once: what is measured first, and other days on the same machine."""
+    directory = campaigns / case.name.replace(":", "_")
+    if not (directory / "other.answer.json").exists():
+        directory.mkdir(parents=True, exist_ok=True)
+        wanted = [Hidden(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
+        sized = hide(case, wanted, directory, "train", 0)
+        hide(case, sized, directory, "other", 1)
+    return directory
+
+
+def run(case: Case, campaigns: Path) -> dict[str, Any]:
     """A line of the results: what was hidden, what the diagnosis said, and how well the model then does elsewhere."""
+    prepared = prepare(case, campaigns)
     with tempfile.TemporaryDirectory(prefix="compd-score-") as temporary:
         directory = Path(temporary)
-        hide(case, directory, "train", 0)
-        hide(case, directory, "other", 1)
+        for name in ("train.csv", "train.yaml", "other.csv", "other.yaml"):
+            # without the seal: it stays where it is
+            shutil.copy(prepared / name, directory)
         start_s = time.perf_counter()
         verdict = json.loads(compd(directory, "diagnose", "train.csv", "--json"))
         took_s = time.perf_counter() - start_s
         ratio, fitted = add_all(directory, [step["effect"] for step in verdict["steps"]])
-        secret = json.loads((directory / "train.answer.json").read_text(encoding="utf-8"))
+    secret = json.loads((prepared / "train.answer.json").read_text(encoding="utf-8"))
     return {"case": case.name, "kind": case.kind, "verdict": verdict, "took_s": took_s, "other_floor_ratio": ratio,
             "fitted": fitted, "secret": secret}  # fmt: skip
 
 
-def hide(case: Case, directory: Path, name: str, other_days: int) -> None:
-    """A campaign with the case's causes in it; NAME.answer.json is for the scorer."""
-    hidden = [Hidden(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
+def hide(case: Case, hidden: list[Hidden], directory: Path, name: str, other_days: int) -> list[Hidden]:
+    """A campaign with these causes in it, and how strong each became; NAME.answer.json is for the scorer."""
     recorded = record(load(CONFIG), case.seed, hidden, other_days=other_days)
-    write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar)
+    write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar, overwrite=True)
     seal(directory / f"{name}.answer.json", [one.cause for one in recorded.hidden],
          [one.floors for one in recorded.hidden], recorded.weak, case.seed)  # fmt: skip
+    return [Hidden(one.cause.id, one.cause.strength) for one in recorded.hidden]
 
 
 def add_all(directory: Path, effects: list[str]) -> tuple[float, list[dict[str, Any]]]:
