@@ -111,7 +111,8 @@ def test_a_cycle_without_zero_reads_back_as_it_was():
 def with_models(tmp_path):
     """A run in which a model with memory is adopted and another shadows it; its cycles' messages and setpoints."""
     run = Run(machine())
-    shelf = ModelShelf(run.machine.model, run.machine.configuration.machine, run.machine.wires)
+    configuration = run.machine.configuration
+    shelf = ModelShelf(run.machine.model, configuration.machine, configuration.geometry_hash, run.machine.wires)
     lag = file_with(tmp_path / "lag.yaml", "link_expansion_lag", "friction_hysteresis")
     backlash = file_with(tmp_path / "backlash.yaml", "backlash")
     adopted = [None, Models(shelf.read(lag)), Models(shelf.read(lag), shelf.read(backlash))]
