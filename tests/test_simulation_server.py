@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -11,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from compd.clock import MonotonicClock
@@ -18,6 +20,8 @@ from compd.configuration import Configuration, load
 from compd.errors import PluginError
 from compd.gauge import LineFault, Quality, Reading
 from compd.lines.open import open_line
+from compd.simulation.hidden import drawn
+from compd.simulation.mechanism import Mechanism
 from compd.simulation.server import STEP_S, Simulation
 from compd.simulation.world import World
 from tests.simulated import HEXAPOD, TRIPOD, ask, run_directory
@@ -135,6 +139,19 @@ def test_machine_zero_is_held_until_somebody_drives(start: Callable[[Path], Runn
     assert truth["weather_time_s"] == pytest.approx(200.0)
 
 
+def test_a_tracker_shows_the_tip_with_its_noise(start: Callable[[Path], Running]) -> None:
+    running = start(TRIPOD)
+    ask(running.control, {"class": "DRIVE", "scale_mm": [3.0, -4.0, 5.0]})
+    running.clock.turn(10.0)
+    true_mm = np.array(ask(running.control, {"class": "TRUTH"})["tip_mm"])
+    answers = [ask(running.control, {"class": "MEASURE"}) for _ in range(100)]
+    off_um = 1e3 * (np.array([answer["reference_mm"] for answer in answers]) - true_mm)
+    assert {answer["class"] for answer in answers} == {"MEASURED"}
+    assert {answer["monotonic_s"] for answer in answers} == {running.clock.monotonic()}
+    assert np.std(off_um) == pytest.approx(answers[0]["sigma_um"], rel=0.2)
+    assert np.abs(off_um.mean(axis=0)).max() < 0.1
+
+
 def test_truth_for_other_scale_values_and_under_load(start: Callable[[Path], Running]) -> None:
     running = start(TRIPOD)
     there = ask(running.control, {"class": "TIP_FOR", "scale_mm": [1.0, 1.0, 1.0]})
@@ -209,6 +226,18 @@ def test_the_command_serves_until_it_is_stopped() -> None:
         assert f"compd run {directory / TRIPOD.name}" in printed
         assert all(name in printed for name in load(TRIPOD).lines)
         assert not (directory / "control.sock").exists()
+
+
+def test_the_command_hides_a_cause_under_seal() -> None:
+    with run_directory() as directory:
+        options = ["--directory", str(directory), "--hidden", "3", "--seconds", "0"]
+        command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), *options]
+        finished = subprocess.run(command, capture_output=True, text=True, check=True)
+        answer = json.loads((directory / "hidden.answer.json").read_text(encoding="utf-8"))
+        (name,) = answer["effects"]
+        assert name == drawn(3, Mechanism(load(TRIPOD).geometry)).id
+        assert answer["error_in_floors"][name] > 0.5
+        assert name not in finished.stdout
 
 
 def test_the_machines_own_directory_is_refused_and_left_alone() -> None:

@@ -11,7 +11,7 @@ from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from compd.simulation.campaign import Campaign
 from compd.simulation.cause import Cause
-from compd.simulation.hidden import CAUSES, LEAST_FLOORS, Hidden, build, possible
+from compd.simulation.hidden import CAUSES, Hidden, build, possible
 from compd.simulation.instruments import TRACKER_SIGMA_UM
 from compd.simulation.mechanism import Mechanism
 from compd.simulation.plan import Plan, plan
@@ -53,23 +53,27 @@ class Sizing:
         if hidden.strength is not None:
             return Sized(self._build(hidden.id, hidden.strength), self.floors(self._build(hidden.id, hidden.strength)))
         kind = CAUSES[hidden.id]
-        least = kind.least if hidden.floors >= LEAST_FLOORS else 0.0
         strength, floors = FIRST_SHARE * kind.most, 0.0
         for _ in range(MOST_TRIES):
             floors = self.floors(self._build(hidden.id, strength))
             if floors == 0 or abs(floors / hidden.floors - 1) < GOOD_ENOUGH:
                 break
-            wanted = min(max(strength * hidden.floors / floors, least), kind.most)
+            wanted = min(max(strength * hidden.floors / floors, kind.least), kind.most)
             if wanted == strength:
                 break
             strength = wanted
         return Sized(self._build(hidden.id, strength), floors)
 
     def weak(self, besides: Sequence[str], rng: np.random.Generator) -> list[Cause]:
-        """Two causes of those that are not `besides`, each too weak to be found."""
+        """Two causes of those that are not `besides`, each too weak to be found: taken down in proportion."""
         others = [name for name in possible(self.mechanism) if name not in besides]
         names = rng.choice(others, WEAK_CAUSES, replace=False).tolist()
-        return [self.cause(Hidden(name, None, WEAK_FLOORS)).cause for name in names]
+        found = []
+        for name in names:
+            strength = FIRST_SHARE * CAUSES[name].most
+            floors = self.floors(self._build(name, strength))
+            found.append(self._build(name, strength * WEAK_FLOORS / floors if floors > 0 else strength))
+        return found
 
     def _build(self, name: str, strength: float) -> Cause:
         return build(name, strength, self.mechanism, self._seed)
