@@ -47,11 +47,15 @@ def adequate(result: Result) -> bool:
     return bool(result["verdict"]["verdict"] == "adequate")
 
 
+def follows(secret: Mapping[str, Any]) -> set[str]:
+    """The covariates by which a cause outside the library may be known."""
+    return {name for one in secret["follows"] for name in (POSITION if one == "position" else (one,))}
+
+
 def covariate_found(result: Result) -> bool:
     """What a cause outside the library follows is first or second in `depends_on`."""
-    told = [one["covariate"] for one in result["verdict"]["depends_on"][:2]]
-    wanted = {name for one in result["secret"]["follows"] for name in (POSITION if one == "position" else (one,))}
-    return bool(wanted & set(told))
+    told = {one["covariate"] for one in result["verdict"]["depends_on"][:2]}
+    return bool(follows(result["secret"]) & told)
 
 
 def intervals(result: Result) -> Iterator[tuple[str, bool]]:

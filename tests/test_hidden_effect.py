@@ -1,0 +1,133 @@
+"""The machine has an effect that the daemon's model lacks: it is found, adopted, and the live error falls.
+
+Everything goes through the commands that a person would use, on wires. The name of what is hidden is in a sealed
+file that is opened here at the end, to score.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.hidden_run import HiddenRun, hidden_run, told
+from tests.scoreboard.scoring import follows
+from tests.simulated import run_directory
+
+pytest.importorskip("compd.cli.diagnose", reason="`compd diagnose` is not there")
+
+VISITS, CHECKS = 32, 6
+# Weather and warm-up: a minute on the machine is five hours of them.
+SPEEDUP = "300"
+# The points lie in this box about machine zero, as scale values; loads as a person would hang them on.
+REACH_MM = 60.0
+LOADED_SHARE = 0.45
+LOAD_LOW_N, LOAD_HIGH_N = (-30.0, -30.0, -60.0), (30.0, 30.0, 10.0)
+# Numbers for `--hidden`, as a person would try one after the other; what each hides is in its sealed file.
+QUICK = (49, 29)
+LONG = (4, 8, 12, 24, 28, 54, 77)
+PAIRS = ([49, 54], [29, 77])
+OUTSIDE = (59, 11, 1)
+TIMEOUT_S = 400
+# A hidden effect is plain when the squared error is so many times what noise alone would give.
+PLAIN_RATIO = 2.0
+
+
+class Outcome(NamedTuple):
+    """What was seen and said; um rms per coordinate. before, after: of the live tip against the truth."""
+
+    compared: dict[str, Any]
+    verdict: dict[str, Any]
+    before_um: float
+    after_um: float
+    secret: dict[str, Any]
+
+
+def plan(seed: int, count: int) -> tuple[list[list[float]], list[list[float]]]:
+    """Points one near the other, so that little time is spent on the way, and loads; as scale values and N."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-REACH_MM, REACH_MM, (count, 3))
+    order, left = [0], set(range(1, count))
+    while left:
+        here = points[order[-1]]
+        order.append(min(left, key=lambda k: float(np.abs(points[k] - here).max())))
+        left.remove(order[-1])
+    loaded = rng.uniform(size=(count, 1)) < LOADED_SHARE
+    forces = np.where(loaded, rng.uniform(LOAD_LOW_N, LOAD_HIGH_N, (count, 3)), 0.0)
+    return points[order].tolist(), forces.tolist()
+
+
+def add_found(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: Path) -> None:
+    """What the diagnosis names; where it names no effect, the description that it proposes."""
+    named = [step["effect"] for step in verdict["steps"]]
+    for number, formula in enumerate(verdict["depends_on"][0]["formula_effects"] if verdict["depends_on"] else []):
+        path = run.directory / f"formula_{number}.yaml"
+        path.write_text(yaml.safe_dump(formula), encoding="utf-8")
+        named.append(str(path))
+    for effect in named:
+        run.compd("effect", "add", effect, "--recording", recording, "--machine", run.configuration, "--model", model)
+
+
+def learned(hidden: list[int], directory: Path) -> Outcome:
+    """The whole way, from a machine with a secret to the daemon that has learned it."""
+    options = [word for number in hidden for word in ("--hidden", str(number))]
+    with hidden_run(directory, "--seed", "1", "--speedup", SPEEDUP, *options) as run:
+        recording = run.survey(*plan(2, VISITS), "survey")
+        machine = ("--machine", str(run.configuration))
+        compared = told(run.compd("compare", recording, "--json", *machine))
+        verdict = told(run.compd("diagnose", recording, "--json", *machine))
+        model = run.directory / "model.yaml"
+        add_found(run, verdict, recording, model)
+        before_um = run.tip_error_um(*plan(3, CHECKS))
+        if model.exists():
+            run.compd("adopt", model, "--daemon", run.socket)
+        after_um = run.tip_error_um(*plan(4, CHECKS))
+    secret = json.loads((run.directory / "hidden.answer.json").read_text(encoding="utf-8"))
+    return Outcome(compared, verdict, before_um, after_um, secret)
+
+
+def check_found(outcome: Outcome) -> None:
+    """Seen, named, and taken away: what is left is less than the noise of the measurement itself."""
+    verdict, floor_um = outcome.verdict, outcome.compared["noise_floor_um"]
+    assert outcome.compared["floor_ratio"] > PLAIN_RATIO
+    named = {name for step in verdict["steps"] for name in (step["effect"], *step["rivals"])}
+    assert named >= set(outcome.secret["answers"]), (outcome.secret, verdict["steps"])
+    assert verdict["verdict"] in ("identified", "ambiguous")
+    assert outcome.after_um < floor_um < outcome.before_um
+
+
+def check_described(outcome: Outcome) -> None:
+    """No effect is named for what the library has not; what it follows is, and its description takes it away."""
+    verdict, floor_um = outcome.verdict, outcome.compared["noise_floor_um"]
+    assert outcome.compared["floor_ratio"] > PLAIN_RATIO
+    assert (verdict["verdict"], verdict["steps"]) == ("unexplained", [])
+    told_first = {one["covariate"] for one in verdict["depends_on"][:2]}
+    assert told_first & follows(outcome.secret), (outcome.secret, told_first)
+    assert outcome.after_um < floor_um < outcome.before_um
+
+
+@pytest.mark.timeout(TIMEOUT_S)
+@pytest.mark.parametrize("hidden", [*QUICK, *(pytest.param(one, marks=pytest.mark.long) for one in LONG)])
+def test_one_effect(hidden: int) -> None:
+    with run_directory() as directory:
+        check_found(learned([hidden], directory))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(TIMEOUT_S)
+@pytest.mark.parametrize("hidden", PAIRS)
+def test_two_effects(hidden: list[int]) -> None:
+    with run_directory() as directory:
+        check_found(learned(hidden, directory))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(TIMEOUT_S)
+@pytest.mark.parametrize("hidden", OUTSIDE)
+def test_cause_that_the_library_has_not(hidden: int) -> None:
+    with run_directory() as directory:
+        check_described(learned([hidden], directory))
