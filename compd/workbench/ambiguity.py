@@ -12,10 +12,12 @@ from compd.workbench.significance import Projection
 
 # Losses closer than so many standard errors of their difference are the same.
 SAME = 2.0
-# Fewer numbers win where the difference is within this many (Breiman's rule).
+# Fewer numbers win where the difference is within this many (Breiman's rule), or, per number saved, this in squares
+# of the floor: a flexible effect also describes a part of the disturbances that a machine always has.
 SIMPLER = 1.0
+PER_NUMBER = 0.004
 # A candidate that can imitate another to this share (cosine) and has more numbers holds it as a special case.
-HOLDS = 0.998
+HOLDS = 0.99
 # Nor are losses that differ by less than this, in squares of the floor, or than LEAST_SHARE of what is explained: that
 # much the disturbances that a machine always has can add on either side.
 ALIKE = 0.08
@@ -42,12 +44,13 @@ def simplest(contest: Contest, chosen: Entry) -> Entry:
     members = chosen.members
     for place, k in enumerate(members):
         for other in _instead(contest, members, place):
-            if contest.candidates[other.members[place]].numbers >= contest.candidates[k].numbers:
+            saved = contest.candidates[k].numbers - contest.candidates[other.members[place]].numbers
+            if saved <= 0:
                 continue
             if other.loss - chosen.loss > FAR * (contest.base - chosen.loss):
                 break
             excess, std = contest.excess(other.members, members)
-            if excess <= SIMPLER * std and contest.is_plausible(other.members):
+            if excess <= max(SIMPLER * std, PER_NUMBER * saved) and contest.is_plausible(other.members):
                 members = other.members
                 break
     return Entry(members, contest.entries([members])[0].loss) if members else chosen

@@ -153,7 +153,7 @@ class Contest:
         index = self.index(members)
         columns = np.concatenate([self.evidence.always.values, *(self.values[k] for k in members)], axis=2)
         found = np.zeros(len(self.evidence.y))
-        counts = self._learnable[list(members)].all(axis=0)
+        counts = np.asarray(self._learnable[list(members)].all(axis=0))
         for scheme, fold in enumerate(self.evidence.folds):
             theta = self.sums.theta_by_fold(index, scheme)
             for k in range(int(fold.max()) + 1):

@@ -98,7 +98,9 @@ class Whitener:
         """(N, m, axes) what is measured of a displacement along each axis at the port."""
         axes = ["xyz".index(axis) for axis in description.axes]
         if description.port == "reference":
-            return np.broadcast_to(np.eye(3)[list(self.seen.axes)][:, axes], (len(self.seen.rows), len(self.seen.axes), len(axes)))
+            return np.broadcast_to(
+                np.eye(3)[list(self.seen.axes)][:, axes], (len(self.seen.rows), len(self.seen.axes), len(axes))
+            )
         return self.seen.sensitivity(["tool"])["tool"].tip[:, list(self.seen.axes)][:, :, axes]
 
     def __call__(self, columns_um: FloatArray) -> FloatArray:

@@ -92,7 +92,7 @@ class Description:
         if self.constant and value is None:
             parameters[self.constant] = {"unit": "s", "plausible": [min(self.grid), max(self.grid)], "source": source}
         what = re.sub(r"[^a-z0-9]+", "_", f"{self.port}_follows_{r}".lower())
-        found = {
+        return {
             "id": f"{what}_{self.form}" + (f"_{axis}" if axis else ""),
             "port": self.port,
             "formula": formula,
@@ -100,7 +100,6 @@ class Description:
             "physics": "A description, not a cause: the residual follows this on the recordings that were looked at.",
             "parameters": parameters,
         }
-        return found
 
 
 def descriptions(seen: Observed) -> Iterator[Description]:
@@ -144,8 +143,7 @@ def _ports(seen: Observed) -> Iterator[Description]:
 
 def _machine_wide(seen: Observed) -> Iterator[tuple[str, FloatArray]]:
     """Measured quantities and the place of the tip."""
-    for name, values in seen.recording.quantities.items():
-        yield name, values
+    yield from seen.recording.quantities.items()
     if np.isfinite(seen.rows.tip_M_mm).all(axis=1).any():
         for axis in range(3):
             yield f"tip_{'xyz'[axis]}_mm", seen.rows.tip_M_mm[:, axis]

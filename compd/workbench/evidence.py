@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -130,14 +131,16 @@ class Sums:
         folds = self.evidence.scheme == scheme
         gram = self.gram[folds][:, index[:, None], index]
         score = self.score[folds][:, index]
-        return solve(gram.sum(axis=0) - gram, score.sum(axis=0) - score, np.broadcast_to(self.ridge[index], score.shape))
+        return solve(
+            gram.sum(axis=0) - gram, score.sum(axis=0) - score, np.broadcast_to(self.ridge[index], score.shape)
+        )
 
     def _held_out(self, index: IntArray, counts: BoolArray) -> FloatArray:
         saved = self.base_losses - self.fold_losses(index)
         scheme = self.evidence.scheme
         gain = np.stack([saved[:, scheme == k].sum(axis=1) for k in range(scheme.max() + 1)], axis=1)
         mean = np.where(counts, gain, 0.0).sum(axis=1) / np.maximum(counts.sum(axis=1), 1) / self.evidence.numbers
-        return np.where(counts.any(axis=1), self.base - mean, np.nan)
+        return np.asarray(np.where(counts.any(axis=1), self.base - mean, np.nan))
 
     @cached_property
     def base_losses(self) -> FloatArray:
@@ -165,7 +168,7 @@ def sums(evidence: Evidence, blocks: Sequence[Block]) -> tuple[Sums, list[IntArr
     every = [evidence.always, *blocks]
     columns = np.concatenate([block.values for block in every], axis=2)
     ends = np.cumsum([block.values.shape[2] for block in every])
-    places = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    places = [np.arange(a, b) for a, b in pairwise(ends)]
     found = Sums(
         evidence,
         evidence.sums(columns, columns),

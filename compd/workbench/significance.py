@@ -25,9 +25,7 @@ class Projection:
         return np.asarray((flat - self._q @ (self._q.T @ flat)).reshape(columns.shape))
 
 
-def chances(
-    families: Sequence[Sequence[FloatArray]], y: FloatArray, left: FloatArray, group: IntArray
-) -> FloatArray:
+def chances(families: Sequence[Sequence[FloatArray]], y: FloatArray, left: FloatArray, group: IntArray) -> FloatArray:
     """(K,) chance that noise alone would let the best of all families look as good as each does; searches included.
 
     families : K lists of a candidate's variants, each (R, m, P), projected on what every fit holds.

@@ -1,0 +1,150 @@
+"""What a diagnosis says: the verdict, what was found, every candidate with its reason; as data and as words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from compd.model.effect import Effect, Fitted
+from compd.workbench.adequacy import Number
+from compd.workbench.ambiguity import Rival
+from compd.workbench.compare import Comparison
+from compd.workbench.dependence import Dependence
+
+Verdict = Literal["adequate", "identified", "ambiguous", "unexplained", "not_testable"]
+Status = Literal["explains", "partial", "no_gain", "not_testable"]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One effect found.
+
+    heldout_rms_um : with it and those before it.  explained_fraction : of what those before it left above the floor.
+    shape : its searched constants are in `fitted`.
+    """
+
+    fitted: Fitted
+    rivals: tuple[Rival, ...]
+    heldout_rms_um: float
+    explained_fraction: float
+    p_adjusted: float
+    numbers: tuple[Number, ...]
+
+    @property
+    def effect(self) -> Effect:
+        """What acts."""
+        return self.fitted.effect
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `steps`."""
+        return {
+            "effect": self.effect.id, "rivals": [one.name for one in self.rivals],
+            "heldout_rms_um": self.heldout_rms_um, "explained_fraction": self.explained_fraction,
+            "p_adjusted": self.p_adjusted, "parameters": [one.as_json() for one in self.numbers],
+            "constants": dict(self.fitted.shape), "equation": self.effect.equation,
+            "alike": {one.name: one.cosine for one in self.rivals},
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One effect of the library, tried alone; nan where it could not be."""
+
+    effect: str
+    status: Status
+    why: str
+    heldout_rms_um: float = math.nan
+    explained_fraction: float = math.nan
+    p_adjusted: float = math.nan
+    numbers: tuple[Number, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `candidates`."""
+        return {
+            "effect": self.effect, "status": self.status, "why": self.why, "heldout_rms_um": self.heldout_rms_um,
+            "explained_fraction": self.explained_fraction, "p_adjusted": self.p_adjusted,
+            "parameters": [one.as_json() for one in self.numbers],
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """before, after : the recording against the model as it was, and with the steps' effects.
+
+    next_measurement : rows of a plan where rivals are to be told apart; else what to vary, in words.
+    """
+
+    verdict: Verdict
+    before: Comparison
+    after: Comparison
+    steps: tuple[Step, ...]
+    candidates: tuple[Judged, ...]
+    depends_on: tuple[Dependence, ...]
+    next_measurement: Sequence[Mapping[str, Any]] = field(default_factory=tuple)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `compd diagnose --json` prints; nan and inf are null."""
+        found: dict[str, Any] = {
+            "verdict": self.verdict, "said": self.said,
+            "recording": str(self.before.seen.recording.path), "sha256": self.before.seen.recording.sha256,
+            "noise_floor_um": self.before.floor.um, "noise_floor_source": self.before.floor.source,
+            "residual_rms_um": self.before.rms_um, "floor_ratio": self.before.floor_ratio,
+            "steps": [one.as_json() for one in self.steps],
+            "candidates": [one.as_json() for one in self.candidates],
+            "depends_on": [one.as_json() for one in self.depends_on],
+            "next_measurement": [dict(one) for one in self.next_measurement],
+            "final_rms_um": self.after.rms_um, "final_floor_ratio": self.after.floor_ratio,
+            "outlier_rows": self.after.seen.recording.row[self.after.outlier].tolist(),
+            "rows_used": int(self.after.used.sum()),
+        }  # fmt: skip
+        finite: dict[str, Any] = _finite(found)
+        return finite
+
+    @property
+    def said(self) -> str:
+        """The verdict in one or two plain sentences."""
+        before, floor = self.before.rms_um, self.before.floor.um
+        error = f"the error of {before:.2g} um"
+        names = _listed([one.effect.id for one in self.steps])
+        after = f"{self.after.rms_um:.2g} um, where noise alone is {floor:.2g} um"
+        match self.verdict:
+            case "adequate":
+                return f"Nothing is missing: {error} is the measurement's own noise ({floor:.2g} um)."
+            case "identified":
+                return f"What is missing is {names}: with it {error} falls to {after}."
+            case "ambiguous":
+                pairs = "; ".join(
+                    f"{one.effect.id} or {_listed([rival.name for rival in one.rivals], 'or')}"
+                    for one in self.steps if one.rivals
+                )  # fmt: skip
+                return (f"With {names} {error} falls to {after}. But this recording cannot tell apart: {pairs}. "
+                        "The rows under 'next' can.")  # fmt: skip
+            case "not_testable":
+                return f"{_capital(error)} is above the noise of {floor:.2g} um, but no effect can be tested on it."
+        found = (
+            f"{_capital(names)} explains a part ({before:.2g} -> {self.after.rms_um:.2g} um). " if self.steps else ""
+        )
+        rest = (f"What follows {self.depends_on[0].covariate} has no cause in the library" if self.depends_on
+                else "The rest follows nothing that was measured")  # fmt: skip
+        return f"{found}{rest}: {self.after.rms_um:.2g} um are left, where noise alone is {floor:.2g} um."
+
+
+def _listed(names: Sequence[str], word: str = "and") -> str:
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no nan: null where a number is not known."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_finite(one) for one in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
