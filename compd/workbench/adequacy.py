@@ -9,16 +9,16 @@ import numpy as np
 from compd.model.effect import Effect
 from compd.workbench.table import FloatArray
 
-# In squares of the noise floor: what is below half of the floor is not worth a name. A machine always has
+# In squares of the noise floor: what is below 0.45 of the floor is not worth a name. A machine always has
 # disturbances of a fifth of the floor (0.04 each), and they may add up.
-LEAST_GAIN = 0.25
-# And so much of what is explained in all: no effect's form is true to better than a tenth of its size. One that comes
-# beside others must gain that times the root of how many numbers it brings: what a wrong form leaves is food for
-# flexible effects.
-LEAST_SHARE = 0.015
-# A description fits anything a little: it must say more than an effect whose physics is known. So must an effect that
-# contradicts what the sidecar declares.
-DESCRIPTION_COSTS = 1.5
+LEAST_GAIN = 0.2
+# And so much of what is explained in all: no effect's form is true to better than a few per cent of its size. One
+# that comes beside others must gain that times the root of how many numbers it brings: what a wrong form leaves is
+# food for flexible effects.
+LEAST_SHARE = 0.005
+# A description fits anything a little: it must say more than an effect whose physics is known; and with the constant
+# that it brings it does two things at once. An effect that contradicts what the sidecar declares must say more, too.
+DESCRIPTION_COSTS = 2.5
 CONTRADICTION_COSTS = 1.5
 # At the floor: chance (the floor is known to 5 %, 600 rows give 3 %) and two disturbances of a fifth of it.
 MOST_AT_FLOOR = 1.25

@@ -15,12 +15,10 @@ SAME = 2.0
 # Fewer numbers win where the difference is within this many (Breiman's rule), or, per number saved, this in squares
 # of the floor: a flexible effect also describes a part of the disturbances that a machine always has.
 SIMPLER = 1.0
-PER_NUMBER = 0.004
-# A candidate that can imitate another to this share (cosine) and has more numbers holds it as a special case.
-HOLDS = 0.99
+PER_NUMBER = 0.005
 # Nor are losses that differ by less than this, in squares of the floor, or than LEAST_SHARE of what is explained: that
 # much the disturbances that a machine always has can add on either side.
-ALIKE = 0.08
+ALIKE = 0.12
 # A candidate that misses more than this share of what another explains is no rival, whatever the errors.
 FAR = 0.3
 
@@ -68,8 +66,8 @@ def rivals(contest: Contest, members: Members, place: int) -> tuple[Rival, ...]:
             continue
         excess, std = contest.excess(other.members, members)
         cosine = likeness(contest, members, place, k)
-        # one that holds the other as a special case is bound to do about as well
-        general = cosine > HOLDS and contest.candidates[k].numbers > contest.candidates[members[place]].numbers
+        # one with more numbers is bound to do about as well where it holds the other as a special case
+        general = contest.candidates[k].numbers > contest.candidates[members[place]].numbers
         alike = 0.0 if general else min(ALIKE, LEAST_SHARE * (worth - own))
         if excess > max(SAME * std, alike) or not contest.is_plausible(other.members):
             continue

@@ -32,9 +32,8 @@ class Bench:
         self.before, self.seen, self.pool = before, seen, pool
         self.sigma_um = before.floor.by_axis_um
         always = _always_um(before) / self.sigma_um[:, None]
-        known: BoolArray = np.asarray(
-            np.isfinite(before.residual_um).all(axis=1) & np.isfinite(always).all(axis=(1, 2))
-        )
+        known: BoolArray = np.asarray(np.isfinite(before.residual_um).all(axis=1))
+        known = known & np.isfinite(always).all(axis=(1, 2))
         for one in pool.candidates:
             known = known & np.isfinite(one.columns_um).all(axis=(1, 2))
         self._known, self._always = known, always

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import combinations
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,8 @@ FINER = 9
 LEAST_SHARE = 0.03
 # Descriptions that are judged on left-out rows, of those that explain most where they were fitted.
 PROMISING = 60
+# Two covariates must take away so much of what the best one alone leaves above the floor.
+LEAST_MORE = 0.5
 # So many are computed at once: a balance of memory and overhead.
 TOGETHER = 64
 # A chance above this is no finding.
@@ -56,7 +59,8 @@ class Dependence:
     """One thing that the residual follows.
 
     explained_fraction : of what is above the noise, on rows that were left out.
-    formula_effects : ready to paste; the first is the largest.  gain_um : by how much the rms falls there.
+    formula_effects : ready to paste; the first is the largest.  numbers : their fitted numbers.
+    beside : another covariate that is needed along with it.
     """
 
     covariate: str
@@ -67,6 +71,7 @@ class Dependence:
     heldout_rms_um: float
     formula_effects: tuple[dict[str, Any], ...]
     numbers: tuple[dict[str, float], ...]
+    beside: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """The keys of the verdict's `depends_on`."""
@@ -74,7 +79,7 @@ class Dependence:
             "covariate": self.covariate, "form": self.form, "port": self.port, "p_adjusted": self.p_adjusted,
             "explained_fraction": self.explained_fraction, "heldout_rms_um": self.heldout_rms_um,
             "formula_effect": self.formula_effects[0], "formula_effects": list(self.formula_effects),
-            "fitted": list(self.numbers), "note": "a description, not a cause",
+            "fitted": list(self.numbers), "beside": list(self.beside), "note": "a description, not a cause",
         }  # fmt: skip
 
 
@@ -172,62 +177,104 @@ def held_out_losses(evidence: Evidence, basis: Block, searched: Sequence[Searche
     return total.held_out([np.concatenate([held, place]) for place in places], counts)
 
 
-def ranked(
-    searched: Sequence[Searched],
-    losses: FloatArray,
-    base: float,
-    evidence: Evidence,
-    basis: Block,
-    noise_um: float,
-    least_gain: float,
-    links: int,
-) -> tuple[Dependence, ...]:
-    """One entry per covariate, the one that explains most first; only those that explain enough not to be chance.
+class Rest(NamedTuple):
+    """What is to be described: the evidence beside `held` (R, m, Q), which leaves `left`, held out.
 
-    base : mean square left by `basis` alone, held out.  least_gain : what is worth a line, in squares of the noise.
+    noise_um : the floor.  least_gain : what is worth a line, in squares of the noise.  links : of the machine.
     """
+
+    evidence: Evidence
+    held: Block
+    left: float
+    noise_um: float
+    least_gain: float
+    links: int
+
+    def rms_um(self, loss: float) -> float:
+        """Per coordinate, from a mean square in squares of the noise."""
+        return self.noise_um * float(np.sqrt(max(loss, 0.0)))
+
+    def explained(self, loss: float) -> float:
+        """Share of what is above the noise."""
+        return float(min((self.left - loss) / max(self.left - 1.0, self.left - loss), 1.0))
+
+
+def ranked(rest: Rest, searched: Sequence[Searched], losses: FloatArray) -> tuple[Dependence, ...]:
+    """One entry per covariate, the one that explains most first; only those that explain enough not to be chance."""
     order = [int(k) for k in np.argsort(losses) if np.isfinite(losses[k])]
     if not order:
         return ()
     first: dict[str, int] = {}
     for k in order:
         first.setdefault(searched[k].description.covariate, k)
-    beside = Projection(basis.values)
-    columns = [beside(searched[k].values) for k in order]
-    y = beside(evidence.y)
+    chance = _chances(rest, [[searched[k]] for k in order])
+    by_place = dict(zip(order, chance, strict=True))
+    return tuple(
+        _dependence(rest, [searched[k]], by_place[k], float(losses[k]))
+        for k in first.values()
+        if rest.left - losses[k] >= rest.least_gain and by_place[k] <= SIGNIFICANT
+    )
+
+
+def together(rest: Rest, searched: Sequence[Searched], alone: float) -> tuple[Dependence, ...]:
+    """The two descriptions that explain most together, where that is much more than the best one does alone.
+
+    alone : mean square that the best one leaves.
+    """
+    pairs = [
+        (a, b)
+        for a, b in combinations(range(len(searched)), 2)
+        if searched[a].description.covariate != searched[b].description.covariate
+    ]
+    total, places = sums(replace(rest.evidence, always=rest.held), [one.block for one in searched])
+    held = np.arange(rest.held.values.shape[2])
+    learnable = np.array([total.learnable(place) for place in places])
+    sets = [np.concatenate([held, places[a], places[b]]) for a, b in pairs]
+    losses = total.held_out(sets, np.array([learnable[a] & learnable[b] for a, b in pairs]))
+    if not np.isfinite(losses).any():
+        return ()
+    best = int(np.nanargmin(losses))
+    pair = [searched[k] for k in pairs[best]]
+    excess = max(float(losses[best]) - 1.0, 0.0)
+    if alone - losses[best] < rest.least_gain or alone - 1.0 < excess / (1 - LEAST_MORE):
+        return ()
+    chance = _chances(rest, [pair])[0]
+    return (_dependence(rest, pair, chance, float(losses[best])),) if chance <= SIGNIFICANT else ()
+
+
+def _chances(rest: Rest, families: Sequence[Sequence[Searched]]) -> list[float]:
+    """Of each family's columns together; the first is taken to be the explanation when the noise is flipped."""
+    beside = Projection(rest.held.values)
+    columns = [beside(np.concatenate([one.values for one in family], axis=2)) for family in families]
+    y = beside(rest.evidence.y)
     left = Projection(columns[0])(y)
-    chance = dict(zip(order, chances([[one] for one in columns], y, left, evidence.group), strict=True))
-    found = []
-    for k in first.values():
-        gain = base - losses[k]
-        if gain >= least_gain and chance[k] <= SIGNIFICANT:
-            explained = min(gain / max(base - 1.0, gain), 1.0)
-            rms_um = noise_um * float(np.sqrt(max(losses[k], 0.0)))
-            found.append(_dependence(searched[k], evidence, basis, chance[k], explained, rms_um, links))
-    return tuple(found)
+    found: list[float] = chances([[one] for one in columns], y, left, rest.evidence.group).tolist()
+    return found
 
 
-def _dependence(
-    one: Searched, evidence: Evidence, basis: Block, chance: float, explained: float, rms_um: float, links: int
-) -> Dependence:
-    """With the numbers fitted on all rows, and the directions that matter."""
-    total, places = sums(replace(evidence, always=basis), [one.block])
-    held = np.arange(basis.values.shape[2])
-    theta = total.fitted(np.concatenate([held, places[0]]))[0][len(held) :]
-    names = [column.name for column in one.effect.columns(links)]
-    parts: list[tuple[float, dict[str, Any], dict[str, float]]] = []
-    for place, axis in enumerate(one.description.axes):
-        here = slice(place * len(names), (place + 1) * len(names))
-        numbers = dict(zip(names, theta[here].tolist(), strict=True))
-        sizes = {
-            parameter.name: max(abs(v) for n, v in numbers.items() if n.split("_")[0] == parameter.name)
-            for parameter in one.effect.parameters
-        }
-        power = float(((one.values[:, :, here] @ theta[here]) ** 2).sum())
-        parts.append((power, one.description.declaration(axis, one.constant, sizes), numbers))
+def _dependence(rest: Rest, described: Sequence[Searched], chance: float, loss: float) -> Dependence:
+    """With the numbers fitted on all rows, and the directions that matter; the first covariate is the larger part."""
+    total, places = sums(replace(rest.evidence, always=rest.held), [one.block for one in described])
+    theta, _, _ = total.fitted(np.concatenate([np.arange(rest.held.values.shape[2]), *places]))
+    parts: list[tuple[float, str, dict[str, Any], dict[str, float]]] = []
+    for one, place in zip(described, places, strict=True):
+        names = [column.name for column in one.effect.columns(rest.links)]
+        for number, axis in enumerate(one.description.axes):
+            here = slice(number * len(names), (number + 1) * len(names))
+            values = theta[place][here]
+            numbers = dict(zip(names, values.tolist(), strict=True))
+            sizes = {
+                parameter.name: max(abs(v) for n, v in numbers.items() if n.split("_")[0] == parameter.name)
+                for parameter in one.effect.parameters
+            }
+            power = float(((one.values[:, :, here] @ values) ** 2).sum())
+            declared = one.description.declaration(axis, one.constant, sizes)
+            parts.append((power, one.description.covariate, declared, numbers))
     parts.sort(key=lambda part: -part[0])
     kept = [part for part in parts if part[0] >= LEAST_SHARE * sum(part[0] for part in parts)]
+    main = next(one for one in described if one.description.covariate == parts[0][1]).description
     return Dependence(
-        one.description.covariate, one.description.form, one.description.port, float(chance), float(explained), rms_um,
-        tuple(part[1] for part in kept), tuple(part[2] for part in kept),
+        main.covariate, main.form, main.port, chance, rest.explained(loss), rest.rms_um(loss),
+        tuple(part[2] for part in kept), tuple(part[3] for part in kept),
+        tuple(one.description.covariate for one in described if one.description.covariate != main.covariate),
     )  # fmt: skip

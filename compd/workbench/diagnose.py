@@ -15,7 +15,7 @@ from compd.workbench.bench import Bench
 from compd.workbench.candidates import library_pool
 from compd.workbench.compare import compare
 from compd.workbench.contest import Contest, Members
-from compd.workbench.dependence import Dependence, held_out_losses, ranked
+from compd.workbench.dependence import Dependence, Rest, held_out_losses, ranked, together
 from compd.workbench.disturbances import disturbance_covariance
 from compd.workbench.experiment import plan
 from compd.workbench.explanation import Explanation, Progress, explain, held_block
@@ -117,14 +117,20 @@ def _steps(
 
 
 def _depends(bench: Bench, found: Explanation, effects: Members) -> tuple[Dependence, ...]:
-    contest = found.contest
+    """What the rest follows, one line per covariate; and two covariates together where one is not enough."""
+    contest, searched = found.contest, found.searched
+    if not searched:
+        return ()
     held = held_block(contest, effects)
-    base = contest.entries([effects])[0].loss if effects else contest.base
-    losses = held_out_losses(bench.evidence, held, found.searched)
-    return ranked(
-        found.searched, losses, base, bench.evidence, held, bench.before.floor.um, cost(contest.base - 1.0),
-        bench.seen.rows.links,
+    rest = Rest(
+        bench.evidence, held, contest.entries([effects])[0].loss if effects else contest.base,
+        bench.before.floor.um, cost(contest.base - 1.0), bench.seen.rows.links,
     )  # fmt: skip
+    losses = held_out_losses(bench.evidence, held, searched)
+    lines = ranked(rest, searched, losses)
+    if not lines or at_floor(float(np.nanmin(losses))):
+        return lines
+    return (*lines, *together(rest, searched, float(np.nanmin(losses))))
 
 
 def _chances(contest: Contest, effects: Members) -> dict[str, float]:

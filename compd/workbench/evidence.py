@@ -145,7 +145,7 @@ class Sums:
     @cached_property
     def base_losses(self) -> FloatArray:
         """(F,) what is left in each fold without any candidate."""
-        return self.fold_losses(np.arange(self.evidence.always.values.shape[2])[None])[0]
+        return np.asarray(self.fold_losses(np.arange(self.evidence.always.values.shape[2])[None])[0])
 
     @property
     def base(self) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -38,13 +38,17 @@ class Plan:
     separation: float
     before: float
 
+    def write_to(self, stream: TextIO) -> None:
+        """As CSV."""
+        writer = csv.DictWriter(stream, list(self.rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
+
     def write(self, path: Path) -> None:
         """As CSV. Raises RecordingError where it cannot be written."""
         try:
             with path.open("w", newline="", encoding="utf-8") as stream:
-                writer = csv.DictWriter(stream, list(self.rows[0]))
-                writer.writeheader()
-                writer.writerows(self.rows)
+                self.write_to(stream)
         except OSError as error:
             raise RecordingError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ ROW_EVERY_S = 30.0
 LINKS_TRAVEL_MM = 40.0
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """Within what the next measurement has to stay.
 
     tip_low_M_mm, tip_high_M_mm : (3,).  force_N : largest, along any axis.  temperature_degC : lowest and highest.
@@ -163,7 +162,7 @@ def rows_of(model: MachineModel, common: Constants, chosen: Sequence[Segment], s
     if (pose.reason != Reason.OK).any():
         bad = tip[pose.reason != Reason.OK][0]
         raise RecordingError(
-            Problem("the next measurement", "a place within the limits cannot be reached", str(np.round(bad, 1).tolist()),
+            Problem("the next measurement", "a place within the limits is out of reach", str(np.round(bad, 1).tolist()),
                     next_step="narrow the workspace with --workspace")
         )  # fmt: skip
     scale_mm = pose.link_length_mm - zero.link_length_mm

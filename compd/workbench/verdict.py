@@ -113,7 +113,8 @@ class Diagnosis:
             case "adequate":
                 return f"Nothing is missing: {error} is the measurement's own noise ({floor:.2g} um)."
             case "identified":
-                return f"What is missing is {names}: with it {error} falls to {after}."
+                with_them = "with it" if len(self.steps) == 1 else "with them"
+                return f"What is missing is {names}: {with_them} {error} falls to {after}."
             case "ambiguous":
                 pairs = "; ".join(
                     f"{one.effect.id} or {_listed([rival.name for rival in one.rivals], 'or')}"

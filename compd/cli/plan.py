@@ -1,0 +1,87 @@
+"""`compd plan`: the measurement that tells two effects apart."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def plan(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv.")],
+    rivals: Annotated[str, typer.Option(help="Two effects, by id: A,B.")],
+    rows: Annotated[int, typer.Option(min=2, help="How many rows may be measured.")] = 40,
+    out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
+    machine: Annotated[
+        Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
+    ] = None,
+    model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
+    workspace: Annotated[
+        str | None, typer.Option(help="x0,x1,y0,y1,z0,z1 of the tip in mm; as in the recording if left out.")
+    ] = None,
+    force: Annotated[float | None, typer.Option(min=0, help="Largest load in N; as in the recording.")] = None,
+    temperature: Annotated[
+        str | None, typer.Option(help="Lowest,highest in degC; as in the recording if left out.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(min=0, help="Fastest in mm/s; as in the recording.")] = None,
+) -> None:
+    """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
+    from compd.cli.compare import open_model, open_recording
+    from compd.errors import CompdError, Problem
+    from compd.model.effects import find
+    from compd.workbench.compare import compare
+    from compd.workbench.experiment import plan as planned
+    from compd.workbench.search import search
+    from compd.workbench.segments import limits_of
+
+    names = [name.strip() for name in rivals.split(",")]
+    if len(names) != 2 or names[0] == names[1]:
+        raise CompdError(Problem("--rivals", "needs two effects", rivals, "A,B", "`compd diagnose` names rivals"))
+    effects = [find(name, "--rivals") for name in names]
+    seen, _ = open_recording(recording, machine)
+    file = open_model(model, seen)
+    present = [one.effect.id for one in file.fitted if one.effect.id in names]
+    if present:
+        raise CompdError(Problem("--rivals", "is in the model already", ", ".join(present), "effects that are not",
+                                 "`compd effect remove` takes it out"))  # fmt: skip
+    limits = limits_of(seen)
+    if workspace is not None:
+        x0, x1, y0, y1, z0, z1 = _numbers("--workspace", workspace, 6)
+        low, high = limits.tip_low_M_mm.copy(), limits.tip_high_M_mm.copy()
+        low[:], high[:] = (x0, y0, z0), (x1, y1, z1)
+        limits = limits._replace(tip_low_M_mm=low, tip_high_M_mm=high)
+    if force is not None:
+        limits = limits._replace(force_N=force)
+    if temperature is not None:
+        coldest, warmest = _numbers("--temperature", temperature, 2)
+        limits = limits._replace(temperature_degC=(coldest, warmest))
+    if speed is not None:
+        limits = limits._replace(speed_mm_per_s=speed)
+    sigma_um = compare(seen, file.fitted, file.covariance).floor.by_axis_um
+    first, second = (search(seen, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
+    found = planned(seen, file.fitted, (first, second), sigma_um, limits, rows)
+    if out is None:
+        found.write_to(sys.stdout)
+    else:
+        found.write(out)
+    typer.echo(
+        f"{names[0]} and {names[1]} differ by {found.before:.2g} times the noise on what was measured, by "
+        f"{found.separation:.2g} times with these {len(found.rows)} rows.",
+        err=out is None,
+    )
+
+
+def _numbers(option: str, text: str, count: int) -> list[float]:
+    """Raises CompdError where these are not so many numbers, each pair rising."""
+    from compd.errors import CompdError, Problem
+
+    try:
+        values = [float(one) for one in text.split(",")]
+    except ValueError:
+        values = []
+    rising = all(low < high for low, high in zip(values[::2], values[1::2], strict=False))
+    if len(values) != count or not rising:
+        raise CompdError(Problem(option, "is not understood", text, f"{count} numbers with commas, low before high"))
+    return values
