@@ -14,12 +14,14 @@ from compd.cli.campaign import campaign
 from compd.cli.check import check
 from compd.cli.compare import compare
 from compd.cli.demo import demo
+from compd.cli.diagnose import diagnose
 from compd.cli.driver import app as driver
 from compd.cli.effect import effect
 from compd.cli.gauge import app as gauge
 from compd.cli.join import join
 from compd.cli.ledger import ledger
 from compd.cli.paper import app as paper
+from compd.cli.plan import plan
 from compd.cli.record import record
 from compd.cli.recording import recording
 from compd.cli.replay import replay
@@ -54,7 +56,7 @@ def _options(
 PANELS = {
     "Begin": (demo, check),
     "The live machine": (run, watch, zero, adopt, shadow, record, replay),
-    "Learn from measurements": (join, compare, ledger),
+    "Learn from measurements": (join, compare, diagnose, plan, ledger),
     "A machine that is not there": (simulate, tracker, campaign),
 }
 for panel, commands in PANELS.items():
