@@ -4,13 +4,14 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help demo test long lint wheel bench scoreboard clean
+.PHONY: help demo test long hidden lint wheel bench scoreboard clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
 	@echo "make test    the tests"
 	@echo "make long    the tests that take minutes"
+	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, a minute or two each"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make wheel   build the wheel, install it in a clean environment, run it"
 	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; goes on where it was)"
@@ -28,11 +29,17 @@ $(STAMP): pyproject.toml
 demo: $(STAMP)
 	@$(BIN)/compd demo
 
+# A hidden cause is found on wires, in real time: minutes each, so they have a target of their own.
+HIDDEN := tests/test_hidden_effect.py tests/test_tutorial.py
+
 test: $(STAMP)
-	$(BIN)/pytest
+	$(BIN)/pytest $(HIDDEN:%=--ignore=%)
 
 long: $(STAMP)
-	$(BIN)/pytest -m long
+	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%)
+
+hidden: $(STAMP)
+	$(BIN)/pytest -m '' $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check
