@@ -19,8 +19,6 @@ from compd.cli.demo_session import wait_for_gauges
 from compd.client import connect
 from tests.simulated import run_directory
 
-pytest.importorskip("compd.cli.diagnose", reason="`compd diagnose` is not there")
-
 ROOT = Path(__file__).parents[1]
 SECTION = "## Learn which effect is missing"
 # What the section writes, and what it is while the test runs.
