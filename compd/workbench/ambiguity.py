@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compd.workbench.adequacy import LEAST_SHARE
+from compd.workbench.adequacy import LEAST_SHARE, PER_NUMBER
 from compd.workbench.contest import Contest, Entry, Members
 from compd.workbench.significance import Projection
 
 # Losses closer than so many standard errors of their difference are the same.
 SAME = 2.0
-# Fewer numbers win where the difference is within this many (Breiman's rule), or, per number saved, this in squares
-# of the floor: a flexible effect also describes a part of the disturbances that a machine always has.
+# Fewer numbers win where the difference is within this many (Breiman's rule), or within PER_NUMBER.
 SIMPLER = 1.0
-PER_NUMBER = 0.005
 # Nor are losses that differ by less than this, in squares of the floor, or than LEAST_SHARE of what is explained: that
 # much the disturbances that a machine always has can add on either side.
 ALIKE = 0.12
@@ -88,7 +86,7 @@ def likeness(contest: Contest, members: Members, place: int, other: int) -> floa
     columns = beside(contest.values[other])
     q, _ = np.linalg.qr(columns.reshape(len(effect), -1))
     size = float(np.linalg.norm(effect))
-    return float(np.linalg.norm(q.T @ effect)) / size if size > 0 else 0.0
+    return min(float(np.linalg.norm(q.T @ effect)) / size, 1.0) if size > 0 else 0.0
 
 
 def _instead(contest: Contest, members: Members, place: int) -> list[Entry]:

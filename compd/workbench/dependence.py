@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.model.effect import Effect
-from compd.workbench.candidates import UM_PER_MM, Candidate
+from compd.workbench.adequacy import PER_NUMBER
+from compd.workbench.candidates import SEARCH_COUNTS, UM_PER_MM, Candidate
 from compd.workbench.descriptions import Description, descriptions, finer
 from compd.workbench.evidence import Block, Evidence, sums
 from compd.workbench.observed import Observed
@@ -24,6 +25,8 @@ FINER = 9
 LEAST_SHARE = 0.03
 # Descriptions that are judged on left-out rows, of those that explain most where they were fitted.
 PROMISING = 60
+# A number more must explain so much of what is above the floor: a curve fits a line's noise a little better.
+PLAIN_SHARE = 0.01
 # Two covariates must take away so much of what the best one alone leaves above the floor.
 LEAST_MORE = 0.5
 # So many are computed at once: a balance of memory and overhead.
@@ -40,6 +43,11 @@ class Searched:
     effect: Effect
     constant: float | None
     values: FloatArray
+
+    @property
+    def numbers(self) -> int:
+        """How many it takes, its constant with them."""
+        return int(self.values.shape[2]) + SEARCH_COUNTS * (self.constant is not None)
 
     @property
     def block(self) -> Block:
@@ -177,6 +185,15 @@ def held_out_losses(evidence: Evidence, basis: Block, searched: Sequence[Searche
     return total.held_out([np.concatenate([held, place]) for place in places], counts)
 
 
+def with_numbers(losses: FloatArray, searched: Sequence[Searched], left: float) -> FloatArray:
+    """(K,) losses by which descriptions are compared: of two that describe about as well the plainer one is better.
+
+    left : mean square without any of them.
+    """
+    each = np.array([one.numbers for one in searched])
+    return np.asarray(losses + (PER_NUMBER + PLAIN_SHARE * max(left - 1.0, 0.0)) * each)
+
+
 class Rest(NamedTuple):
     """What is to be described: the evidence beside `held` (R, m, Q), which leaves `left`, held out.
 
@@ -201,7 +218,7 @@ class Rest(NamedTuple):
 
 def ranked(rest: Rest, searched: Sequence[Searched], losses: FloatArray) -> tuple[Dependence, ...]:
     """One entry per covariate, the one that explains most first; only those that explain enough not to be chance."""
-    order = [int(k) for k in np.argsort(losses) if np.isfinite(losses[k])]
+    order = [int(k) for k in np.argsort(with_numbers(losses, searched, rest.left)) if np.isfinite(losses[k])]
     if not order:
         return ()
     first: dict[str, int] = {}

@@ -108,7 +108,7 @@ def _formula(found: Diagnosis) -> Panel:
     lines = [
         line
         for one in min(found.depends_on, key=lambda one: one.heldout_rms_um).formula_effects
-        for line in yaml.safe_dump([one], sort_keys=False, width=100).splitlines()
+        for line in yaml.safe_dump(one, sort_keys=False, default_flow_style=None, width=100).splitlines()
     ]
     caption = "Ready to paste: it lowers the error until the cause is known."
     return Panel("As a formula effect", caption, Table(("",), [[line.replace("  ", "\u00a0 ")] for line in lines]))

@@ -11,7 +11,7 @@ from compd.workbench.adequacy import at_floor
 from compd.workbench.ambiguity import simplest
 from compd.workbench.bench import Bench
 from compd.workbench.contest import Contest, Members
-from compd.workbench.dependence import Everything, Searched, held_out_losses
+from compd.workbench.dependence import Everything, Searched, held_out_losses, with_numbers
 from compd.workbench.evidence import Block
 
 # Descriptions that compete with the library's effects: of the best so many covariates, beside each basis.
@@ -54,7 +54,8 @@ def explain(bench: Bench, progress: Progress) -> Explanation:
         held = held_block(library, basis)
         searched = everything.best(bench.evidence.y, held.values)
         covariates: list[str] = []
-        for k in np.argsort(held_out_losses(bench.evidence, held, searched)):
+        losses = held_out_losses(bench.evidence, held, searched)
+        for k in np.argsort(with_numbers(losses, searched, library.base)):
             about = searched[k].description
             if about.covariate not in covariates and len(covariates) < COMPETING:
                 covariates.append(about.covariate)

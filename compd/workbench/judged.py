@@ -11,9 +11,6 @@ from compd.workbench.bench import Bench
 from compd.workbench.contest import Contest, Entry
 from compd.workbench.verdict import Judged, Status, Step
 
-# An effect that explains so much alone is enough alone.
-ENOUGH = 0.9
-
 
 def judged(bench: Bench, contest: Contest, steps: Sequence[Step], chance: Mapping[str, float]) -> tuple[Judged, ...]:
     """The best first; then those that could not be tried.
@@ -49,21 +46,18 @@ def _alone(bench: Bench, contest: Contest, entry: Entry, steps: Sequence[Step], 
     status: Status
     percent = f"{100 * max(phi, 0.0):.0f} %"
     if candidate.name in named:
-        status, why = "explains", f"named; alone it explains {percent}"
+        status, why = "explains", f"named, number {named.index(candidate.name) + 1}"
     elif rival_of:
-        status, why = "explains", f"as good as {rival_of[0]} on these rows: {candidate.effect.separated_by}"
+        status, why = "explains", f"as good as {rival_of[0]} on these rows; apart by {candidate.effect.separated_by}"
     elif untestable(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
     elif gain < worth:
-        status, why = "no_gain", f"explains {percent} of the error on rows left out: not worth a name"
+        status, why = "no_gain", f"takes {percent} of the error away: not worth a name"
     elif strange:
-        status = "partial"
         values = ", ".join(f"{one.name} = {one.value:.3g} {one.unit}" for one in strange[:3])
-        why = f"explains {percent}, but only with {values}, which is implausible"
-    elif phi >= ENOUGH:
-        status, why = "partial", f"explains {percent} alone, but {', '.join(named) or 'a description'} explains more"
+        status, why = "partial", f"only with implausible numbers: {values}"
     elif named:
-        status, why = "partial", f"explains {percent} alone, and nothing more beside {', '.join(named)}"
+        status, why = "partial", "nothing more beside what is named"
     else:
-        status, why = "partial", f"explains {percent}, and leaves {rms_um:.2g} um"
+        status, why = "partial", f"leaves {rms_um:.2g} um: a likeness, not the cause"
     return Judged(candidate.name, status, why, rms_um, phi, chance, shown)
