@@ -93,7 +93,8 @@ def part(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
 
 def some_shape(effect: Effect) -> dict[str, float]:
     """Shape constants with which something happens between rows of `varied`."""
-    return {"p": PERIODS_MM[4], "d": 30.0, "tau": 240.0} if effect.constants else {}
+    some = {"p": PERIODS_MM[4], "d": 30.0, "tau": 240.0}
+    return {constant.name: some.get(constant.name, constant.grid[-1]) for constant in effect.constants}
 
 
 def added(id_: str, rows: Rows, *theta: float, **shape: float) -> Floats:

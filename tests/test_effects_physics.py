@@ -143,10 +143,11 @@ def test_contact_is_soft_at_first_and_odd_in_the_force() -> None:
         np.testing.assert_allclose(added("joint_contact", rows, 0.2), 0.2 * UM * expected, rtol=1e-9)
 
 
-def test_a_leaning_link_sags_with_the_cube_of_its_length() -> None:
+@pytest.mark.parametrize("n", [3.0, 7.0])
+def test_a_leaning_link_sags_with_a_power_of_its_length(n: float) -> None:
     level_part = 1 - COSINE**2
     np.testing.assert_allclose(
-        added("link_sag", at_zero(), 5.0), -5 * UM * level_part * (LINK_MM / 500) ** 3, rtol=1e-9
+        added("link_sag", at_zero(), 5.0, n=n), -5 * UM * level_part * (LINK_MM / 500) ** n, rtol=1e-9
     )
 
 
@@ -199,7 +200,9 @@ def test_runout_along_the_axis_moves_the_tip_and_across_it_does_not() -> None:
     rows = at_tips(TRIPOD, np.array([[30.0, 20.0, 180.0]]))
     cosine_1 = [0.0] * 12
     cosine_1[3] = 2.0
-    found = added("joint_runout", rows, *cosine_1).reshape(3, 3)
+    found = added("joint_runout", rows, *cosine_1, z=0.0).reshape(3, 3)
+    from_zero = added("joint_runout", at_zero(), *cosine_1, z=1.0)
+    np.testing.assert_allclose(from_zero, 0, atol=1e-15)
     axis = rows.revolute_axes_M[0, 0]
     np.testing.assert_allclose(found[0], 2 * UM * np.cos(rows.joint_angles_rad[0, 0, 0]) * axis, rtol=1e-12)
     np.testing.assert_allclose(found[1:], 0)

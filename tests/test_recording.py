@@ -238,15 +238,6 @@ def test_check_against_counts_gauges(tmp_path: Path) -> None:
         check_against(found, load(TRIPOD))
 
 
-def test_velocity_stays_within_a_session(tmp_path: Path) -> None:
-    text = csv_text()
-    for row in range(2, 22):
-        text = cell(row, "scale_1_mm", str(2 * (row - 2) + 1000 * (row > 11)))(text)
-    velocity = read_recording(put(tmp_path, text)).scale_velocity_mm_per_s
-    assert velocity is not None
-    assert velocity[:, 0] == pytest.approx(0.2), "2 mm each 10 s; the jump between the sessions is no motion"
-
-
 def test_direction_ignores_creep_but_adds_it_up() -> None:
     scale_mm = np.array([[0.0, 1.0, 1.0002, 0.9998, 0.5, 0.4996, 0.4992, 0.4988, 0.5]]).T
     assert np.array_equal(last_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True)

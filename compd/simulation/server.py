@@ -17,6 +17,7 @@ from compd.simulation.control import Answer, ControlSocket, Handler
 from compd.simulation.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.instruments import TRACKER_SIGMA_UM, noisy
 from compd.simulation.sensing import Sensing
+from compd.simulation.warm_up import COLUMNS, Floats, Heat
 from compd.simulation.wire import SimulatedLine
 from compd.simulation.world import World
 
@@ -68,6 +69,7 @@ class Simulation:
             "TOUR": self._tour,
             "TIP_FOR": self._tip_for,
             "LOAD": self._load,
+            "HEAT": self._heat,
             "FAULT": self._fault,
         }
         self._running = ExitStack()
@@ -169,9 +171,31 @@ class Simulation:
             self.world.force_M_N = force_M_N
         return self.truth()
 
+    def _heat(self, message: Mapping[str, Any]) -> Answer:
+        heat = Heat(
+            _watts(message, "drives_W", self.world.mechanism.links), _one_watts(message, "ring_W"),
+            _watts(message, "cabinet_W", COLUMNS),
+            *(_one_watts(message, name) for name in ("platform_W", "tool_W", "lamps_W")),
+        )  # fmt: skip
+        with self._lock:
+            self.world.heat(heat)
+        return self.truth()
+
     def _fault(self, message: Mapping[str, Any]) -> Answer:
         name = message["line"]
         if name not in self.lines:
             raise ValueError(f"no line {name!r}; there are " + ", ".join(self.lines))
         self.lines[name].fault = message["fault"]
         return self.truth()
+
+
+def _watts(message: Mapping[str, Any], name: str, count: int) -> Floats:
+    """(count,); ValueError for another number of them, and for what is no heat."""
+    watts = np.array(message[name], dtype=float)
+    if watts.shape != (count,) or not np.all(np.isfinite(watts) & (watts >= 0)):
+        raise ValueError(f"{name}: {count} finite numbers, not below 0, W")
+    return watts
+
+
+def _one_watts(message: Mapping[str, Any], name: str) -> float:
+    return float(_watts({name: [message[name]]}, name, 1)[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from compd.model.rows import Rows
 from compd.workbench.recording import BoolArray, Recording
 from compd.workbench.registration import Registration, free_motion, lay_over
 from compd.workbench.table import FloatArray
+from compd.workbench.velocity import velocities
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,24 +174,13 @@ def _rows(recording: Recording, model: MachineModel) -> Rows:
     joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
     frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
-    velocity = recording.scale_velocity_mm_per_s
-    movement = Movement(
-        approach, np.full_like(scale_mm, np.nan) if velocity is None else velocity, _velocity(joint_mm, recording)
-    )
+    at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
+    velocity = velocities(recording.time_s, _starts(recording), at_point, scale_mm, joint_mm)
+    movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
     return observe(
         model, model.constants, scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm,
         quantities=recording.quantities, time_s=recording.time_s, session_start=_starts(recording), movement=movement,
     )  # fmt: skip
-
-
-def _velocity(values: FloatArray, recording: Recording) -> FloatArray:
-    """(N, k) per second by central differences within a session; nan where a row stands alone."""
-    starts = np.append(np.flatnonzero(_starts(recording)), recording.rows)
-    found = np.full(values.shape, np.nan)
-    for first, end in pairwise(starts):
-        if end - first > 1:
-            found[first:end] = np.gradient(values[first:end], recording.time_s[first:end], axis=0)
-    return found
 
 
 def _starts(recording: Recording) -> BoolArray:

@@ -171,31 +171,6 @@ class Recording:
         together = block[first][inverse]
         return np.where(self.visit >= 0, together, block).astype(np.int64)
 
-    @cached_property
-    def scale_velocity_mm_per_s(self) -> FloatArray | None:
-        """(N, n) by central differences within a session, one-sided at its ends; nan where a neighbour is missing.
-
-        Means something where the rows follow each other closely; between dwells it is the mean speed of the move.
-        """
-        if self.scale_mm is None:
-            return None
-        start, stop = _neighbours(self.session, self.rows)
-        span_s = self.time_s[stop] - self.time_s[start]
-        moved_mm = self.scale_mm[stop] - self.scale_mm[start]
-        velocity = np.full(moved_mm.shape, np.nan)
-        np.divide(moved_mm, span_s[:, None], out=velocity, where=span_s[:, None] > 0)
-        return velocity
-
-
-def _neighbours(session: IntArray | None, rows: int) -> tuple[IntArray, IntArray]:
-    """(N,), (N,) the row before and the row after each, or itself at the ends of its session."""
-    here = np.arange(rows, dtype=np.int64)
-    same = np.ones(max(rows - 1, 0), dtype=bool) if session is None else session[1:] == session[:-1]
-    before, after = here.copy(), here.copy()
-    before[1:] -= same
-    after[:-1] += same
-    return before, after
-
 
 def last_direction(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
     """(N, n) sign of each scale's last movement of STILL_MM or more; nan before its first in a session.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.model.effect import Effect, Parameter, Shape, memoryless
+from compd.model.effect import Constant, Effect, Parameter, Shape, memoryless
 from compd.model.jit import Floats
 from compd.model.rows import Rows
 
@@ -23,7 +23,11 @@ def _runout(rows: Rows, shape: Shape) -> Floats:
     """
     n = rows.links
     angles_rad = rows.joint_angles_rad
-    waves = [wave(angles_rad[:, :, angle]) for angle in (0, 1) for wave in (np.sin, np.cos)]
+    waves = [
+        wave
+        for angle_rad in (angles_rad[:, :, 0], angles_rad[:, :, 1])
+        for wave in (np.sin(angle_rad), np.cos(angle_rad) - shape["z"])
+    ]
     basis = np.zeros((len(rows), n, 3, len(waves), n))
     for column, values in enumerate(waves):
         for i in range(n):
@@ -49,11 +53,12 @@ EFFECTS = (
         id="joint_runout",
         ports=("base_joint",),
         physics="A ball that is not round wanders sideways as its joint turns, where no comparator looks.",
-        equation="delta_i = e_i (Sp_i sin p_i + Cp_i cos p_i + Sq_i sin q_i + Cq_i cos q_i)",
+        equation="delta_i = e_i (Sp_i sin p_i + Cp_i (cos p_i - z) + Sq_i sin q_i + Cq_i (cos q_i - z))",
         symbols={
             "e_i": "revolute axis of link i in {M}; only motion along it reaches the tip, 1",
             "p_i, q_i": "angles of base joint i since machine zero, towards the axis and across, rad",
             "Sp_i, Cp_i, Sq_i, Cq_i": "runout of ball i with either angle, um",
+            "z": "1 where the joints' places were taken at machine zero, the runout there with them; 0 where not, 1",
         },
         source="Oiwa, section 2.1 and reference [3]: motion square to a link changes its length to second order only",
         needs=("revolute_axes",),
@@ -64,5 +69,6 @@ EFFECTS = (
         mistaken_for=("tool_offset",),
         separated_by="points in a ring and along a radius: runout follows the joints' angles, an offset does not",
         basis=memoryless(_runout),
+        constants=(Constant("z", "1", 0, 1, "how the joints' places were found", (1.0, 0.0)),),
     ),
 )

@@ -37,8 +37,7 @@ def _contact(rows: Rows, shape: Shape) -> Floats:
 
 def _sag(rows: Rows, shape: Shape) -> Floats:
     leaning = 1 - rows.directions_M[:, :, 2] ** 2
-    relative = rows.link_mm / SAG_LENGTH_MM
-    return np.asarray(-UM * leaning * (relative * relative * relative))[:, :, None]
+    return np.asarray(-UM * leaning * (rows.link_mm / SAG_LENGTH_MM) ** shape["n"])[:, :, None]
 
 
 def _zero(rows: Rows, shape: Shape) -> Floats:
@@ -142,18 +141,21 @@ EFFECTS = (
         id="link_sag",
         ports=("link",),
         physics="A leaning link bows under its own weight, and a bowed link is shorter between its ends.",
-        equation="delta_i = -s (1 - u_iz^2) (l_i / 500 mm)^3",
+        equation="delta_i = -s (1 - u_iz^2) (l_i / 500 mm)^n",
         symbols={
             "s": "shortening of a level link of 500 mm, um",
             "u_iz": "vertical component of link i's direction, 1",
             "l_i": "length of link i, mm",
+            "n": "7 for a beam that bends between its joints, 3 for a slender link that tension holds, 1",
         },
-        source="Young, Roark's Formulas for Stress and Strain, chapter 8: arc and chord of a bent beam",
+        source="arc less chord, w^2 l^3 / (24 H^2) of a catenary, 17 w^2 l^7 / (40320 (E I)^2) of a beam on two "
+        "supports: Young, Roark's Formulas for Stress and Strain, chapter 8",
         needs=(),
         parameters=(Parameter("s", "um", 0, 20, "stiff tube 0, slender spindle 20"),),
         mistaken_for=("scale_gain",),
         separated_by="equally long links at different inclinations",
         basis=memoryless(_sag),
+        constants=(Constant("n", "1", 3, 7, "catenary 3, beam 7", (3.0, 7.0)),),
     ),
     Effect(
         id="link_zero",
