@@ -27,6 +27,7 @@ from compd.simulation.world import World
 from tests.simulated import HEXAPOD, TRIPOD, ask, run_directory
 
 LONGEST_WAIT_S = 20.0
+HEAT = {"drives_W": [0.0] * 3, "ring_W": 0.0, "cabinet_W": [0.0] * 3, "platform_W": 0.0, "tool_W": 0.0, "lamps_W": 0.0}
 
 
 class TurnedClock:
@@ -166,6 +167,16 @@ def test_truth_for_other_scale_values_and_under_load(start: Callable[[Path], Run
     assert loaded["tip_mm"][2] < truth["tip_mm"][2] - 1e-4
 
 
+def test_parts_warm_up_where_heat_is_switched_on(start: Callable[[Path], Running]) -> None:
+    running = start(TRIPOD)
+    assert ask(running.control, {"class": "HEAT", **HEAT, "drives_W": [3.0, 0.0, 0.0]})["class"] != "ERROR"
+    ask(running.control, {"class": "DRIVE", "scale_mm": [0.0, 0.0, 0.0]})
+    running.clock.turn(10.0)
+    running.clock.turn(10.0)
+    link_1, link_2 = (running.simulation.world.sense(f"temperature_link_{i}_degC") for i in (1, 2))
+    assert link_1 > link_2 + 1.0
+
+
 @pytest.mark.parametrize(
     "message",
     [
@@ -174,6 +185,11 @@ def test_truth_for_other_scale_values_and_under_load(start: Callable[[Path], Run
         {"class": "DRIVE", "scale_mm": "home"},
         {"class": "LOAD", "force_M_N": [1.0, 2.0]},
         {"class": "LOAD", "force_M_N": [1.0, 2.0, float("inf")]},
+        {"class": "HEAT", "ring_W": 1.0},
+        {"class": "HEAT", **HEAT, "drives_W": [1.0]},
+        {"class": "HEAT", **HEAT, "cabinet_W": 1.0},
+        {"class": "HEAT", **HEAT, "ring_W": -1.0},
+        {"class": "HEAT", **HEAT, "lamps_W": float("nan")},
         {"class": "FAULT", "line": "nowhere", "fault": "silent"},
         {"class": "FAULT", "line": ["joints"], "fault": "silent"},
         {"class": "FAULT", "line": "joints", "fault": "bored"},

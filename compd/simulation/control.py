@@ -6,7 +6,7 @@
     {"class": "TOUR"}                                 go on visiting points
     {"class": "TIP_FOR", "scale_mm": [..]}            where the tip would be, were the scales there now
     {"class": "LOAD", "force_M_N": [x, y, z]}         load on the tool's tip
-    {"class": "HEAT", "drives_W": [..], "ring_W": ..} what drives, electronics and lamps give off: all of `Heat`
+    {"class": "HEAT", "drives_W": [..], "ring_W": ..} what parts give off from now on: all of `Heat`
     {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null mends it
 
 Every request gets one answer: TRUTH, MEASURED, TIP, or ERROR with code and text.

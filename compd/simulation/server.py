@@ -17,7 +17,7 @@ from compd.simulation.control import Answer, ControlSocket, Handler
 from compd.simulation.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.instruments import TRACKER_SIGMA_UM, noisy
 from compd.simulation.sensing import Sensing
-from compd.simulation.warm_up import COLUMNS, Floats, Heat
+from compd.simulation.warm_up import COLUMNS, Heat
 from compd.simulation.wire import SimulatedLine
 from compd.simulation.world import World
 
@@ -172,13 +172,15 @@ class Simulation:
         return self.truth()
 
     def _heat(self, message: Mapping[str, Any]) -> Answer:
-        heat = Heat(
-            _watts(message, "drives_W", self.world.mechanism.links), _one_watts(message, "ring_W"),
-            _watts(message, "cabinet_W", COLUMNS),
-            *(_one_watts(message, name) for name in ("platform_W", "tool_W", "lamps_W")),
-        )  # fmt: skip
+        drives_W, cabinet_W = ([_watts(value) for value in message[name]] for name in ("drives_W", "cabinet_W"))
+        links = self.world.mechanism.links
+        if (len(drives_W), len(cabinet_W)) != (links, COLUMNS):
+            raise ValueError(f"drives_W: {links} numbers, one per link; cabinet_W: {COLUMNS}, one per column")
+        ring_W, platform_W, tool_W, lamps_W = (
+            _watts(message[name]) for name in ("ring_W", "platform_W", "tool_W", "lamps_W")
+        )
         with self._lock:
-            self.world.heat(heat)
+            self.world.heat(Heat(np.array(drives_W), ring_W, np.array(cabinet_W), platform_W, tool_W, lamps_W))
         return self.truth()
 
     def _fault(self, message: Mapping[str, Any]) -> Answer:
@@ -189,13 +191,8 @@ class Simulation:
         return self.truth()
 
 
-def _watts(message: Mapping[str, Any], name: str, count: int) -> Floats:
-    """(count,); ValueError for another number of them, and for what is no heat."""
-    watts = np.array(message[name], dtype=float)
-    if watts.shape != (count,) or not np.all(np.isfinite(watts) & (watts >= 0)):
-        raise ValueError(f"{name}: {count} finite numbers, not below 0, W")
+def _watts(value: Any) -> float:
+    watts = float(value)
+    if not 0 <= watts < np.inf:
+        raise ValueError(f"{value}: what is switched on gives off 0 W or more")
     return watts
-
-
-def _one_watts(message: Mapping[str, Any], name: str) -> float:
-    return float(_watts({name: [message[name]]}, name, 1)[0])
