@@ -24,6 +24,7 @@ from compd.cli.background import Command, running
 from compd.cli.demo_session import ARRIVED_MM, MachineController, wait_for_gauges
 from compd.client import connect
 from compd.configuration.document import read
+from tests.hidden_visits import Visit
 from tests.simulated import TRIPOD
 
 # A quarter of the tracker's rate: every row has looks of its own.
@@ -47,6 +48,7 @@ def equipped(directory: Path) -> Path:
         )
         data["wiring"]["quantities"].append({"name": name, "gauge": f"cabinet.{name.lower()}"})
         address += 2
+    del data["sockets"]["tcp"]  # several machines side by side, each on its own Unix socket
     path = directory / TRIPOD.name
     path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
     return path
@@ -90,28 +92,40 @@ class HiddenRun:
                 return
         self.compd("zero", self.socket)
 
-    def drive(self, scale_mm: Sequence[float], force_M_N: Sequence[float]) -> None:
-        """To these scale values under this load, and rest there."""
-        self.machine.ask("LOAD", force_M_N=list(force_M_N))
+    def drive(self, visit: Visit) -> None:
+        """Go there, under its load, with its heaters on, and rest there."""
+        self.machine.ask("HEAT", **visit.heat)
+        self.machine.ask("LOAD", force_M_N=visit.force_M_N)
         while True:
-            truth = self.machine.ask("DRIVE", scale_mm=list(scale_mm))
-            if np.abs(np.subtract(truth["scale_mm"], scale_mm)).max() < ARRIVED_MM and not truth["moving"]:
+            truth = self.machine.ask("DRIVE", scale_mm=visit.scale_mm)
+            if np.abs(np.subtract(truth["scale_mm"], visit.scale_mm)).max() < ARRIVED_MM and not truth["moving"]:
                 break
             threading.Event().wait(0.02)
         threading.Event().wait(DWELL_S)
 
-    def survey(self, points: Sequence[Sequence[float]], forces: Sequence[Sequence[float]], name: str) -> Path:
-        """Visit points while the daemon records and the tracker looks; the recording, joined."""
+    def tip_error_um(self, visits: Sequence[Visit]) -> float:
+        """rms per coordinate of what the daemon says of the tip, against the truth, at rest at each visit's place."""
+        wrong = []
+        with connect(self.socket, COMMAND_TIMEOUT_S) as daemon:
+            setpoints = daemon.watch(20.0)
+            for visit in visits:
+                self.drive(visit)
+                arrived_s = time.monotonic()
+                setpoint = next(one for one in setpoints if one["time_s"] > arrived_s and one["state"] == "ok")
+                wrong.append(np.subtract(setpoint["tip_M_mm"], self.machine.ask("TRUTH")["tip_mm"]))
+        return float(np.sqrt(np.mean(np.square(wrong)))) * 1e3
+
+    def survey(self, visits: Sequence[Visit], name: str) -> tuple[Path, float]:
+        """The daemon records and the tracker looks: the recording, joined, and the tip's error meanwhile, in um."""
         part, track, joined = (self.directory / f"{name}{suffix}" for suffix in ("-0001.csv", ".track.csv", ".csv"))
         recorder = self.beside("record", name, "--daemon", self.socket, "--rate-hz", str(RECORDER_HZ), begins="begins")
         tracker = self.beside("tracker", self.directory, "--out", track, begins="looks")
         with recorder, tracker:
-            for point, force in zip(points, forces, strict=True):
-                self.drive(point, force)
+            error_um = self.tip_error_um(visits)
         self.said.append(
             self.compd("join", part, track, joined, "--frame", "machine", "--sigma-um", str(TRACKER_SIGMA_UM))
         )
-        return joined
+        return joined, error_um
 
     @contextmanager
     def beside(self, *arguments: str | Path, begins: str) -> Iterator[None]:
@@ -128,18 +142,6 @@ class HiddenRun:
         finally:
             process.terminate()
             self.said.append(first + process.communicate(timeout=COMMAND_TIMEOUT_S)[0])
-
-    def tip_error_um(self, points: Sequence[Sequence[float]], forces: Sequence[Sequence[float]]) -> float:
-        """rms per coordinate of what the daemon says of the tip, against the truth, at rest."""
-        wrong = []
-        with connect(self.socket, COMMAND_TIMEOUT_S) as daemon:
-            setpoints = daemon.watch(20.0)
-            for point, force in zip(points, forces, strict=True):
-                self.drive(point, force)
-                arrived_s = time.monotonic()
-                setpoint = next(one for one in setpoints if one["time_s"] > arrived_s and one["state"] == "ok")
-                wrong.append(np.subtract(setpoint["tip_M_mm"], self.machine.ask("TRUTH")["tip_mm"]))
-        return float(np.sqrt(np.mean(np.square(wrong)))) * 1e3
 
 
 @contextmanager

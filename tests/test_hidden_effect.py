@@ -16,23 +16,19 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 import yaml
 
 from tests.hidden_run import HiddenRun, hidden_run, told
+from tests.hidden_visits import visits
 from tests.scoreboard.scoring import follows
 from tests.simulated import run_directory
 
-VISITS, CHECKS = 32, 10
+VISITS, CHECKS = 48, 12
 # Weather and warm-up: a minute on the machine is five hours of them.
 SPEEDUP = "300"
 # Pressure and humidity take days to change.
 SLOW_WEATHER_SPEEDUP = "900"
-# The points lie in this box about machine zero, as scale values; loads as a person would hang them on.
-REACH_MM = 60.0
-LOADED_SHARE = 0.45
-LOAD_LOW_N, LOAD_HIGH_N = (-30.0, -30.0, -60.0), (30.0, 30.0, 10.0)
 # Numbers for `--hidden`, as a person would try one after the other; what each hides is in its sealed file.
 ONE = (49, 29)
 PAIRS = ([49, 54],)
@@ -52,20 +48,6 @@ class Outcome(NamedTuple):
     secret: dict[str, Any]
 
 
-def plan(seed: int, count: int) -> tuple[list[list[float]], list[list[float]]]:
-    """Points one near the other, so that little time is spent on the way, and loads; as scale values and N."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(-REACH_MM, REACH_MM, (count, 3))
-    order, left = [0], set(range(1, count))
-    while left:
-        here = points[order[-1]]
-        order.append(min(left, key=lambda k: float(np.abs(points[k] - here).max())))
-        left.remove(order[-1])
-    loaded = rng.uniform(size=(count, 1)) < LOADED_SHARE
-    forces = np.where(loaded, rng.uniform(LOAD_LOW_N, LOAD_HIGH_N, (count, 3)), 0.0)
-    return points[order].tolist(), forces.tolist()
-
-
 def add_found(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: Path) -> None:
     """What the diagnosis names; where it names no effect, the description that it proposes."""
     named = [step["effect"] for step in verdict["steps"]]
@@ -81,16 +63,15 @@ def learned(hidden: list[int], directory: Path, speedup: str = SPEEDUP) -> Outco
     """The whole way, from a machine with a secret to the daemon that has learned it."""
     options = [word for number in hidden for word in ("--hidden", str(number))]
     with hidden_run(directory, "--seed", "1", "--speedup", speedup, *options) as run:
-        recording = run.survey(*plan(2, VISITS), "survey")
+        recording, before_um = run.survey(visits(2, VISITS), "survey")
         machine = ("--machine", str(run.configuration))
         compared = told(run.compd("compare", recording, "--json", *machine))
         verdict = told(run.compd("diagnose", recording, "--json", *machine))
         model = run.directory / "model.yaml"
         add_found(run, verdict, recording, model)
-        before_um = run.tip_error_um(*plan(3, CHECKS))
         if model.exists():
             run.compd("adopt", model, "--daemon", run.socket)
-        after_um = run.tip_error_um(*plan(4, CHECKS))
+        after_um = run.tip_error_um(visits(3, CHECKS))
     secret = json.loads((run.directory / "hidden.answer.json").read_text(encoding="utf-8"))
     return Outcome(compared, verdict, before_um, after_um, secret)
 
