@@ -32,6 +32,9 @@ def campaign(
     other_days: Annotated[
         int, typer.Option(min=0, help="Another campaign on the same machine: other points, weather and loads.")
     ] = 0,
+    plan: Annotated[
+        Path | None, typer.Option(help="Measure these rows, as `compd plan --out` has written them, and nothing else.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
     """Simulate a measuring campaign: about 600 rows in four sessions, repeats, loads, passes, 1 % outliers.
@@ -42,6 +45,8 @@ def campaign(
     from rich.console import Console
 
     from compd.configuration import load
+    from compd.errors import CompdError, Problem
+    from compd.simulation.given_plan import read_plan
     from compd.simulation.hidden import asked, drawn, seal
     from compd.simulation.mechanism import Mechanism
     from compd.simulation.recorded import record
@@ -49,11 +54,16 @@ def campaign(
 
     configuration = load(config)
     path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
+    mechanism = Mechanism(configuration.geometry)
+    if plan is not None and reference is ReferenceKind.ball_plate:
+        raise CompdError(Problem("--reference", "a ball plate's balls are not where the plan goes", reference.value,
+                                 "tracker, interferometer", "leave --plan or --reference out"))  # fmt: skip
+    given = () if plan is None else read_plan(plan, mechanism)
     wanted = asked(effect or [])
     if hidden is not None:
-        wanted.append(drawn(hidden, Mechanism(configuration.geometry)))
+        wanted.append(drawn(hidden, mechanism))
     plate = path.with_name(f"{path.stem}.plate.csv")
-    recorded = record(configuration, seed, wanted, reference.value, plate.name, other_days)
+    recorded = record(configuration, seed, wanted, reference.value, plate.name, other_days, given)
     write_recording(path, recorded.columns, recorded.sidecar, overwrite)
     if recorded.balls_M is not None:
         lines = [f"{k},{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(recorded.balls_M, 1)]
@@ -61,4 +71,7 @@ def campaign(
     answer = path.with_name(f"{path.stem}.answer.json")
     seal(answer, [one.cause for one in recorded.hidden], [one.floors for one in recorded.hidden], recorded.weak, seed)
     rows = len(recorded.columns["time_s"])
-    Console().print(f"{path}: {rows} rows, {len(recorded.columns)} columns; under seal: {answer}", soft_wrap=True)
+    said = f"{rows} rows, {len(recorded.columns)} columns"
+    if given:
+        said = f"the plan's {len(given)} rows, and {rows - len(given)} between them that only the gauges saw"
+    Console().print(f"{path}: {said}; under seal: {answer}", soft_wrap=True)

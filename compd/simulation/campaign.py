@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
-from compd.simulation.apparent import Apparent
 from compd.simulation.cause import Cause
 from compd.simulation.closure import Floats, Posture
 from compd.simulation.instruments import Kind, noisy
 from compd.simulation.motion import ACCELERATION_MM_PER_S2, Move
+from compd.simulation.notes import Notes, Rows
 from compd.simulation.plan import (
     PASS_MM,
     PASS_ROW_EVERY_S,
@@ -30,25 +29,6 @@ from compd.simulation.world import World
 
 # Between sessions time passes in steps, for causes that remember.
 LONGEST_WAIT_S = 300.0
-UM = 1e-3
-
-
-@dataclass
-class Rows:
-    """What was written down, by column of a recording; `apparent_mm`: where the gauges take the tip to be."""
-
-    columns: dict[str, list[float]] = field(default_factory=dict)
-    apparent_mm: list[Floats] = field(default_factory=list)
-    reference_mm: list[Floats] = field(default_factory=list)
-
-    def add(self, values: Mapping[str, float]) -> None:
-        for name, value in values.items():
-            self.columns.setdefault(name, []).append(value)
-
-    def error_um(self) -> float:
-        """Root mean square per coordinate of what the reference shows beyond the gauges."""
-        wrong = np.array(self.reference_mm) - np.array(self.apparent_mm)
-        return float(np.sqrt(np.mean(wrong**2)) / UM)
 
 
 class Campaign:
@@ -69,13 +49,12 @@ class Campaign:
         self._mechanism = self._world.mechanism
         self._plan = plan
         self._rng = np.random.default_rng([seed, 2, plan.number])
-        self._reference, self._sigma_um, self._outlier_share = reference, sigma_um, outlier_share
+        self._notes = Notes(self._world, wiring, self._rng, reference, sigma_um, outlier_share)
+        self._sigma_um, self._outlier_share = sigma_um, outlier_share
         self._balls_M = balls_M
         self._direction = np.ones(self._mechanism.links)
-        self._apparent = Apparent(self._mechanism, wiring) if sigma_um == 0 else None
         self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
-        self._rows = Rows()
 
     def run(self) -> Rows:
         """Raises KinematicsError where a point cannot be reached."""
@@ -96,7 +75,7 @@ class Campaign:
                     self._note(item, item.point)
             else:
                 self._pass(item)
-        return self._rows
+        return self._notes.rows
 
     # --- moving ---------------------------------------------------------------------------------------
 
@@ -144,37 +123,5 @@ class Campaign:
                 self._visit += 1
                 self._note(item, None)
 
-    # --- writing down ---------------------------------------------------------------------------------
-
     def _note(self, item: Item, point: int | None) -> None:
-        world = self._world
-        shown = {name: world.sense(name) for name in world.names}
-        links = range(1, self._mechanism.links + 1)
-        joints = [name for name in shown if name.startswith("joint_")]
-        frames = [name for name in shown if name.startswith("frame_")]
-        others = [name for name in shown if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
-        self._rows.add(
-            {
-                "time_s": round(world.time_s, 6),
-                "session": item.session,
-                "point": np.nan if point is None else point,
-                "visit": self._visit,
-                **{f"scale_{i}_mm": shown[f"scale_{i}"] for i in links},
-                **{f"{name}_um": shown[name] / UM for name in (*joints, *frames)},
-                **{name: round(shown[name], 3) for name in others},
-                **{f"approach_{i}": self._direction[i - 1] for i in links},
-                **self._measured(point),
-            }
-        )
-        if self._apparent is not None:
-            self._rows.apparent_mm.append(self._apparent.tip(shown, world.posture))
-            self._rows.reference_mm.append(world.shown_mm())
-
-    def _measured(self, point: int | None) -> dict[str, float]:
-        if self._reference == "ball_plate":
-            return {"ball": np.nan if point is None else point}
-        if self._reference == "interferometer":
-            changes = noisy(self._world.link_change_mm(), self._sigma_um, self._rng, self._outlier_share)
-            return {f"reference_link_{i + 1}_mm": round(value, 6) for i, value in enumerate(changes.tolist())}
-        tip = noisy(self._world.shown_mm(), self._sigma_um, self._rng, self._outlier_share)
-        return {f"reference_{axis}_mm": round(value, 6) for axis, value in zip("xyz", tip.tolist(), strict=True)}
+        self._notes.add(item.session, self._visit, point, self._direction)

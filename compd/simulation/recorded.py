@@ -12,6 +12,8 @@ from compd.configuration import Configuration
 from compd.simulation.campaign import Campaign
 from compd.simulation.cause import Cause
 from compd.simulation.closure import Floats
+from compd.simulation.given_campaign import GivenCampaign
+from compd.simulation.given_row import GivenRow
 from compd.simulation.hidden import Hidden
 from compd.simulation.instruments import SIGMA_UM, Kind, ball_plate_mm
 from compd.simulation.mechanism import Mechanism
@@ -39,22 +41,32 @@ class Recorded:
 
 def record(
     configuration: Configuration, seed: int, hidden: Sequence[Hidden], reference: Kind = "tracker",
-    plate_file: str = "", other_days: int = 0,
+    plate_file: str = "", other_days: int = 0, given: Sequence[GivenRow] = (),
 ) -> Recorded:  # fmt: skip
     """One campaign. `seed`: machine and parts; `other_days`: another campaign on the same machine.
 
-    `plate_file`: the ball plate's file, beside the recording.
+    `plate_file`: the ball plate's file, beside the recording. `given`: measure these rows, on the same machine, and
+    nothing else; not with a ball plate, whose balls are where they are.
     """
     geometry, wiring = configuration.geometry, configuration.wiring
     sizing = Sizing(geometry, wiring, seed)
     sized = tuple(sizing.cause(one) for one in hidden)
     weak = sizing.weak([one.id for one in hidden], np.random.default_rng([seed, 3]))
-    balls_M, days = _days(sizing.mechanism, reference, seed, other_days)
+    causes = [*(one.cause for one in sized), *weak]
     sigma_um = SIGMA_UM[reference]
-    campaign = Campaign(
-        geometry, wiring, days, seed, SEEN, [*(one.cause for one in sized), *weak], reference=reference,
-        sigma_um=sigma_um, outlier_share=OUTLIER_SHARE, balls_M=balls_M,
-    )  # fmt: skip
+    campaign: Campaign | GivenCampaign
+    balls_M = None
+    if given:
+        campaign = GivenCampaign(
+            geometry, wiring, given, seed, other_days, SEEN, causes, reference=reference, sigma_um=sigma_um,
+            outlier_share=OUTLIER_SHARE,
+        )  # fmt: skip
+    else:
+        balls_M, days = _days(sizing.mechanism, reference, seed, other_days)
+        campaign = Campaign(
+            geometry, wiring, days, seed, SEEN, causes, reference=reference, sigma_um=sigma_um,
+            outlier_share=OUTLIER_SHARE, balls_M=balls_M,
+        )  # fmt: skip
     says: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": sigma_um}
     if reference == "tracker":
         says["frame"] = "machine"

@@ -8,6 +8,7 @@ radiation together: 8 W/(m2 K).
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ from compd.simulation.weather import REFERENCE_degC, Weather
 
 Floats = NDArray[np.float64]
 
+# Beside the links, what a thermometer is on: a place that can be held warm or cold.
+PARTS = ("base", "platform", "tool", "frame", "plate_top", "plate_bottom")
 LINK_PIECES = 5
 COLUMN_STOREYS = 4
 COLUMNS = 3
@@ -77,6 +80,13 @@ class WarmUp:
         self._at_link = np.array([[index[name] for name in pieces] for pieces in self._links])
         self._at_column = np.array([[[index[n] for n in column[face]] for face in _FACES] for column in self._columns])
         self._at_plate = np.array([index[name] for name in self._plate])
+        columns = [name for column in self._columns for face in _FACES for name in column[face]]
+        self._places: dict[str, Sequence[str]] = {
+            **{f"link_{i + 1}": pieces for i, pieces in enumerate(self._links)},
+            **dict(
+                zip(PARTS, (["base"], ["platform"], ["tool"], columns, self._plate[:1], self._plate[-1:]), strict=True)
+            ),
+        }
         self.heat = usual_heat(links, heat_share)
         self._moving_W: Floats = np.zeros(len(index))
         self._moving_W[self._at_link] = heat_share * _DRIVE_MOVING_W * _DRIVE_SHARES
@@ -89,6 +99,10 @@ class WarmUp:
             step_s = time_s / steps
             self._network.advance(step_s, self._weather.room_degC(self.time_s + step_s / 2), heat_W)
             self.time_s += step_s
+
+    def hold(self, places_degC: Mapping[str, float]) -> None:
+        """From now on these places, and no others, are held at their temperatures; named as by a thermometer there."""
+        self._network.hold({body: degC for place, degC in places_degC.items() for body in self._places[place]})
 
     @property
     def room_degC(self) -> float:

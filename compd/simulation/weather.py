@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -23,22 +24,37 @@ KNOTS_PER_SESSION = 4
 
 
 class Weather:
-    """Slow waves with seeded phases. At time 0 the room is at reference conditions."""
+    """Slow waves with seeded phases. At time 0 the room is at reference conditions.
+
+    `held`: what a climate chamber keeps as it is told, by name with unit; all else is as outside.
+    """
 
     def __init__(self, swing_K: float, rng: np.random.Generator) -> None:
         """`swing_K`: amplitude of the daily wave of the room's temperature."""
+        self.held: Mapping[str, float] = {}
         self._temperature = _phased([(period, share * swing_K) for period, share in _TEMPERATURE_WAVES], rng)
         self._pressure = _phased(_PRESSURE_WAVES_hPa, rng)
         self._humidity = _phased(_HUMIDITY_WAVES_pct, rng)
 
     def room_degC(self, time_s: float) -> float:
-        return REFERENCE_degC + _waves(self._temperature, time_s)
+        return self.held.get("temperature_room_degC", REFERENCE_degC + self._room_K(time_s))
 
     def pressure_hPa(self, time_s: float) -> float:
-        return STANDARD_PRESSURE_hPa + _waves(self._pressure, time_s)
+        return self.held.get("pressure_hPa", STANDARD_PRESSURE_hPa + self._over_standard_hPa(time_s))
 
     def humidity_pct(self, time_s: float) -> float:
-        return MIDDLE_HUMIDITY_pct + _waves(self._humidity, time_s)
+        return self.held.get("humidity_pct", MIDDLE_HUMIDITY_pct + self._over_middle_pct(time_s))
+
+    # --- outside, as differences ----------------------------------------------------------------------
+
+    def _room_K(self, time_s: float) -> float:
+        return _waves(self._temperature, time_s)
+
+    def _over_standard_hPa(self, time_s: float) -> float:
+        return _waves(self._pressure, time_s)
+
+    def _over_middle_pct(self, time_s: float) -> float:
+        return _waves(self._humidity, time_s)
 
 
 _Waves = list[tuple[float, float, float]]
@@ -71,14 +87,14 @@ class WorkshopWeather(Weather):
                     knots.append((time_s, room_K, pressure_hPa, humidity_pct))
         self._knots = np.array(knots).T
 
-    def room_degC(self, time_s: float) -> float:
-        return REFERENCE_degC + self._at(1, time_s)
+    def _room_K(self, time_s: float) -> float:
+        return self._at(1, time_s)
 
-    def pressure_hPa(self, time_s: float) -> float:
-        return STANDARD_PRESSURE_hPa + self._at(2, time_s)
+    def _over_standard_hPa(self, time_s: float) -> float:
+        return self._at(2, time_s)
 
-    def humidity_pct(self, time_s: float) -> float:
-        return MIDDLE_HUMIDITY_pct + self._at(3, time_s)
+    def _over_middle_pct(self, time_s: float) -> float:
+        return self._at(3, time_s)
 
     def _at(self, row: int, time_s: float) -> float:
         return float(np.interp(time_s, self._knots[0], self._knots[row]))

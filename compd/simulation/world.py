@@ -14,32 +14,34 @@ from compd.simulation.cause import Cause, Travel
 from compd.simulation.closure import Floats, Posture
 from compd.simulation.equilibrium import Equilibrium, Settled
 from compd.simulation.frame import Frame
+from compd.simulation.given_row import GivenRow
 from compd.simulation.joints import Joints
 from compd.simulation.mechanism import Mechanism
 from compd.simulation.motion import Follower, Phase, Tour
 from compd.simulation.sensors import Sensors
+from compd.simulation.stages import DWELL_S, Measuring
 from compd.simulation.strengths import Strengths
 from compd.simulation.tour import STROKE_SHARE, tour_points_mm
 from compd.simulation.warm_up import Heat, WarmUp
 from compd.simulation.weather import Weather
 
-DWELL_S = 1.5
-Mode = Literal["zero", "tour", "commanded", "blocked"]
+Mode = Literal["zero", "tour", "plan", "commanded", "blocked"]
 
 
 class World:
     """Starts at machine zero and stands there, unchanged, for a while; then it is switched on: it warms up
-    and starts its tour. Not for two threads at once, but for `sense`."""
+    and starts its tour, or measures what is planned. Not for two threads at once, but for `sense`."""
 
     def __init__(
         self, geometry: Geometry, wiring: Wiring, seed: int, speedup: float = 1.0,
         zero_hold_s: float = 0.0, strengths: Strengths | None = None, causes: Sequence[Cause] = (),
-        weather: Weather | None = None,
+        weather: Weather | None = None, rows: Sequence[GivenRow] = (),
     ) -> None:  # fmt: skip
         """`speedup`: weather and warm-up run this many times faster than the machine moves.
 
-        `zero_hold_s`: how long it stands at machine zero; a command or a call of `tour` ends it too.
-        `causes`: beyond those in `strengths`. `weather`: another than the usual one.
+        `zero_hold_s`: how long it stands at machine zero; a command, or a call of `tour` or `measure`, ends it too.
+        `causes`: beyond those in `strengths`. `weather`: another than the usual one. `rows`: what to measure
+        instead of the tour.
         """
         self._strengths = strengths or Strengths()
         weather_rng, joint_rng, self._tour_rng, sensor_rng = (
@@ -56,7 +58,8 @@ class World:
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
         self._points_mm = tour_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
-        self._drives: Tour | Follower = Follower(np.zeros(self._mechanism.links))
+        self._drives: Tour | Follower | Measuring = Follower(np.zeros(self._mechanism.links))
+        self._rows = rows
         self.time_s = 0.0
         self.force_M_N: Floats = np.zeros(3)
         self.mode: Mode = "zero"
@@ -76,7 +79,7 @@ class World:
             self.zero_hold_s -= held_s
             time_s -= held_s
             if time_s > 0:
-                self.tour()
+                self.measure() if self._rows else self.tour()
         if time_s > 0:
             moved_s = self._drives.advance(time_s)
             try:
@@ -103,6 +106,24 @@ class World:
         self._drives = Tour(self._settled.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
         self.mode, self.zero_hold_s = "tour", 0.0
 
+    def measure(self) -> None:
+        """Go through the planned rows from the first; then stand still. Raises CompdError where nothing is planned."""
+        if not self._rows:
+            raise CompdError(Problem("simulated machine", "nothing is planned", next_step="start it with --plan"))
+        self._drives = Measuring(self._rows, self._settled.scale_mm, self.hold, self._speedup)
+        self.mode, self.zero_hold_s = "plan", 0.0
+
+    def hold(self, quantities: Mapping[str, float]) -> None:
+        """From now on hold parts of the machine, the room and the load on the tip as told, by name with unit.
+
+        What is not named is left alone; a load that is not named is 0.
+        """
+        parts = {name: degC for name, degC in quantities.items() if name.startswith("temperature_")}
+        parts.pop("temperature_room_degC", None)  # the weather's
+        self._warm.hold({name[len("temperature_") : -len("_degC")]: degC for name, degC in parts.items()})
+        self._weather.held = quantities
+        self.force_M_N = np.array([quantities.get(f"force_{axis}_N", 0.0) for axis in "xyz"])
+
     def command(self, scale_mm: Sequence[float]) -> None:
         """Drive to scale values, (n,) mm, at limited speed.
 
@@ -125,6 +146,11 @@ class World:
     def point(self) -> int | None:
         """Number of the tour's point that is visited or driven to; None outside a tour."""
         return self._drives.point
+
+    @property
+    def measuring(self) -> Measuring | None:
+        """How far the plan has come; None while none is followed."""
+        return self._drives if isinstance(self._drives, Measuring) else None
 
     @property
     def tip_frame(self) -> str:
