@@ -62,6 +62,7 @@ class Cause:
     id, unit : of the strength. least, most : the smallest and largest that are plausible, either way where `signed`.
     reciprocal : whether a person states 1/strength: a stiffness, where the cause needs what gives.
     in_library : whether the effect library has it, under the same id; if not, `follows` says what it depends on.
+    in_motion : whether it acts on the move alone.
     """
 
     id: ClassVar[str]
@@ -72,6 +73,7 @@ class Cause:
     signed: ClassVar[bool] = False
     in_library: ClassVar[bool] = True
     follows: ClassVar[tuple[str, ...]] = ()
+    in_motion: ClassVar[bool] = False
 
     def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
         """`rng`: for what differs from part to part; the same seed gives the same parts at every strength."""

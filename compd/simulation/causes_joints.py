@@ -58,7 +58,10 @@ class JointRunout(Cause):
 
     def base_M(self, now: Now) -> Floats:
         moved = self._runout.displacement_mm(angles(self._triads, now.directions_M))
-        return np.asarray((moved[:, :, None] * self._triads).sum(axis=1))
+        moved_M = (moved[:, :, None] * self._triads).sum(axis=1)
+        # along the link as it stands now the comparators do look
+        along_mm = (moved_M * now.directions_M).sum(axis=1, keepdims=True)
+        return np.asarray(moved_M - along_mm * now.directions_M)
 
 
 class PlatformExpansion(Cause):

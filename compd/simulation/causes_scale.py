@@ -80,7 +80,7 @@ class ScaleCyclic(Cause):
 class GaugeLatency(Cause):
     """Scale displays and comparators average: what they show is where things were a moment ago."""
 
-    id, unit, most = "gauge_latency", "ms", 50.0
+    id, unit, most, in_motion = "gauge_latency", "ms", 50.0, True
 
     def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, machine, rng)

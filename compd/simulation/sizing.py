@@ -45,7 +45,9 @@ class Sizing:
 
     def floors(self, cause: Cause) -> float:
         """rms of the tip's error that the gauges do not see, over the floor; the cause's memory is used up."""
-        campaign = Campaign(self._geometry, self._wiring, self._short, self._seed, SEEN_WITHOUT_NOISE, [cause])
+        # of the few rows on the move a share would tell its size badly
+        days = self.plan if cause.in_motion else self._short
+        campaign = Campaign(self._geometry, self._wiring, days, self._seed, SEEN_WITHOUT_NOISE, [cause])
         return campaign.run().error_um() / self._floor_um
 
     def cause(self, hidden: Hidden) -> Sized:
