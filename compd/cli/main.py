@@ -24,6 +24,7 @@ from compd.cli.paper import app as paper
 from compd.cli.plan import plan
 from compd.cli.record import record
 from compd.cli.recording import recording
+from compd.cli.recording_merge import merge
 from compd.cli.replay import replay
 from compd.cli.run import run
 from compd.cli.simulate import simulate
@@ -64,6 +65,7 @@ for panel, commands in PANELS.items():
         app.command(rich_help_panel=panel)(command)
 for change in (model_commands.add, model_commands.remove, model_commands.fit, model_commands.undo):
     effect.command()(change)
+recording.command()(merge)
 GROUPS = {
     "gauge": (gauge, "The live machine"),
     "driver": (driver, "The live machine"),

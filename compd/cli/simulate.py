@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -39,8 +40,17 @@ def simulate(
             help="Hide a cause that follows from this number, in a machine whose gauges see all else; again for two.",
         ),
     ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(help="After machine zero go through these rows, as `compd plan --out` has written them."),
+    ] = None,
 ) -> None:
-    """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol."""
+    """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol.
+
+    Without a plan it visits points for ever. With one it visits them once, so that `compd join` finds the clocks,
+    then goes through the plan's rows: sets the load, holds parts and room as planned, comes from the planned side,
+    waits (--speedup takes that much of it away), dwells; then it stands still.
+    """
     import contextlib
     import math
     import signal
@@ -52,16 +62,20 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
+    from compd.simulation.given_plan import read_plan
     from compd.simulation.hidden import seal
+    from compd.simulation.mechanism import Mechanism
     from compd.simulation.server import Simulation
     from compd.simulation.strengths import SEEN
     from compd.simulation.world import World
 
     configuration = load(config)
+    measured = [quantity.name for quantity in configuration.wiring.quantities]
+    rows = () if plan is None else read_plan(plan, Mechanism(configuration.geometry), measured)
     hid = [_hidden(configuration, seed, number) for number in hidden or ()]
     world = World(
         configuration.geometry, configuration.wiring, seed, speedup, zero_hold,
-        strengths=SEEN if hid else None, causes=[one.cause for one in hid],
+        strengths=SEEN if hid else None, causes=[one.cause for one in hid], rows=rows,
     )  # fmt: skip
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -79,11 +93,15 @@ def simulate(
         daemon = simulation.start()
         console.print(_lines(simulation))
         console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
+        done = not rows
         end_s = math.inf if seconds is None else clock.monotonic() + seconds
         with Live(console=console, auto_refresh=False, transient=True) as live:
             while not clock.wait(stop, LOOK_EVERY_S) and clock.monotonic() < end_s:
                 if console.is_terminal:
                     live.update(_status(simulation), refresh=True)
+                if not done and simulation.truth().get("plan", {}).get("done"):
+                    console.print(f"The plan is done: {plan}, {len(rows)} rows. It stands still; Ctrl-C ends.")
+                    done = True
 
 
 def _hidden(configuration: Configuration, seed: int, number: int) -> Sized:
@@ -128,6 +146,20 @@ def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
     )
 
 
+def _planned(plan: Mapping[str, Any]) -> str:
+    """Where in the plan it is."""
+    doing = {
+        "walk": "a walk first, for the clocks",
+        "way": "on the way",
+        "settle": "parts settle",
+        "wait": "waiting",
+        "look": "at the row",
+    }
+    if plan.get("done", True):
+        return "the plan is done, standing still"
+    return f"row {plan['row']} of {plan['rows']}, {plan['purpose']}: {doing[plan['doing']]}"
+
+
 def _status(simulation: Simulation) -> Text:
     """One line: what it does, where its tip is, how warm it is, how far its frame has moved."""
     from rich.text import Text
@@ -138,6 +170,7 @@ def _status(simulation: Simulation) -> Text:
     doing = {
         "zero": f"at machine zero, {truth['zero_hold_s']:.0f} s more",
         "tour": f"{truth['phase']}, point {truth['point']}",
+        "plan": _planned(truth.get("plan", {})),
         "commanded": f"commanded, {truth['phase']}",
         "blocked": "blocked: the links cannot meet there",
     }[truth["mode"]]

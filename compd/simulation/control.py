@@ -4,6 +4,7 @@
     {"class": "MEASURE"}                              what a laser tracker shows of the tip, with its noise
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
     {"class": "TOUR"}                                 go on visiting points
+    {"class": "PLAN"}                                 measure the planned rows, from the first
     {"class": "TIP_FOR", "scale_mm": [..]}            where the tip would be, were the scales there now
     {"class": "LOAD", "force_M_N": [x, y, z]}         load on the tool's tip
     {"class": "HEAT", "drives_W": [..], "ring_W": ..} what parts give off from now on: all of `Heat`

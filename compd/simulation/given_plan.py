@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,19 +38,23 @@ def quantities(links: int) -> tuple[str, ...]:
             "force_x_N", "force_y_N", "force_z_N")  # fmt: skip
 
 
-def read_plan(path: Path, mechanism: Mechanism) -> tuple[GivenRow, ...]:
-    """The rows of a plan for this machine. Raises CompdError with everything that is wrong with the file."""
-    return _Reader(path, mechanism).rows()
+def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None = None) -> tuple[GivenRow, ...]:
+    """The rows of a plan for this machine. measured : the quantities that gauges are wired to; None = every one.
+
+    Raises CompdError with everything that is wrong with the file.
+    """
+    return _Reader(path, mechanism, measured).rows()
 
 
 class _Reader:
     """One pass over one file; every finding with line and column."""
 
-    def __init__(self, path: Path, mechanism: Mechanism) -> None:
+    def __init__(self, path: Path, mechanism: Mechanism, measured: Collection[str] | None) -> None:
         self._path, self._mechanism = path, mechanism
         self._problems: list[Problem] = []
         self._approaches = tuple(f"approach_{i}" for i in range(1, mechanism.links + 1))
         self._held = quantities(mechanism.links)
+        self._measured = self._held if measured is None else measured
 
     def rows(self) -> tuple[GivenRow, ...]:
         header, lines = self._lines()
@@ -60,11 +64,11 @@ class _Reader:
         before_s = math.inf
         for line, cells in lines:
             values = self._numbers(line, header, cells)
-            scale_mm = self._scale_mm(line, [values.get(name, math.nan) for name in TIP])
             place = tuple(values.get(name, math.nan) for name in TIP)
+            scale_mm = self._scale_mm(line, place)
             time_s = values.get("time_s", math.nan)
             row = GivenRow(
-                len(found) + 1, cells[header.index("purpose")] if "purpose" in header else "",
+                len(found) + 1, dict(zip(header, cells, strict=False)).get("purpose", ""),
                 places.setdefault(place, len(places) + 1), not time_s > before_s, time_s, scale_mm,
                 np.array([values.get(name, 0.0) for name in self._approaches]), values.get(SPEED, 0.0),
                 {name: values[name] for name in self._held if name in values},
@@ -90,7 +94,8 @@ class _Reader:
             why = error.strerror if isinstance(error, OSError) else str(error)
             raise CompdError(Problem(str(self._path), f"cannot be read: {why}", next_step=_AGAIN)) from error
         if self._mechanism.tip_frame != "M":
-            self._fault("", "is for a tool on the platform", "this machine's tool stands on the plate")
+            raise CompdError(Problem(str(self._path), "is for a tool on the platform; this one stands on the plate",
+                                     "plate", "tool on: platform", "plan by hand, and drive there"))  # fmt: skip
         if not lines:
             raise CompdError(Problem(str(self._path), "is empty", allowed="a header and rows", next_step=_AGAIN))
         return lines[0][1], lines[1:]
@@ -100,6 +105,10 @@ class _Reader:
         for name in dict.fromkeys(header):
             if header.count(name) > 1:
                 self._fault(f":1 column {name}", "is there twice", next_step="delete one")
+            if name in self._held and name not in self._measured:
+                self._fault(f":1 column {name}", "no gauge of this machine measures it: no recording will tell", name,
+                            ", ".join(self._measured) or "nothing beside lengths",
+                            "wire one to it in the configuration, or delete the column")  # fmt: skip
             if name in known:
                 continue
             close = difflib.get_close_matches(name, known, n=1)

@@ -67,6 +67,7 @@ class Simulation:
             "MEASURE": lambda _: self.measure(),
             "DRIVE": self._drive,
             "TOUR": self._tour,
+            "PLAN": self._plan,
             "TIP_FOR": self._tip_for,
             "LOAD": self._load,
             "HEAT": self._heat,
@@ -127,6 +128,7 @@ class Simulation:
                 "tip_frame": world.tip_frame,
                 "tip_mm": tip_mm.tolist(),
                 "scale_mm": world.scale_mm.tolist(),
+                **({} if world.measuring is None else {"plan": world.measuring.told()}),
             }
 
     def measure(self) -> Answer:
@@ -156,6 +158,11 @@ class Simulation:
     def _tour(self, _: Mapping[str, Any]) -> Answer:
         with self._lock:
             self.world.tour()
+        return self.truth()
+
+    def _plan(self, _: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.measure()
         return self.truth()
 
     def _tip_for(self, message: Mapping[str, Any]) -> Answer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,12 +17,18 @@ SETTLED_S = 7 * HELD_TIME_CONSTANT_S
 # At rest at a row: every gauge is read, and a tracker has looked many times.
 DWELL_S = 1.5
 
-Purpose = Literal["way", "settle", "wait", "look"]
+# At the points of a walk, in turn: motion with a pattern, so that two clocks that saw it can be laid over each other.
+WALK_DWELLS_S = (0.2, 0.9, 0.4, 0.7)
+
+Purpose = Literal["walk", "way", "settle", "wait", "look"]
 Hold = Callable[[Mapping[str, float]], None]
 
 
 class Stage(NamedTuple):
-    """The links follow `move` and rest until `duration_s` is over; `look`: this is where the row is measured."""
+    """The links follow `move` and rest until `duration_s` is over; `look`: this is where the row is measured.
+
+    row : the one that is measured here or next.
+    """
 
     row: GivenRow
     purpose: Purpose
@@ -30,15 +36,22 @@ class Stage(NamedTuple):
     duration_s: float
 
 
-def stages(rows: Sequence[GivenRow], start_mm: Floats, hold: Hold, speedup: float = 1.0) -> Iterator[Stage]:
+def stages(
+    rows: Sequence[GivenRow], start_mm: Floats, hold: Hold, speedup: float = 1.0, walk_mm: Sequence[Floats] = ()
+) -> Iterator[Stage]:
     """All of them in order. start_mm : (n,) where the links are.
 
     hold : called with a row's quantities when the machine sets out for it. speedup : a plan's waiting, and the
-    warming up of its parts, take so many times less.
+    warming up of its parts, take so many times less. walk_mm : points (n,) to visit first.
     """
     here_mm, direction = start_mm, np.ones_like(start_mm)
     now_s = began_s = 0.0
     held_degC: dict[str, float] = {}
+    for number, point_mm in enumerate(walk_mm):
+        move = Move(here_mm, point_mm)
+        direction = np.where(point_mm != here_mm, np.sign(point_mm - here_mm), direction)
+        here_mm = point_mm
+        yield Stage(rows[0], "walk", move, move.duration_s + WALK_DWELLS_S[number % len(WALK_DWELLS_S)])
     for row in rows:
         hold(row.quantities)
         settled_s = now_s + SETTLED_S / speedup if row.parts_degC != held_degC else now_s
@@ -66,17 +79,20 @@ def stages(rows: Sequence[GivenRow], start_mm: Floats, hold: Hold, speedup: floa
 
 
 class Measuring:
-    """The drives of a machine that goes through a plan's rows, and stands still after the last."""
+    """The drives of a machine that goes through a plan's rows, one or more, and stands still after the last."""
 
     point = None
 
-    def __init__(self, rows: Sequence[GivenRow], start_mm: Floats, hold: Hold, speedup: float) -> None:
-        self._stages = stages(rows, start_mm, hold, speedup)
+    def __init__(
+        self, rows: Sequence[GivenRow], start_mm: Floats, hold: Hold, speedup: float, walk_mm: Sequence[Floats]
+    ) -> None:
+        """As `stages`."""
+        self._stages = stages(rows, start_mm, hold, speedup, walk_mm)
         self._stage: Stage | None = next(self._stages, None)
         self._since_s = 0.0
-        self.rows = len(rows)
+        self._rows = len(rows)
+        self._row = rows[0]
         self.position_mm = start_mm
-        self.row = rows[0] if rows else None
 
     @property
     def done(self) -> bool:
@@ -98,5 +114,11 @@ class Measuring:
             if time_s <= 0:
                 break
             self._stage, self._since_s = next(self._stages, None), 0.0
-            self.row = self._stage.row if self._stage else self.row
+            self._row = self._stage.row if self._stage else self._row
         return moved_s
+
+    def told(self) -> Mapping[str, Any]:
+        """For TRUTH: which row of how many, what it is for, what happens there now, and whether all is done."""
+        doing = self._stage.purpose if self._stage else "done"
+        return {"row": self._row.number, "rows": self._rows, "purpose": self._row.purpose, "doing": doing,
+                "done": self.done}  # fmt: skip

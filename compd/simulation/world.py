@@ -103,14 +103,18 @@ class World:
 
     def tour(self) -> None:
         """Visit seeded points of the workspace, dwelling at each, as a measuring machine does."""
+        self._leave_plan()
         self._drives = Tour(self._settled.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
         self.mode, self.zero_hold_s = "tour", 0.0
 
     def measure(self) -> None:
-        """Go through the planned rows from the first; then stand still. Raises CompdError where nothing is planned."""
+        """Visit the tour's points once, go through the planned rows, then stand still.
+
+        The walk is for who has to lay two clocks over each other. Raises CompdError where nothing is planned.
+        """
         if not self._rows:
             raise CompdError(Problem("simulated machine", "nothing is planned", next_step="start it with --plan"))
-        self._drives = Measuring(self._rows, self._settled.scale_mm, self.hold, self._speedup)
+        self._drives = Measuring(self._rows, self._settled.scale_mm, self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
 
     def hold(self, quantities: Mapping[str, float]) -> None:
@@ -131,6 +135,7 @@ class World:
         """
         setpoint_mm = self._checked(scale_mm)
         self._settle(setpoint_mm, self._settled.posture)
+        self._leave_plan()
         if not isinstance(self._drives, Follower):
             self._drives = Follower(self._settled.scale_mm)
         self._drives.setpoint_mm = setpoint_mm
@@ -234,6 +239,12 @@ class World:
         for cause in self._causes:
             cause.pass_time(travel, self._warm)
         self._settled = self._settle(scale_mm, guess)
+
+    def _leave_plan(self) -> None:
+        """What was held for the plan is held no longer; a load stays."""
+        if self.measuring:
+            self._warm.hold({})
+            self._weather.held = {}
 
     def _settle(self, scale_mm: Floats, guess: Posture) -> Settled:
         return self._equilibrium.settle(scale_mm, guess, self.force_M_N)
