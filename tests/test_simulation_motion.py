@@ -69,6 +69,19 @@ def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
     assert path_mm[:, 0].max() <= 40.0 + 0.01  # brakes in time
 
 
+def test_follower_comes_from_one_side_whatever_the_steps() -> None:
+    """A play of a micrometre would show a turn at the end."""
+    rng = np.random.default_rng(1)
+    drives = Follower(np.zeros(3))
+    for _ in range(100):
+        start_mm = drives.position_mm
+        drives.setpoint_mm = rng.uniform(-60.0, 60.0, 3)
+        way = np.sign(drives.setpoint_mm - start_mm)
+        while drives.phase == "moving":
+            drives.advance(rng.uniform(0.015, 0.045))
+            assert np.all(way * drives.position_mm <= way * drives.setpoint_mm)
+
+
 def test_follower_takes_new_setpoints_on_the_way() -> None:
     drives = Follower(np.zeros(1))
     drives.setpoint_mm = np.array([40.0])

@@ -126,6 +126,8 @@ class Follower:
         wanted = np.sign(left_mm) * np.minimum(braking, SPEED_MM_PER_S)
         self._speed_mm_per_s = self._speed_mm_per_s + np.clip(wanted - self._speed_mm_per_s, -gain, gain)
         travel_mm = self._speed_mm_per_s * step_s
-        arrived = (np.abs(left_mm) <= np.abs(travel_mm) + 1e-9) & (np.abs(self._speed_mm_per_s) <= 2 * gain)
+        # a short step leaves the next one more to brake than it can: nobody goes past for that
+        slow = np.abs(self._speed_mm_per_s) <= 2 * ACCELERATION_MM_PER_S2 * FOLLOWING_STEP_S
+        arrived = (np.abs(left_mm) <= np.abs(travel_mm) + 1e-9) & slow
         self.position_mm = np.where(arrived, self.setpoint_mm, self.position_mm + travel_mm)
         self._speed_mm_per_s = np.where(arrived, 0.0, self._speed_mm_per_s)
