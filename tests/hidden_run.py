@@ -94,7 +94,8 @@ class HiddenRun:
 
     def drive(self, visit: Visit) -> None:
         """Go there, under its load, with its heaters on, and rest there."""
-        self.machine.ask("HEAT", **visit.heat)
+        if visit.heat is not None:
+            self.machine.ask("HEAT", **visit.heat)
         self.machine.ask("LOAD", force_M_N=visit.force_M_N)
         while True:
             truth = self.machine.ask("DRIVE", scale_mm=visit.scale_mm)

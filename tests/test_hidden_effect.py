@@ -1,13 +1,11 @@
 """The machine has an effect that the daemon's model lacks: it is found, adopted, and the live error falls.
 
-Everything goes through the commands that a person would use, on wires. The name of what is hidden is in a sealed
-file that is opened here at the end, to score.
+Everything goes through the commands that a person would use, on wires. What is hidden is in a sealed file that is
+opened here at the end, to score. For each cause the number is the first that hides it plainly, not one that suits:
+the first test here holds that.
 
-Not covered: backlash (number 63; found as friction, and not down to the floor: rows at rest do not show the last
-direction), link sag (7; its truth bends more steeply than the library's form), frame rods (18; one warm-up warms all
-parts alike), humidity (59; a small step of the library is named too), causes at the reference instrument and those
-that follow time (nothing of them is live), and fewer than ten effects and three causes in all: the others have not
-been run on wires from end to end.
+Not covered: LEFT_OUT and why; causes at the reference instrument and those that follow time, for the daemon's tip has
+no part in them.
 """
 
 from __future__ import annotations
@@ -19,21 +17,39 @@ from typing import Any, NamedTuple
 import pytest
 import yaml
 
+from compd.simulation.hidden import CAUSES, drawn
+from compd.simulation.mechanism import Mechanism
 from tests.hidden_run import HiddenRun, hidden_run, told
-from tests.hidden_visits import visits
+from tests.hidden_visits import check_visits, survey_visits
 from tests.scoreboard.scoring import follows
-from tests.simulated import run_directory
+from tests.simulated import run_directory, tripod
 
-VISITS, CHECKS = 48, 12
-# Weather and warm-up: a minute on the machine is five hours of them.
-SPEEDUP = "300"
-# Pressure and humidity take days to change.
-SLOW_WEATHER_SPEEDUP = "900"
-# Numbers for `--hidden`, as a person would try one after the other; what each hides is in its sealed file.
-ONE = (49, 29)
+
+class Pace(NamedTuple):
+    """By how much weather and warm-up are faster than the machine; whether heaters are switched on and off."""
+
+    speedup: str
+    heaters: bool
+
+
+# A minute on the machine is five hours of warm-up; pressure and humidity take longer, and then the frame must not
+# move with the heaters while it is being read.
+HOURS, DAYS = Pace("300", True), Pace("900", False)
+# Numbers for `--hidden`. Two are run with all the tests, the others by `make hidden`.
+QUICK = (49, 29)
+ONE = (4, 5, 6, 8, 12, 28, 33, 39, 54, 77)
 PAIRS = ([49, 54],)
-OUTSIDE = (11,)
-TIMEOUT_S = 400
+OUTSIDE = {1: HOURS, 11: DAYS, 59: DAYS}
+# Run on wires from end to end too, and not passed.
+LEFT_OUT: dict[int, str] = {}
+# Numbers below this are looked through; a cause is plain from so many times the noise.
+NUMBERS = 200
+PLAIN_FLOORS = 2.5
+# What the daemon's tip has no part in: the reference instrument shows another place, or a moment passes.
+NOT_LIVE = ("plate_bending", "reference_drift", "reference_air_index", "reference_registration", "plate_swelling",
+            "collision_step", "room_breathing")  # fmt: skip
+VISITS, CHECKS = 48, 12
+TIMEOUT_S = 600
 # A hidden effect is plain when the squared error is so many times what noise alone would give.
 PLAIN_RATIO = 2.0
 
@@ -59,11 +75,11 @@ def add_found(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: P
         run.compd("effect", "add", effect, "--recording", recording, "--machine", run.configuration, "--model", model)
 
 
-def learned(hidden: list[int], directory: Path, speedup: str = SPEEDUP) -> Outcome:
+def learned(hidden: list[int], directory: Path, pace: Pace = HOURS) -> Outcome:
     """The whole way, from a machine with a secret to the daemon that has learned it."""
     options = [word for number in hidden for word in ("--hidden", str(number))]
-    with hidden_run(directory, "--seed", "1", "--speedup", speedup, *options) as run:
-        recording, before_um = run.survey(visits(2, VISITS), "survey")
+    with hidden_run(directory, "--seed", "1", "--speedup", pace.speedup, *options) as run:
+        recording, before_um = run.survey(survey_visits(2, VISITS, heaters=pace.heaters), "survey")
         machine = ("--machine", str(run.configuration))
         compared = told(run.compd("compare", recording, "--json", *machine))
         verdict = told(run.compd("diagnose", recording, "--json", *machine))
@@ -71,7 +87,7 @@ def learned(hidden: list[int], directory: Path, speedup: str = SPEEDUP) -> Outco
         add_found(run, verdict, recording, model)
         if model.exists():
             run.compd("adopt", model, "--daemon", run.socket)
-        after_um = run.tip_error_um(visits(3, CHECKS))
+        after_um = run.tip_error_um(check_visits(3, CHECKS, heaters=pace.heaters))
     secret = json.loads((run.directory / "hidden.answer.json").read_text(encoding="utf-8"))
     return Outcome(compared, verdict, before_um, after_um, secret)
 
@@ -96,8 +112,19 @@ def check_described(outcome: Outcome) -> None:
     assert outcome.after_um < floor_um < outcome.before_um
 
 
+def test_every_live_cause_is_run_by_the_first_number_that_hides_it() -> None:
+    machine = Mechanism(tripod())
+    first: dict[str, int] = {}
+    for number in range(NUMBERS):
+        cause, _, floors = drawn(number, machine)
+        if cause not in NOT_LIVE and floors >= PLAIN_FLOORS:
+            first.setdefault(cause, number)
+    assert sorted((*QUICK, *ONE, *OUTSIDE, *LEFT_OUT)) == sorted(first.values())
+    assert {*first, *NOT_LIVE} == {*CAUSES} - {"tool_expansion"}
+
+
 @pytest.mark.timeout(TIMEOUT_S)
-@pytest.mark.parametrize("hidden", ONE)
+@pytest.mark.parametrize("hidden", [*QUICK, *(pytest.param(number, marks=pytest.mark.long) for number in ONE)])
 def test_one_effect(hidden: int) -> None:
     with run_directory() as directory:
         check_found(learned([hidden], directory))
@@ -116,4 +143,4 @@ def test_two_effects(hidden: list[int]) -> None:
 @pytest.mark.parametrize("hidden", OUTSIDE)
 def test_cause_that_the_library_has_not(hidden: int) -> None:
     with run_directory() as directory:
-        check_described(learned([hidden], directory, SLOW_WEATHER_SPEEDUP))
+        check_described(learned([hidden], directory, OUTSIDE[hidden]))
