@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
+from compd.live.directions import Directions
 from compd.live.protocol import Target
 from compd.live.recorder import Keeping, Recorder
 from compd.live.transcript import Transcript
@@ -26,7 +27,8 @@ class Run:
     def __init__(self, machine: Machine, seed: int = 1):
         self.machine = machine
         self.random = np.random.default_rng(seed)
-        self.transcript = Transcript(machine.wires, machine.latest.channels)
+        self.directions = Directions(machine.wires.scale.wires)
+        self.transcript = Transcript(machine.wires, machine.latest.channels, self.directions)
         self.version = {
             "class": "VERSION", "protocol": 1, "release": "1.2", "machine": machine.configuration.machine,
             "config_hash": machine.configuration.config_hash, "links": machine.configuration.geometry.links,
@@ -54,6 +56,7 @@ class Run:
             assert machine.tick == recorded[1]["seq"]
 
     def recorded(self, setpoint):
+        self.directions.saw(setpoint)
         line = self.transcript.line(setpoint)
         return line, json.loads(line), setpoint
 

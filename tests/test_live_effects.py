@@ -16,6 +16,7 @@ from compd.errors import CompdError, DaemonError, StateError
 from compd.gauge import Quality
 from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
+from compd.live.directions import Directions
 from compd.live.loop import Orders
 from compd.live.models import Models, ModelShelf
 from compd.live.protocol import Target
@@ -345,7 +346,7 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
     live, again = (with_noise(machine(on_stale="fade"), 0.1) for _ in range(2))
     one = shelf(live).read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
     two = shelf(live).read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
-    transcript = Transcript(live.wires, live.latest.channels)
+    transcript = Transcript(live.wires, live.latest.channels, Directions(live.wires.scale.wires))
     orders = {0: None, 20: Models(one), 60: Models(one, two), 120: Models(two), 170: Models(shelf(live).bare)}
     states = set()
     for tick in range(200):

@@ -16,6 +16,7 @@ from compd.errors import StateError
 from compd.live.acquisition import Acquisition
 from compd.live.adopting import ModelAdopter
 from compd.live.chain import build_chain
+from compd.live.directions import Directions
 from compd.live.loop import Loop, Orders
 from compd.live.models import Models, ModelShelf
 from compd.live.notify import Notifier
@@ -57,7 +58,9 @@ class Daemon:
         self.publisher = Publisher(configuration.sockets, period_s, self._note_state)
         udp = configuration.sockets.udp
         self._packets = PacketSender(udp, configuration.config_hash) if udp is not None else None
-        outlets = [self.publisher.deliver] if self._packets is None else [self._packets.deliver, self.publisher.deliver]
+        directions = Directions(self._wires.scale.wires)
+        packets = [] if self._packets is None else [self._packets.deliver]
+        outlets = [*packets, directions.saw, self.publisher.deliver]
         self.loop = Loop(configuration.loop, cycle, self.latest, self.orders, outlets, self._notifier, clock)
         self._zero_taker = ZeroTaker(
             self._wires, self.latest, self.orders, _directory(configuration), configuration.zero_hash, clock
@@ -80,7 +83,7 @@ class Daemon:
         )
         self._requests = Requests(
             version, keys, self.orders, report.message, self._zero_taker.take,
-            Transcript(self._wires, self.latest.channels), self._model_adopter.take,
+            Transcript(self._wires, self.latest.channels, directions), self._model_adopter.take,
         )  # fmt: skip
         self._state: State | None = None
 

@@ -44,7 +44,9 @@ class RecordingPart:
         self._origin_s = origin_s
         sidecar = yaml.safe_dump(self._sidecar(version, watch, started_at), sort_keys=False).encode()
         opened = b"".join(json.dumps(message, separators=(",", ":")).encode() + b"\n" for message in opening)
-        header = ",".join(["time_s", *(column["column"] for column in self._columns)]).encode() + b"\n"
+        self._links = len(first.get("approach", ()))
+        approach = [f"approach_{i + 1}" for i in range(self._links)]
+        header = ",".join(["time_s", *(column["column"] for column in self._columns), *approach]).encode() + b"\n"
         self._stem = stem
         self._models: dict[str, Path] = {}
         self._whole_size = 0
@@ -111,6 +113,8 @@ class RecordingPart:
         now_s, readings = message["time_s"], message["readings"]
         cells = [_number(now_s - self._origin_s, _DECIMALS_S)]
         cells += [self._cell(column, readings[column["channel"]], now_s) for column in self._columns]
+        # empty until a link has moved
+        cells += [str(way) if way else "" for way in message.get("approach", ())[: self._links]]
         return ",".join(cells)
 
     def _cell(self, column: Message, reading: Message, now_s: float) -> str:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from compd.configuration.crosscheck import DISTANCES
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading
+from compd.live.directions import Directions
 from compd.live.inputs import Carried, Inputs
 from compd.live.protocol import Target, line
 from compd.live.setpoint import Setpoint
@@ -32,11 +33,12 @@ class RecordedCycle(NamedTuple):
 
 
 class Transcript:
-    """Writes a machine's READINGS; `wires` and `channels` are those of the loop's snapshots."""
+    """Writes a machine's READINGS; `wires` and `channels` are those of the loop's snapshots; `directions` sees these."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str]) -> None:
+    def __init__(self, wires: MachineWires, channels: Sequence[str], directions: Directions) -> None:
         self.columns = columns(wires)
         self._channels = tuple(channels)
+        self._directions = directions
 
     def line(self, setpoint: Setpoint) -> bytes:
         """The READINGS line of the cycle that made `setpoint`, with its newline."""
@@ -48,6 +50,8 @@ class Transcript:
             "time_s": inputs.snapshot.time_s,
             "readings": dict(zip(self._channels, map(_reading, inputs.snapshot.readings), strict=True)),
         }
+        if approach := self._directions.now:
+            message["approach"] = approach
         if isinstance(inputs.zero, MachineZero):
             message["zero"] = inputs.zero.to_json()
         else:

@@ -16,7 +16,7 @@ from compd.workbench.candidates import library_pool
 from compd.workbench.compare import compare
 from compd.workbench.contest import Contest, Members
 from compd.workbench.dependence import Dependence, Rest, held_out_losses, ranked, together
-from compd.workbench.disturbances import disturbance_covariance
+from compd.workbench.disturbances import with_disturbances
 from compd.workbench.experiment import plan
 from compd.workbench.explanation import Explanation, Progress, explain, held_block
 from compd.workbench.judged import judged
@@ -68,6 +68,7 @@ def _diagnosis(bench: Bench, found: Explanation, covariance: FloatArray | None) 
     current, joint = before.fitted, covariance
     for k in effects:
         result = search(seen, current, contest.candidates[k].effect, bench.sigma_um)
+        result = with_disturbances(result, seen, bench.sigma_um, bench.pool.candidates)
         current, joint = result.fitted, result.covariance
     after = compare(seen, current, joint) if effects else before
     quiet = not found.described and at_floor(after.floor_ratio, contest.base - 1.0 if effects else 0.0)
@@ -104,11 +105,10 @@ def _steps(
 ) -> tuple[Step, ...]:
     """One effect after another, with what each adds. Rivals are looked for where the end is at the floor."""
     contest, noise_um = found.contest, bench.before.floor.um
-    disturbed = disturbance_covariance(contest, effects)
     steps, left = [], contest.base
     for place, one in enumerate(fitted):
         loss = contest.entries([effects[: place + 1]])[0].loss
-        known = numbers(one.effect, bench.seen.rows.links, one.theta, one.covariance + disturbed[place])
+        known = numbers(one.effect, bench.seen.rows.links, one.theta, one.covariance)
         others = rivals(contest, effects, place) if quiet else ()
         phi = explained_fraction(left, loss)
         steps.append(Step(one, others, noise_um * float(np.sqrt(loss)), phi, chance[one.effect.id], tuple(known)))

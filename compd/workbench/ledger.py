@@ -8,8 +8,11 @@ import numpy as np
 
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect, Fitted
+from compd.model.effects import library
 from compd.model_file import Declaration, Kind, ModelFile, Step, Stored
+from compd.workbench.candidates import library_pool
 from compd.workbench.compare import Comparison, compare
+from compd.workbench.disturbances import with_disturbances
 from compd.workbench.fit import Fit, fit, start
 from compd.workbench.observed import Observed
 from compd.workbench.search import search
@@ -82,6 +85,8 @@ def _change(
     file: ModelFile, old: ModelFile, found: Fit, before: Comparison, kind: Kind, effect: str, date: str
 ) -> Change:
     seen = before.seen
+    others = library_pool(seen, list(library().values()), [one.effect.id for one in found.fitted])
+    found = with_disturbances(found, seen, before.floor.by_axis_um, others.candidates)
     after = compare(seen, found.fitted, found.covariance)
     recording = seen.recording
     step = Step(
