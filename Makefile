@@ -9,9 +9,9 @@ STAMP  := $(VENV)/.installed
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
-	@echo "make test    the tests"
+	@echo "make test    the tests; two hidden causes are found on wires among them"
 	@echo "make long    the tests that take minutes"
-	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, a minute or two each"
+	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, three at a time (15 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make wheel   build the wheel, install it in a clean environment, run it"
 	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; goes on where it was)"
@@ -29,17 +29,19 @@ $(STAMP): pyproject.toml
 demo: $(STAMP)
 	@$(BIN)/compd demo
 
-# A hidden cause is found on wires, in real time: minutes each, so they have a target of their own.
-HIDDEN := tests/test_hidden_effect.py tests/test_tutorial.py
+# A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. One takes a
+# third of a processor: three at a time leave two processors enough for everything to be in time.
+HIDDEN := tests/test_tutorial.py tests/test_hidden_effect.py
+SIDE_BY_SIDE ?= 3
 
 test: $(STAMP)
-	$(BIN)/pytest $(HIDDEN:%=--ignore=%)
+	$(BIN)/pytest
 
 long: $(STAMP)
 	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%)
 
 hidden: $(STAMP)
-	$(BIN)/pytest -m '' $(HIDDEN)
+	$(BIN)/pytest -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check
