@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 from compd.cli.main import app
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.simulation.campaign import Campaign, Rows
+from compd.simulation.campaign import Campaign
 from compd.simulation.hidden import CAUSES, LEAST_FLOORS, MOST_FLOORS, Hidden, asked, build, drawn
 from compd.simulation.instruments import BALLS, TRACKER_SIGMA_UM, ball_plate_mm
 from compd.simulation.mechanism import Mechanism
+from compd.simulation.notes import Rows
 from compd.simulation.plan import GAP_S, SESSIONS, plan
 from compd.simulation.recorded import Recorded, record
 from compd.simulation.sizing import Sizing

@@ -42,6 +42,8 @@ def campaign(
     Two disturbances of a fifth of the noise are always in it. What was hidden, and how strong, is written to
     NAME.answer.json; who wants to diagnose leaves that file shut.
     """
+    import math
+
     from rich.console import Console
 
     from compd.configuration import load
@@ -73,5 +75,9 @@ def campaign(
     rows = len(recorded.columns["time_s"])
     said = f"{rows} rows, {len(recorded.columns)} columns"
     if given:
-        said = f"the plan's {len(given)} rows, and {rows - len(given)} between them that only the gauges saw"
+        measured = rows - sum(map(math.isnan, recorded.columns[min(recorded.reference_columns)]))
+        said = (
+            f"the plan's {len(given)} rows, {measured} with repeats, and {rows - measured} between them that only the "
+            "gauges saw"
+        )
     Console().print(f"{path}: {said}; under seal: {answer}", soft_wrap=True)

@@ -15,7 +15,7 @@ from compd.simulation.given_row import GivenRow
 from compd.simulation.heat import HELD_TIME_CONSTANT_S
 from compd.simulation.instruments import Kind
 from compd.simulation.notes import Notes, Rows
-from compd.simulation.plan import PASS_ROW_EVERY_S
+from compd.simulation.plan import PASS_ROW_EVERY_S, REPEAT_AFTER_S
 from compd.simulation.stages import Stage, stages
 from compd.simulation.strengths import Strengths
 from compd.simulation.weather import Weather
@@ -52,8 +52,7 @@ class GivenCampaign:
             elif stage.row.on_the_move:
                 self._pass(stage)
             else:
-                self._go_on(stage, 0.0, stage.duration_s)
-                self._note(stage.row.point, measured=True)
+                self._rest(stage)
         return self._notes.rows
 
     def _spend(self, stage: Stage) -> None:
@@ -63,6 +62,13 @@ class GivenCampaign:
         for k in range(steps):
             self._go_on(stage, k * stage.duration_s / steps, (k + 1) * stage.duration_s / steps)
             self._note(None, measured=False)
+
+    def _rest(self, stage: Stage) -> None:
+        """At a row at rest the reference looks twice: their scatter is its noise."""
+        self._go_on(stage, 0.0, stage.duration_s)
+        self._note(stage.row.point, measured=True)
+        self._go_on(stage, stage.duration_s, stage.duration_s + REPEAT_AFTER_S)
+        self._note(stage.row.point, measured=True, same_visit=True)
 
     def _pass(self, stage: Stage) -> None:
         """Past the row at constant speed: measured in the middle, gauges read shortly before and after, and at rest."""
@@ -81,6 +87,6 @@ class GivenCampaign:
         travel_s = max(0.0, min(time_s, move.duration_s) - since_s)
         world.carry(end_mm, world.posture, time_s - since_s, travel_s)
 
-    def _note(self, point: int | None, *, measured: bool) -> None:
-        self._visit += 1
+    def _note(self, point: int | None, *, measured: bool, same_visit: bool = False) -> None:
+        self._visit += not same_visit
         self._notes.add(SESSION, self._visit, point, self._direction, measured)

@@ -38,6 +38,11 @@ class Recorded:
     hidden: tuple[Sized, ...]
     weak: tuple[Cause, ...]
 
+    @property
+    def reference_columns(self) -> list[str]:
+        """What the instrument showed; nan where only the gauges were read."""
+        return [name for name in self.columns if name.startswith("reference_")]
+
 
 def record(
     configuration: Configuration, seed: int, hidden: Sequence[Hidden], reference: Kind = "tracker",

@@ -22,7 +22,7 @@ _RENUMBERED = tuple(name for name in ID_COLUMNS if name != "ball")
 
 
 class Merged(NamedTuple):
-    """rows : of each recording. starts_s : when each begins in the merged time; gap_known : whether that is recorded."""
+    """rows : of each recording. starts_s : when each begins in merged time; gap_known : whether that is recorded."""
 
     rows: tuple[int, ...]
     starts_s: tuple[float, ...]
@@ -73,14 +73,14 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
             )  # fmt: skip
     for one in others:
         pairs = (
-            ("is of another machine", one.machine, first.machine),
-            ("has another reference", _reference(one), _reference(first)),
-            ("was recorded from another machine zero", *(str(r.sidecar.provenance.get("zero_taken_at", ""))
-             for r in (one, first))),
+            ("is of another machine", one.machine, first.machine, "leave it out"),
+            ("has another reference", _reference(one), _reference(first), "diagnose it by itself"),
+            ("was recorded from another machine zero", _zero(one), _zero(first),
+             "measure again from the first zero: it survives a restart of the daemon"),
         )  # fmt: skip
         problems += [
-            Problem(str(one.sidecar.path), what, here, there, f"leave it out: {first.path} comes first")
-            for what, here, there in pairs
+            Problem(str(one.sidecar.path), what, here, there, step)
+            for what, here, there, step in pairs
             if here != there
         ]
     return problems
@@ -89,6 +89,10 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
 def _reference(one: Recording) -> str:
     reference = one.reference
     return "none" if reference is None else f"{reference.quantity}, {reference.frame}, sigma {reference.sigma_um} um"
+
+
+def _zero(one: Recording) -> str:
+    return str(one.sidecar.provenance.get("zero_taken_at", ""))
 
 
 def _began_s(one: Recording) -> float | None:
