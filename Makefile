@@ -66,7 +66,7 @@ bench: $(STAMP)
 
 # More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
 scoreboard: $(STAMP)
-	$(BIN)/python -m tests.scoreboard $(OPTIONS)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.scoreboard $(OPTIONS)
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

@@ -61,7 +61,7 @@ def caused(path: Path, cause: Cause, effects: dict[str, tuple[float, ...]], seed
         (pressed, "pressure_hPa", "linear"),
         (hit, "time_s", "step"),
         (breathing, "time_s", "periodic"),
-        (dragged, "tip_x_mm", "square"),
+        (dragged, "tip_x_mm", "knee"),
     ],
 )
 def test_a_cause_outside_the_library_is_described_and_not_named(

@@ -102,7 +102,7 @@ def _print_step(console: Console, number: int, step: Step) -> None:
     for name, value in step.fitted.shape.items():
         console.print(f"    {name} = {value:.4g}, searched")
     console.print(
-        f"    explains {100 * step.explained_fraction:.0f} % of what was above the noise; error on rows left out "
+        f"    explains {100 * step.explained_fraction:.3g} % of what was above the noise; error on rows left out "
         f"{step.heldout_rms_um:.3g} um; chance {step.p_adjusted:.3g}"
     )
     for rival in step.rivals:
@@ -113,7 +113,7 @@ def _print_step(console: Console, number: int, step: Step) -> None:
 
 def _print_dependence(console: Console, one: Dependence) -> None:
     console.print(
-        f"    {one.covariate}, {one.form}, at the {one.port}: {100 * one.explained_fraction:.0f} % on rows left out "
+        f"    {one.covariate}, {one.form}, at the {one.port}: {100 * one.explained_fraction:.3g} % on rows left out "
         f"({one.heldout_rms_um:.3g} um left), chance {one.p_adjusted:.3g}"
         + (f", together with {', '.join(one.beside)}" if one.beside else "")
     )

@@ -27,7 +27,8 @@ CONTRADICTION_COSTS = 1.5
 MOST_AT_FLOOR = 1.25
 # What an explanation may leave of the error above the floor.
 MOST_LEFT = 0.1
-# A number is implausible when it is outside its range by more standard errors than this, and by more of the range.
+# A number is implausible when it is outside its range by more standard errors than this, and by more of the range;
+# but where the range ends at zero, beyond it is the wrong sign: nothing shrinks when it gets warm.
 SURE = 3.0
 SLACK = 0.1
 
@@ -60,8 +61,11 @@ def at_floor(ratio: float, explained: float = 0.0) -> bool:
 
 
 def explained_fraction(before: float, after: float) -> float:
-    """phi = (SSE0 - SSE1) / (SSE0 - n sigma^2), from mean squares in squares of the floor; 0 where nothing is above."""
-    return (before - after) / (before - 1.0) if before > 1.0 else 0.0
+    """phi = (SSE0 - SSE1) / (SSE0 - n sigma^2), from mean squares in squares of the floor; 0 where nothing is above.
+
+    1 where more is explained than was above the floor: the floor is known to a few per cent only.
+    """
+    return min((before - after) / (before - 1.0), 1.0) if before > 1.0 else 0.0
 
 
 def numbers(effect: Effect, links: int, theta: FloatArray, covariance: FloatArray) -> list[Number]:
@@ -80,8 +84,9 @@ def numbers(effect: Effect, links: int, theta: FloatArray, covariance: FloatArra
 def plausible(limits: tuple[float, float], theta: float, std: float) -> bool:
     """Whether a fitted number may be inside its range, within its error."""
     low, high = limits
-    slack = max(SURE * np.nan_to_num(std), SLACK * (high - low))
-    return bool(low - slack <= theta <= high + slack)
+    sure, slack = SURE * float(np.nan_to_num(std)), SLACK * (high - low)
+    below, above = (sure if end == 0 else max(sure, slack) for end in (low, high))
+    return bool(low - below <= theta <= high + above)
 
 
 def untestable(limits: FloatArray, std: FloatArray) -> bool:

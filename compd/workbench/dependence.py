@@ -19,14 +19,16 @@ from compd.workbench.recording import BoolArray
 from compd.workbench.significance import Projection, chances
 from compd.workbench.table import FloatArray
 
-# Places between neighbours of a grid that are tried for a step or a period.
+# Places between neighbours of a grid that are tried for a step, a knee or a period.
 FINER = 9
 # A direction with a smaller share of what a description explains is left out of the proposal.
 LEAST_SHARE = 0.03
 # Descriptions that are judged on left-out rows, of those that explain most where they were fitted.
 PROMISING = 60
-# A number more must explain so much of what is above the floor: a curve fits a line's noise a little better.
+# A number more must explain so much of what is above the floor: a curve fits a line's noise a little better, and
+# that of a covariate which only goes along. Between forms of one covariate less will do.
 PLAIN_SHARE = 0.01
+FORM_SHARE = 0.002
 # Two covariates must take away so much of what the best one alone leaves above the floor.
 LEAST_MORE = 0.5
 # So many are computed at once: a balance of memory and overhead.
@@ -138,7 +140,7 @@ class Everything:
     def best(self, y: FloatArray, basis: FloatArray) -> list[Searched]:
         """Each description at its best constant beside `basis` (R, m, Q), the PROMISING ones that explain most of y.
 
-        Steps and periods are then looked for more finely.
+        Steps, knees and periods are then looked for more finely.
         """
         beside = Projection(basis)
         left = beside(y)
@@ -151,7 +153,7 @@ class Everything:
         return [self._finer(one, left, beside) for _, one in order]
 
     def _finer(self, one: Searched, left: FloatArray, beside: Projection) -> Searched:
-        if one.constant is None or one.description.form not in ("step", "periodic"):
+        if one.constant is None or one.description.form not in ("step", "knee", "periodic"):
             return one
         around = [one]
         for value in finer(one.description, one.constant, FINER):
@@ -185,13 +187,20 @@ def held_out_losses(evidence: Evidence, basis: Block, searched: Sequence[Searche
     return total.held_out([np.concatenate([held, place]) for place in places], counts)
 
 
-def with_numbers(losses: FloatArray, searched: Sequence[Searched], left: float) -> FloatArray:
-    """(K,) losses by which descriptions are compared: of two that describe about as well the plainer one is better.
+def by_covariate(losses: FloatArray, searched: Sequence[Searched], left: float) -> list[int]:
+    """The best description of each covariate that can be tested, the best covariate first.
 
     left : mean square without any of them.
     """
-    each = np.array([one.numbers for one in searched])
-    return np.asarray(losses + (PER_NUMBER + PLAIN_SHARE * max(left - 1.0, 0.0)) * each)
+    known = [k for k in range(len(searched)) if np.isfinite(losses[k])]
+    best: dict[str, int] = {}
+    for share in (PLAIN_SHARE, FORM_SHARE):  # the second, of the covariates in the order of the first
+        price = PER_NUMBER + share * max(left - 1.0, 0.0)
+        found: dict[str, int] = {}
+        for k in sorted(known, key=lambda k: losses[k] + price * searched[k].numbers):
+            found.setdefault(searched[k].description.covariate, k)
+        best = {name: found[name] for name in best} if best else found
+    return list(best.values())
 
 
 class Rest(NamedTuple):
@@ -218,17 +227,15 @@ class Rest(NamedTuple):
 
 def ranked(rest: Rest, searched: Sequence[Searched], losses: FloatArray) -> tuple[Dependence, ...]:
     """One entry per covariate, the one that explains most first; only those that explain enough not to be chance."""
-    order = [int(k) for k in np.argsort(with_numbers(losses, searched, rest.left)) if np.isfinite(losses[k])]
-    if not order:
+    first = by_covariate(losses, searched, rest.left)
+    if not first:
         return ()
-    first: dict[str, int] = {}
-    for k in order:
-        first.setdefault(searched[k].description.covariate, k)
+    order = [*first, *(k for k in range(len(searched)) if np.isfinite(losses[k]) and k not in first)]
     chance = _chances(rest, [[searched[k]] for k in order])
     by_place = dict(zip(order, chance, strict=True))
     return tuple(
         _dependence(rest, [searched[k]], by_place[k], float(losses[k]))
-        for k in first.values()
+        for k in first
         if rest.left - losses[k] >= rest.least_gain and by_place[k] <= SIGNIFICANT
     )
 

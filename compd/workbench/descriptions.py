@@ -20,6 +20,8 @@ HOUR_S = 3600.0
 STEPS = 48
 # Lags between a fan's minute and a granite plate's morning.
 LAGS_S = (120.0, 300.0, 700.0, 1700.0, 4000.0, 10000.0)
+# Where a slope may change: a cable comes taut, a stop is reached, a preload is used up.
+KNEES = 8
 # A period must span so many rows, and fit into the recording.
 ROWS_PER_PERIOD = 6
 MOST_PERIODS = 160
@@ -32,12 +34,16 @@ _LINK = re.compile(r"^(?P<what>[a-z][a-z0-9_]*)_link_(?P<link>\d+)_(?P<unit>[A-Z
 FORMS = {
     "linear": "k * {q} + c",
     "proportional": "k * {r}",
+    "strain": "(k * {q} + c) * link_mm / 1000",
     "square": "k * {q} + k2 * {q}**2 + c",
+    "knee": "k * {q} + m * maximum({r} - knee, 0) + c",
     "lagged": "k * (lag({r}, tau) - {m}) + c",
     "step": "k * (1 + sign(time_s - start)) / 2 + c",
     "periodic": "a * sin(2 * pi * time_s / period) + b * cos(2 * pi * time_s / period) + c",
 }
-VECTOR_PORTS = ("tool", "reference")
+# Of a number by its name; um where it is not here.
+_UNITS = {"k": "um/{}", "m": "um/{}", "k2": "um/{}^2"}
+_UNITS_OF_STRAIN = {"k": "ppm/{}", "c": "ppm"}
 
 
 @dataclass(frozen=True)
@@ -79,18 +85,20 @@ class Description:
         formula = FORMS[self.form].format(q=about, r=r, m=f"{self.middle:g}")
         if value is not None and self.constant:
             formula = re.sub(rf"\b{self.constant}\b", f"{value:.6g}", formula)
-        names = [name for name in ("k", "k2", "a", "b", "c") if re.search(rf"\b{name}\b", formula)]
+        names = [name for name in ("k", "k2", "m", "a", "b", "c") if re.search(rf"\b{name}\b", formula)]
         source = "describes a residual; its cause is not known"
         parameters: dict[str, Any] = {}
         for name in names:
             size = 3 * abs((sizes or {}).get(name, 0.0)) or 1e3
-            unit = {"k": f"um/{self.unit}", "k2": f"um/{self.unit}^2"}.get(name, "um") if self.form != "step" else "um"
+            units = {} if self.form == "step" else _UNITS_OF_STRAIN if self.form == "strain" else _UNITS
+            unit = units.get(name, "um").format(self.unit)
             parameters[name] = {"unit": unit, "plausible": [-float(f"{size:.3g}"), float(f"{size:.3g}")],
                                 "source": source}  # fmt: skip
             if self.per_link:
                 parameters[name]["per"] = "link"
         if self.constant and value is None:
-            parameters[self.constant] = {"unit": "s", "plausible": [min(self.grid), max(self.grid)], "source": source}
+            unit = self.unit if self.form == "knee" else "s"
+            parameters[self.constant] = {"unit": unit, "plausible": [min(self.grid), max(self.grid)], "source": source}
         what = re.sub(r"[^a-z0-9]+", "_", f"{self.port}_follows_{r}".lower())
         return {
             "id": f"{what}_{self.form}" + (f"_{axis}" if axis else ""),
@@ -115,8 +123,12 @@ def descriptions(seen: Observed) -> Iterator[Description]:
         for port in ports:
             for form in ("linear", "square"):
                 yield replace(port, covariate=name, form=form, middle=middle)
-            if not name.startswith(("force_", "tip_")):
-                yield replace(port, covariate=name, form="lagged", middle=middle, constant="tau", grid=LAGS_S)
+            if name.startswith(("force_", "tip_")):
+                yield replace(port, covariate=name, form="knee", middle=middle, constant="knee", grid=_knees(column))
+                continue
+            if port.port == "link":  # what grows does so in proportion to its length
+                yield replace(port, covariate=name, form="strain", middle=middle)
+            yield replace(port, covariate=name, form="lagged", middle=middle, constant="tau", grid=LAGS_S)
     for port in ports:
         yield replace(port, covariate="time_s", form="linear", middle=float(f"{time_s.mean():.3g}"))
         yield replace(port, covariate="time_s", form="step", constant="start", grid=_starts(time_s))
@@ -172,6 +184,11 @@ def _varies(values: FloatArray) -> bool:
     return len(known) >= (1 - MOST_EMPTY) * len(values) > 0 and float(np.ptp(known)) > 1e-9 * max(1.0, float(known[0]))
 
 
+def _knees(column: FloatArray) -> tuple[float, ...]:
+    places = np.quantile(column[np.isfinite(column)], np.linspace(0, 1, KNEES + 2)[1:-1])
+    return tuple(float(f"{one:.4g}") for one in np.unique(places))
+
+
 def _starts(time_s: FloatArray) -> tuple[float, ...]:
     places = np.quantile(time_s, np.linspace(0, 1, STEPS + 2)[1:-1])
     return tuple(float(one) for one in np.unique(places))
@@ -190,6 +207,6 @@ def finer(description: Description, value: float, places: int) -> Sequence[float
     grid = sorted(description.grid)
     place = grid.index(value)
     low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
-    if description.form == "step":
+    if description.form in ("step", "knee"):
         return [float(one) for one in np.linspace(low, high, places)]
     return [float(one) for one in np.geomspace(low, high, places)]

@@ -117,7 +117,7 @@ def _steps(
 
 
 def _depends(bench: Bench, found: Explanation, effects: Members) -> tuple[Dependence, ...]:
-    """What the rest follows, one line per covariate; and two covariates together where one is not enough."""
+    """What the rest follows, one line per covariate; two covariates together first, where one is not enough."""
     contest, searched = found.contest, found.searched
     if not searched:
         return ()
@@ -130,7 +130,7 @@ def _depends(bench: Bench, found: Explanation, effects: Members) -> tuple[Depend
     lines = ranked(rest, searched, losses)
     if not lines or at_floor(float(np.nanmin(losses))):
         return lines
-    return (*lines, *together(rest, searched, float(np.nanmin(losses))))
+    return (*together(rest, searched, float(np.nanmin(losses))), *lines)
 
 
 def _chances(contest: Contest, effects: Members) -> dict[str, float]:

@@ -11,7 +11,7 @@ from compd.workbench.adequacy import at_floor
 from compd.workbench.ambiguity import simplest
 from compd.workbench.bench import Bench
 from compd.workbench.contest import Contest, Members
-from compd.workbench.dependence import Everything, Searched, held_out_losses, with_numbers
+from compd.workbench.dependence import Everything, Searched, by_covariate, held_out_losses
 from compd.workbench.evidence import Block
 
 # Descriptions that compete with the library's effects: of the best so many covariates, beside each basis.
@@ -53,13 +53,10 @@ def explain(bench: Bench, progress: Progress) -> Explanation:
     for basis in dict.fromkeys([(), chosen.members[:1], chosen.members]):
         held = held_block(library, basis)
         searched = everything.best(bench.evidence.y, held.values)
-        covariates: list[str] = []
         losses = held_out_losses(bench.evidence, held, searched)
-        for k in np.argsort(with_numbers(losses, searched, library.base)):
+        for k in by_covariate(losses, searched, library.base)[:COMPETING]:
             about = searched[k].description
-            if about.covariate not in covariates and len(covariates) < COMPETING:
-                covariates.append(about.covariate)
-                competing[about.covariate, about.form, about.port, about.per_link] = searched[k]
+            competing[about.covariate, about.form, about.port, about.per_link] = searched[k]
     descriptions = list(competing.values())
     columns_um = [bench.whiten.columns_um(one.description, one.effect, one.constant) for one in descriptions]
     progress("effects against descriptions")

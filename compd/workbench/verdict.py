@@ -105,31 +105,40 @@ class Diagnosis:
     @property
     def said(self) -> str:
         """The verdict in one or two plain sentences."""
-        before, floor = self.before.rms_um, self.before.floor.um
-        error = f"the error of {before:.2g} um"
+        floor = _um(self.before.floor.um)
+        noise = f"where noise alone is {floor}"
+        before, after = _um(self.before.rms_um), _um(self.after.rms_um)
+        error = f"the error of {before}"
         names = _listed([one.effect.id for one in self.steps])
-        after = f"{self.after.rms_um:.2g} um, where noise alone is {floor:.2g} um"
         match self.verdict:
             case "adequate":
-                return f"Nothing is missing: {error} is the measurement's own noise ({floor:.2g} um)."
+                return f"Nothing is missing: {error} is the measurement's own noise ({floor})."
             case "identified":
                 with_them = "with it" if len(self.steps) == 1 else "with them"
-                return f"What is missing is {names}: {with_them} {error} falls to {after}."
+                return f"What is missing is {names}: {with_them} {error} falls to {after}, {noise}."
             case "ambiguous":
                 pairs = "; ".join(
                     f"{one.effect.id} or {_listed([rival.name for rival in one.rivals], 'or')}"
                     for one in self.steps if one.rivals
                 )  # fmt: skip
-                return (f"With {names} {error} falls to {after}. But this recording cannot tell apart: {pairs}. "
-                        "The rows under 'next' can.")  # fmt: skip
+                return (f"With {names} {error} falls to {after}, {noise}. But this recording cannot tell apart: "
+                        f"{pairs}. The rows under 'next' can.")  # fmt: skip
             case "not_testable":
-                return f"{_capital(error)} is above the noise of {floor:.2g} um, but no effect can be tested on it."
-        found = (
-            f"{_capital(names)} explains a part ({before:.2g} -> {self.after.rms_um:.2g} um). " if self.steps else ""
-        )
-        rest = (f"What follows {self.depends_on[0].covariate} has no cause in the library" if self.depends_on
-                else "The rest follows nothing that was measured")  # fmt: skip
-        return f"{found}{rest}: {self.after.rms_um:.2g} um are left, where noise alone is {floor:.2g} um."
+                return f"{_capital(error)} is above the noise of {floor}, but no effect can be tested on it."
+        found = f"{_capital(names)} explains a part ({before} -> {after}). The rest" if self.steps else _capital(error)
+        if not self.depends_on:
+            return (
+                f"{found} has no cause in the library and follows nothing that was measured: {after} are left, {noise}."
+            )
+        first = self.depends_on[0]
+        follows = _listed([first.covariate, *first.beside])
+        left = _um(first.heldout_rms_um)
+        return f"{found} has no cause in the library. It follows {follows}: to describe that leaves {left}, {noise}."
+
+
+def _um(value: float) -> str:
+    """Two figures, and no powers of ten."""
+    return f"{value:.0f} um" if value >= 100 else f"{value:.2g} um"
 
 
 def _listed(names: Sequence[str], word: str = "and") -> str:
