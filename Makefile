@@ -63,6 +63,7 @@ bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.bench_latency
 	$(BIN)/python -m tests.benchmarks.bench_throughput
 	$(BIN)/python -m tests.benchmarks.bench_compare
+	$(BIN)/python -m tests.benchmarks.bench_diagnose
 
 # More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
 scoreboard: $(STAMP)

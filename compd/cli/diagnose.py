@@ -79,7 +79,7 @@ def _print(console: Console, found: Diagnosis, checked: list[Sealed]) -> None:
         console.print("\n[bold]What the rest follows[/] (a description, not a cause):")
         for dependence in found.depends_on[:SHOWN]:
             _print_dependence(console, dependence)
-        _print_formulas(console, min(found.depends_on, key=lambda one: one.heldout_rms_um))
+        _print_formulas(console, found.depends_on[0])
     _print_candidates(console, found)
     if found.next_measurement:
         console.print("\n[bold]Next[/], measure:")

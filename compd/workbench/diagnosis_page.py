@@ -11,11 +11,12 @@ from plotly.graph_objects import Figure
 
 from compd.model.effect import Effect, quantities
 from compd.workbench.compare import Comparison
+from compd.workbench.dependence import Dependence
 from compd.workbench.page import COLOURS, Panel, Table, styled, write_page
 from compd.workbench.report_figures import small_multiples
 from compd.workbench.sealed import Sealed
 from compd.workbench.units import unit_of
-from compd.workbench.verdict import Diagnosis, Judged, Step
+from compd.workbench.verdict import Diagnosis, Judged, Step, in_um
 from compd.workbench.whereabouts import Covariate, covariates
 
 
@@ -26,7 +27,7 @@ def write_diagnosis(path: Path, found: Diagnosis, sealed: Sequence[Sealed]) -> N
     for number, step in enumerate(found.steps, start=1):
         panels += _of_step(number, step, found)
     if found.depends_on:
-        panels += [_depends(found), _formula(found)]
+        panels += [_depends(found), *_against(found), _formula(found)]
     panels.append(_candidates(found.candidates))
     if found.next_measurement:
         panels.append(_next(found))
@@ -42,16 +43,23 @@ def _falling(found: Diagnosis, sealed: Sequence[Sealed]) -> Panel:
     names = ["as it was", *(f"with {one.effect.id}" for one in found.steps)]
     values = [found.before.rms_um, *(one.heldout_rms_um for one in found.steps)]
     colours = [COLOURS["worst"], *[COLOURS["middle"]] * (len(found.steps) - 1), COLOURS["best"]][: len(names)]
+    for first in found.depends_on[:1]:
+        names.append(f"described by {_follows(first)}")
+        values.append(first.heldout_rms_um)
+        colours.append(COLOURS["quiet"])
     for one in sealed:
         name = one.after.seen.recording.path.name
         names += [f"{name}, before", f"{name}, after"]
         values += [one.before.rms_um, one.after.rms_um]
         colours += [COLOURS["quiet"], COLOURS["plain"]]
     figure = Figure()
-    figure.add_bar(x=names, y=values, marker_color=colours, text=[f"{value:.2g}" for value in values], name="error")
+    figure.add_bar(x=names, y=values, marker_color=colours, text=[in_um(value) for value in values], name="error")
     figure.add_hline(y=found.before.floor.um, line_dash="dot", annotation_text="noise alone")
     figure.update_layout(showlegend=False)
-    caption = "Error per coordinate, rms. With an effect: on rows that were left out when its numbers were fitted."
+    caption = (
+        "Error per coordinate, rms. With an effect or a description: on rows that were left out when its numbers were "
+        "fitted."
+    )
     return Panel("The falling error", caption, styled(figure, "", "error, um", 300))
 
 
@@ -84,7 +92,7 @@ def _drivers(effect: Effect, comparison: Comparison) -> list[Covariate]:
     """What drives an effect, among what can be drawn; place and link lengths where there is nothing else."""
     every = covariates(comparison.seen)
     needed = quantities(effect, comparison.seen.rows.links)
-    names = {name.removesuffix(f"_{unit_of(name)}") for name in needed}
+    names = {_name(name) for name in needed}
     found = [one for one in every if one.name in names]
     if "direction" in effect.needs:
         found += [one for one in every if one.name.startswith("direction")]
@@ -96,18 +104,37 @@ def _drivers(effect: Effect, comparison: Comparison) -> list[Covariate]:
 def _depends(found: Diagnosis) -> Panel:
     rows = []
     for one in found.depends_on:
-        follows = " with ".join([one.covariate, *one.beside])
-        share = f"{100 * one.explained_fraction:.0f} %"
-        rows.append([follows, one.form, one.port, share, f"{one.heldout_rms_um:.3g}", f"{one.p_adjusted:.3g}"])
+        share = f"{100 * one.explained_fraction:.3g} %"
+        rows.append([_follows(one), one.form, one.port, share, f"{one.heldout_rms_um:.3g}", f"{one.p_adjusted:.3g}"])
     head = ("follows", "form", "port", "explains on rows left out", "left, um", "chance")
     return Panel("What the rest follows", "A description, not a cause: the library has no effect that does this.",
                  Table(head, rows))  # fmt: skip
 
 
+def _follows(one: Dependence) -> str:
+    return " with ".join([one.covariate, *one.beside])
+
+
+def _against(found: Diagnosis) -> list[Panel]:
+    """The rest against what it follows; nothing for what has no picture (each link's own speed or force)."""
+    first = found.depends_on[0]
+    drawn = {_name(name) for name in (first.covariate, *first.beside)}
+    against = [one for one in covariates(found.after.seen) if one.name in drawn or one.name.split(" of ")[0] in drawn]
+    if not against:
+        return []
+    picture = small_multiples(found.after, against, found.after.residual_um, found.after.seen.labels, "error, um")
+    return [Panel(f"The rest against {_follows(first)}", "Dots are rows, lines are means.", picture)]
+
+
+def _name(covariate: str) -> str:
+    """As pictures call it: without its unit; a tip's coordinate by its letter."""
+    return covariate.removesuffix(f"_{unit_of(covariate)}").removeprefix("tip_")
+
+
 def _formula(found: Diagnosis) -> Panel:
     lines = [
         line
-        for one in min(found.depends_on, key=lambda one: one.heldout_rms_um).formula_effects
+        for one in found.depends_on[0].formula_effects
         for line in yaml.safe_dump(one, sort_keys=False, default_flow_style=None, width=100).splitlines()
     ]
     caption = "Ready to paste: it lowers the error until the cause is known."

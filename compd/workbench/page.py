@@ -21,8 +21,9 @@ main { max-width: 1080px; margin: 0 auto; padding: 2rem 1.5rem 4rem; }
 h1 { font-size: 1.7rem; margin: 0 0 .3rem; } h2 { font-size: 1.15rem; margin: 2.4rem 0 .4rem; }
 .verdict { font-size: 1.15rem; margin: .4rem 0 1.4rem; max-width: 60rem; }
 table { border-collapse: collapse; margin: .8rem 0 1.2rem; } caption { text-align: left; color: #555c64; }
-th, td { padding: .35rem .9rem .35rem 0; border-bottom: 1px solid #dfe3e8; text-align: right; }
-th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2px solid #9aa2ab; }
+th, td { padding: .35rem .9rem .35rem 0; border-bottom: 1px solid #dfe3e8; text-align: left; }
+th.number, td.number { text-align: right; font-variant-numeric: tabular-nums; }
+thead th { border-bottom: 2px solid #9aa2ab; }
 p.caption { color: #555c64; margin: 0 0 .3rem; max-width: 60rem; }
 footer { margin-top: 3rem; color: #555c64; font-size: .9rem; }
 """
@@ -81,7 +82,19 @@ def _figure(figure: Figure, number: int) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.head)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    """Columns of numbers are aligned on the right."""
+    columns = zip(*table.rows, strict=True) if table.rows else [()] * len(table.head)
+    kinds = [" class=number" if all(map(_is_number, column)) else "" for column in columns]
+
+    def row(name: str, cells: Sequence[str]) -> str:
+        found = (f"<{name}{kind}>{html.escape(cell)}</{name}>" for kind, cell in zip(kinds, cells, strict=True))
+        return f"<tr>{''.join(found)}</tr>"
+
     caption = f"<caption>{html.escape(table.caption)}</caption>" if table.caption else ""
-    return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    body = "".join(row("td", cells) for cells in table.rows)
+    return f"<table>{caption}<thead>{row('th', table.head)}</thead><tbody>{body}</tbody></table>"
+
+
+def _is_number(cell: str) -> bool:
+    """With or without a unit behind it; or nothing known."""
+    return cell in ("", "-") or cell[0].isdigit() or (cell[0] in "+-." and cell[1:2].isdigit())

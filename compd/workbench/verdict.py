@@ -105,9 +105,9 @@ class Diagnosis:
     @property
     def said(self) -> str:
         """The verdict in one or two plain sentences."""
-        floor = _um(self.before.floor.um)
+        floor = in_um(self.before.floor.um)
         noise = f"where noise alone is {floor}"
-        before, after = _um(self.before.rms_um), _um(self.after.rms_um)
+        before, after = in_um(self.before.rms_um), in_um(self.after.rms_um)
         error = f"the error of {before}"
         names = _listed([one.effect.id for one in self.steps])
         match self.verdict:
@@ -132,11 +132,11 @@ class Diagnosis:
             )
         first = self.depends_on[0]
         follows = _listed([first.covariate, *first.beside])
-        left = _um(first.heldout_rms_um)
+        left = in_um(first.heldout_rms_um)
         return f"{found} has no cause in the library. It follows {follows}: to describe that leaves {left}, {noise}."
 
 
-def _um(value: float) -> str:
+def in_um(value: float) -> str:
     """Two figures, and no powers of ten."""
     return f"{value:.0f} um" if value >= 100 else f"{value:.2g} um"
 
