@@ -27,8 +27,8 @@ from compd.configuration.document import read
 from tests.hidden_visits import Visit
 from tests.simulated import TRIPOD
 
-# A quarter of the tracker's rate: every row has looks of its own.
-RECORDER_HZ = 5.0
+# Half the tracker's rate: every row has looks of its own.
+RECORDER_HZ = 10.0
 TRACKER_SIGMA_UM = 0.15
 # Twice as long as the slowest gauge needs to be read anew, and the tracker to have looked three times.
 DWELL_S = 0.8

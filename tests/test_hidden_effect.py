@@ -37,18 +37,21 @@ class Pace(NamedTuple):
 HOURS, DAYS = Pace("300", True), Pace("900", False)
 # Numbers for `--hidden`. Two are run with all the tests, the others by `make hidden`.
 QUICK = (49, 29)
-ONE = (4, 5, 6, 8, 12, 28, 33, 39, 54, 77)
-PAIRS = ([49, 54],)
+ONE = (4, 5, 6, 7, 8, 12, 14, 18, 24, 28, 33, 39, 54, 61, 69, 74, 77, 113, 268)
+PAIRS = ([49, 54], [29, 54], [6, 77])
 OUTSIDE = {1: HOURS, 11: DAYS, 59: DAYS}
-# Run on wires from end to end too, and not passed.
-LEFT_OUT: dict[int, str] = {}
+LEFT_OUT = {
+    16: "friction: named first, but its truth yields in more steps than the library's, and play is named too",
+    32: "gauge latency shows on the move alone, and here all is measured at rest",
+    51: "a lag of minutes is seconds where weather is faster: below what the library takes for plausible",
+}
 # Numbers below this are looked through; a cause is plain from so many times the noise.
 NUMBERS = 300
 PLAIN_FLOORS = 2.5
 # What the daemon's tip has no part in: the reference instrument shows another place, or a moment passes.
 NOT_LIVE = ("plate_bending", "reference_drift", "reference_air_index", "reference_registration", "plate_swelling",
             "collision_step", "room_breathing")  # fmt: skip
-VISITS, CHECKS = 48, 12
+VISITS, CHECKS = 40, 10
 TIMEOUT_S = 600
 # A hidden effect is plain when the squared error is so many times what noise alone would give.
 PLAIN_RATIO = 2.0
