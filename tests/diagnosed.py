@@ -93,4 +93,8 @@ def recorded(
 
 
 def _shape(name: str) -> dict[str, float]:
-    return {"link_expansion_lag": {"tau": 900.0}, "friction_hysteresis": {"d": 20.0}}.get(name, {})
+    shapes = {
+        "link_expansion_lag": {"tau": 900.0}, "friction_hysteresis": {"d": 20.0, "r": 0.0}, "link_sag": {"n": 3.0},
+        "joint_runout": {"z": 1.0},
+    }  # fmt: skip
+    return shapes.get(name, {})

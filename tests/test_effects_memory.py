@@ -14,14 +14,14 @@ UM = 1e-3
 LINK_MM = 481.040538832228  # the tripod's links at machine zero
 
 
-def along(position_mm: Floats) -> Floats:
+def along(position_mm: Floats, rounded: float = 0.0) -> Floats:
     """Bend of link 1 in um, one micrometre when sliding, yield after 2 mm of travel."""
     scale_mm = np.repeat(np.asarray(position_mm)[:, None], 3, axis=1)
     count = len(scale_mm)
     unknown = Movement(np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 9)))
     tip = np.tile(TRIPOD.zero.contact.tip_M_mm, (count, 1))
     rows = at_tips(TRIPOD, tip, scale_mm=scale_mm, movement=unknown)
-    return -added("friction_hysteresis", rows, 1.0, d=2.0)[:, 0] / UM
+    return -added("friction_hysteresis", rows, 1.0, d=2.0, r=rounded)[:, 0] / UM
 
 
 def test_hysteresis_builds_up_again_after_a_reversal() -> None:
@@ -39,7 +39,16 @@ def test_hysteresis_follows_the_approach_where_rows_hide_a_reversal() -> None:
     scale_mm = np.array([[10.0] * 3, [0.0] * 3])
     upwards = Movement(np.ones((2, 3)), np.zeros((2, 3)), np.zeros((2, 9)))
     rows = at_tips(TRIPOD, np.tile(TRIPOD.zero.contact.tip_M_mm, (2, 1)), scale_mm=scale_mm, movement=upwards)
-    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0), -UM)
+    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0, r=0.0), -UM)
+
+
+def test_a_round_loop_nears_its_end_by_a_factor_e_over_the_distance() -> None:
+    """dz/dg = (s - z) s / d: exact, however the way is divided into rows."""
+    for steps in (1, 7):
+        scale_mm = np.concatenate([[0.0], np.linspace(0, 40, 9)[1:], 40 - np.linspace(0, 2, steps + 1)[1:]])
+        bend = along(scale_mm, rounded=1.0)
+        assert bend[8] == pytest.approx(1.0, abs=1e-8)
+        assert bend[-1] == pytest.approx(-1 + 2 * np.exp(-1), abs=1e-7)
 
 
 def test_a_session_forgets_the_one_before() -> None:
@@ -47,7 +56,7 @@ def test_a_session_forgets_the_one_before() -> None:
     unknown = Movement(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 9)))
     rows = at_tips(TRIPOD, np.tile(TRIPOD.zero.contact.tip_M_mm, (3, 1)), scale_mm=scale_mm, movement=unknown,
                    session_start=np.array([True, False, True]))  # fmt: skip
-    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0)[:, 0], [0, -UM, 0], atol=1e-15)
+    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0, r=0.0)[:, 0], [0, -UM, 0], atol=1e-15)
 
 
 def step_response(times_s: Floats, tau_s: float) -> Floats:

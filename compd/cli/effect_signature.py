@@ -95,7 +95,10 @@ def signature(effect: Effect, model: MachineModel, details: Details) -> Signatur
 
 
 def middle(parameter: Parameter | Constant) -> float:
-    """A plausible value: half the range if it is symmetric, its geometric middle if it spans decades."""
+    """A plausible value: half the range if it is symmetric, its geometric middle if it spans decades; of a choice the
+    first."""
+    if isinstance(parameter, Constant) and parameter.choice:
+        return parameter.grid[0]
     low, high = parameter.low, parameter.high
     if low < 0:
         return high / 2

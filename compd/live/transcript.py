@@ -33,7 +33,7 @@ class RecordedCycle(NamedTuple):
 
 
 class Transcript:
-    """Writes a machine's READINGS; `wires` and `channels` are those of the loop's snapshots; `directions` sees these."""
+    """Writes a machine's READINGS; `wires` and `channels`: of the loop's snapshots, which `directions` sees."""
 
     def __init__(self, wires: MachineWires, channels: Sequence[str], directions: Directions) -> None:
         self.columns = columns(wires)

@@ -117,6 +117,11 @@ class Constant:
     grid: tuple[float, ...]
     setting: str = ""
 
+    @property
+    def choice(self) -> bool:
+        """Whether one of two values is true, and nothing between them."""
+        return len(self.grid) <= 2
+
 
 @dataclass(frozen=True)
 class Column:

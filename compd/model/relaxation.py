@@ -67,14 +67,15 @@ def lag(time_s: Floats, value: Floats, session_start: Flags, tau_s: float, state
 
 
 @kernel(
-    [VECTOR, VECTOR, VECTOR, SCALAR, SCALAR, SCALAR, SCALAR, VECTOR, VECTOR, VECTOR],
-    "(m),(m),(m),(),(),(),()->(m),(),()",
+    [VECTOR, VECTOR, VECTOR, SCALAR, SCALAR, SCALAR, SCALAR, SCALAR, VECTOR, VECTOR, VECTOR],
+    "(m),(m),(m),(),(),(),(),()->(m),(),()",
 )
-def _stop(
+def _friction(
     position_mm: Floats,
     direction: Floats,
     start: Floats,
-    yield_mm: float,
+    distance_mm: float,
+    rounded: float,
     least_mm: float,
     position_before_mm: float,
     strain_before: float,
@@ -92,24 +93,38 @@ def _stop(
             move_mm = position_mm[k] - position_before_mm
             if abs(direction[k]) == 1.0 and abs(move_mm) > least_mm:
                 move_mm = direction[k] * abs(move_mm)
-            strain_before = min(1.0, max(-1.0, strain_before + move_mm / yield_mm))
+            if rounded < 0.5:
+                strain_before = min(1.0, max(-1.0, strain_before + move_mm / distance_mm))
+            elif move_mm != 0.0:
+                end = math.copysign(1.0, move_mm)
+                strain_before = end - (end - strain_before) * math.exp(-abs(move_mm) / distance_mm)
         position_before_mm = position_mm[k]
         strain[k] = strain_before
     position_after_mm[0] = position_before_mm
     strain_after[0] = strain_before
 
 
-def stop(
-    position_mm: Floats, direction: Floats, session_start: Flags, yield_mm: float, least_mm: float, state: State | None
+def friction(
+    position_mm: Floats,
+    direction: Floats,
+    session_start: Flags,
+    distance_mm: float,
+    rounded: float,
+    least_mm: float,
+    state: State | None,
 ) -> tuple[Floats, State]:
-    """Stop operator (elastic up to `yield_mm` of travel, then sliding), -1..1; the play operator is the rest.
+    """How far dry friction has bent what it holds, -1..1, while it is dragged along.
 
-    position_mm, direction (N, n): a session starts fully yielded in its direction, at 0 where that is not +1 or -1.
+    position_mm, direction (N, n): a session starts fully bent in its direction, at 0 where that is not +1 or -1.
+    rounded : 0 for the stop operator (one spring: elastic up to `distance_mm` of travel, then sliding; Visintin,
+    Differential Models of Hysteresis, 1994, chapter III), 1 for many springs that slide one after another, which
+    `distance_mm` brings nearer to the end by a factor e (Dahl, A solid friction model, 1968).
     A move beyond least_mm counts in the direction of its end: approached from one side, a link may have
     gone farther than the two rows tell.
-    Returns (N, n) and the state after. (Visintin, Differential Models of Hysteresis, 1994, chapter III.)
+    Returns (N, n) and the state after.
     """
     if state is None:
         state = (np.full(position_mm.shape[1], np.nan),) * 2
-    strain, *after = _stop(position_mm.T, direction.T, session_start.astype(float), yield_mm, least_mm, *state)
+    started = session_start.astype(float)
+    strain, *after = _friction(position_mm.T, direction.T, started, distance_mm, rounded, least_mm, *state)
     return strain.T, tuple(after)

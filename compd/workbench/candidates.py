@@ -18,8 +18,9 @@ UM_PER_MM = 1e3
 MOST_EMPTY = 0.1
 # A column that moves the tip by less than this at the end of its plausible range does nothing on these rows.
 LEAST_UM = 1e-3
-# The best of ten values of a constant fits by chance as two fitted numbers do (log 10 = 2.3).
+# The best of ten values of a constant fits by chance as two fitted numbers do (log 10 = 2.3), of two values as one.
 SEARCH_COUNTS = 2
+CHOICE_COUNTS = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class Candidate:
     name : the effect's id; variants of one effect share it.
     columns_um : (N, m, P) by how many um each fitted number moves the prediction.
     limits : (P, 2) plausible range of each fitted number; infinite where nothing is known of it.
-    searched : how many shape constants were searched for it.
+    searched : how many fitted numbers the search for its shape constants is worth.
     """
 
     name: str
@@ -59,7 +60,7 @@ class Candidate:
     @property
     def numbers(self) -> int:
         """How many numbers it takes to describe it."""
-        return int(self.columns_um.shape[2]) + SEARCH_COUNTS * self.searched
+        return int(self.columns_um.shape[2]) + self.searched
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,11 @@ def library_pool(seen: Observed, effects: Sequence[Effect], present: Collection[
             untestable[effect.id] = why
             continue
         shapes = effect.shapes(seen.rows)
-        searched = sum(len({shape[constant.name] for shape in shapes}) > 1 for constant in effect.constants)
+        searched = sum(
+            CHOICE_COUNTS if constant.choice else SEARCH_COUNTS
+            for constant in effect.constants
+            if len({shape[constant.name] for shape in shapes}) > 1
+        )
         variants = [_candidate(effect, shape, seen, searched) for shape in shapes]
         why = _silent(variants, usable)
         if why:

@@ -61,7 +61,7 @@ class Searched:
         name = f"{self.description.covariate} {self.description.form}"
         shape = {self.description.constant: self.constant} if self.constant is not None else {}
         limits = np.tile([-np.inf, np.inf], (columns_um.shape[2], 1))
-        return Candidate(name, self.effect, shape, columns_um, limits, len(shape))
+        return Candidate(name, self.effect, shape, columns_um, limits, SEARCH_COUNTS * len(shape))
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def search(seen: Observed, model: Sequence[Fitted], effect: Effect, sigma_um: Fl
     results = [tried(shape) for shape in shapes]
     best = min(range(len(shapes)), key=lambda k: results[k][0])
     loss, found = results[best]
-    searched = [constant for constant in effect.constants if len({shape[constant.name] for shape in shapes}) > 1]
+    searched = [one for one in effect.constants if not one.choice and len({shape[one.name] for shape in shapes}) > 1]
     if len(searched) != 1:
         return found
     name = searched[0].name

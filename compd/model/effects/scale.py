@@ -6,7 +6,7 @@ import numpy as np
 
 from compd.model.effect import Constant, Effect, Memory, Parameter, Shape, memoryless, one_per_link
 from compd.model.jit import Floats
-from compd.model.relaxation import stop
+from compd.model.relaxation import friction
 from compd.model.rows import REVERSAL_MM, Rows
 
 PPM = 1e-6
@@ -36,7 +36,9 @@ def _backlash(rows: Rows, shape: Shape) -> Floats:
 
 
 def _hysteresis(rows: Rows, shape: Shape, memory: Memory) -> tuple[Floats, Memory]:
-    strain, memory = stop(rows.scale_mm, rows.direction, rows.session_start, shape["d"], REVERSAL_MM, memory)
+    strain, memory = friction(
+        rows.scale_mm, rows.direction, rows.session_start, shape["d"], shape["r"], REVERSAL_MM, memory
+    )
     return -UM * strain[:, :, None], memory
 
 
@@ -124,12 +126,15 @@ EFFECTS = (
         id="friction_hysteresis",
         ports=("scale",),
         physics="Friction bends what carries the scale; after a reversal the bend builds up again over a distance.",
-        equation="delta_i = -h z_i, z_i := min(1, max(-1, z_i + change of g_i / d))",
+        equation="delta_i = -h z_i; r = 0: z_i := min(1, max(-1, z_i + change of g_i / d)); "
+        "r = 1: dz_i/dg_i = (s - z_i) s / d",
         symbols={
             "h": "bend when sliding, um; negative where it is the scale that lags",
             "z_i": "how far link i has yielded, -1 to 1",
             "g_i": "reading of scale i, mm",
-            "d": "travel from unbent to sliding, mm",
+            "s": "direction of motion, +1 or -1",
+            "d": "travel from unbent to sliding, or in which the loop nears its end by a factor e, mm",
+            "r": "0 where one spring slides at once, 1 where many slide one after another: a round loop",
         },
         source="stop operator: Visintin, Differential Models of Hysteresis (1994); friction: Dahl (1968)",
         needs=("order", "direction"),
@@ -146,6 +151,7 @@ EFFECTS = (
                 "rolling contacts 0.001-0.1; bellows, cable chains and seals up to 50",
                 (0.001, 0.01, 0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 35.0, 50.0),
             ),
+            Constant("r", "1", 0, 1, "single contacts 0, guides and bellows 1", (0.0, 1.0)),
         ),
         remembers=True,
     ),
