@@ -131,7 +131,8 @@ class _Reader:
 
     def _number(self, place: str, name: str, cell: str) -> float:
         low, high = self._range(name)
-        allowed = "-1, 0 or 1" if name in self._approaches else f"{low:g} to {high:g}"
+        allowed = f"{low:g} to {high:g}" if math.isfinite(high) else "a number" if low < 0 else "0 or more"
+        allowed = "-1, 0 or 1" if name in self._approaches else allowed
         try:
             value = float(cell)
         except ValueError:
