@@ -35,7 +35,8 @@ HIDDEN := tests/test_tutorial.py tests/test_hidden_effect.py
 SIDE_BY_SIDE ?= 4
 
 test: $(STAMP)
-	$(BIN)/pytest
+	$(BIN)/pytest $(HIDDEN:%=--ignore=%)
+	$(BIN)/pytest -n 2 $(HIDDEN)
 
 long: $(STAMP)
 	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%)
