@@ -124,7 +124,8 @@ def descriptions(seen: Observed) -> Iterator[Description]:
             for form in ("linear", "square"):
                 yield replace(port, covariate=name, form=form, middle=middle)
             if name.startswith(("force_", "tip_")):
-                yield replace(port, covariate=name, form="knee", middle=middle, constant="knee", grid=_knees(column))
+                if len(knees := _knees(column)) > 1:
+                    yield replace(port, covariate=name, form="knee", middle=middle, constant="knee", grid=knees)
                 continue
             if port.port == "link":  # what grows does so in proportion to its length
                 yield replace(port, covariate=name, form="strain", middle=middle)
