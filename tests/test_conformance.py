@@ -7,13 +7,14 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compd.conformance import faults
-from compd.conformance.cases import Result
+from compd.conformance.cases import Result, Subject, tried
 from compd.conformance.faults import Fault
 from compd.conformance.report import Driver, find, try_driver
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
@@ -46,6 +47,16 @@ def test_driver_on_ptys_and_ports(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_driver_on_ptys_and_ports(name: str) -> None:
     assert failures(list(try_driver(find(name)))) == []
+
+
+@pytest.mark.parametrize(("failing", "exact", "verdict"), [(1, False, "pass"), (3, False, "FAIL"), (1, True, "FAIL")])
+def test_a_computer_may_be_late_by_chance_in_real_time_and_a_driver_wrong_never(
+    failing: int, exact: bool, verdict: str
+) -> None:
+    results = iter(["FAIL"] * failing + ["pass"] * 3)
+    case = Mock(side_effect=lambda session, subject: Result("late", "ok", "timeout", next(results)))
+    subject = Subject(registers=False, over_tcp=True, checksum=False, exact=exact, error_replies={})
+    assert tried(case, Mock(), subject).verdict == verdict
 
 
 # --- random interleavings ------------------------------------------------------------------------------------

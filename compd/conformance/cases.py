@@ -24,6 +24,9 @@ EXCEPTIONS = (1, 2, 3, 4, 6, 11)  # of Modbus, those that a slave or gateway ans
 
 BY_TCP = "TCP's own checksum keeps it from the driver"
 
+# How often a case that fails in real time is tried again.
+AGAIN = 2
+
 Verdict = Literal["pass", "FAIL", "-"]
 
 
@@ -51,12 +54,30 @@ class Subject:
 def run(session: Session, subject: Subject) -> list[Result]:
     """Every case in turn; a driver whose fault-free readings are wrong is tried no further."""
     extent = "every channel within 1 % of its range"
-    if (fault := session.calibrate()) is not None:
+    fault = session.calibrate()
+    for _ in range(0 if subject.exact or fault is None else AGAIN):
+        session.settle()
+        fault = session.calibrate()
+        if fault is None:
+            break
+    if fault is not None:
         return [Result("units and scale", extent, fault, "FAIL")]
     off = ", ".join(sorted({f"{tolerance / 2:.2g}" for tolerance in session.tolerance.values()}))
     results = [Result("units and scale", extent, f"largest differences {off}", "pass")]
-    results += [case(session, subject) for case in CASES]
+    results += [tried(case, session, subject) for case in CASES]
     return results
+
+
+def tried(case: Case, session: Session, subject: Subject) -> Result:
+    """In real time a case that fails is tried again: a busy computer is late by chance, a wrong driver wrong always."""
+    result = case(session, subject)
+    for _ in range(0 if subject.exact else AGAIN):
+        if result.verdict != "FAIL":
+            break
+        session.settle()
+        session.recover()
+        result = case(session, subject)
+    return result
 
 
 def _try(session: Session, case: str, wanted: frozenset[Quality], tries: Sequence[Sequence[Fault]]) -> Result:
