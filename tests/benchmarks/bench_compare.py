@@ -28,6 +28,7 @@ BUDGET_S = 20.0
 BUDGET_MB = 2048.0
 SCIPY_ROWS = 300
 FEW_ROWS = 100  # their time is that of Python, of imports and of compiled kernels
+LEAST_SHARE = 0.1  # of the start: less work than that is lost in how long starts take
 COMMAND = "import sys; from compd.cli import main; sys.argv[0] = 'compd'; main()"
 
 
@@ -43,7 +44,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         directory = Path(temporary)
         rows = []
-        before = float("nan")
+        before = 0.0
         few = record(directory, gauges(FEW_ROWS, 1), name="few")
         start = command(["compare", str(few), "--json"]).processor_s
         for count in ROWS:
@@ -51,12 +52,15 @@ def main() -> None:
             bare = command(["compare", str(path), "--json"])
             page = command(["compare", str(path), "--json", "--html", str(directory / "page.html")])
             work = bare.processor_s - start
-            growth = [f"{work / (count - FEW_ROWS) * 1e6:.1f}", f"{work / before:.1f}"]
+            plain = work > LEAST_SHARE * start
+            growth = [
+                f"{work / (count - FEW_ROWS) * 1e6:.1f}" if plain else "-", f"{work / before:.1f}" if before else "-"
+            ]  # fmt: skip
             rows.append([
                 f"{count}", f"{bare.seconds:.2f}", f"{bare.processor_s:.2f}", *growth, f"{bare.largest_MB:.0f}",
                 f"{page.seconds:.2f}", f"{page.seconds / BUDGET_S:.2f}", f"{page.largest_MB / BUDGET_MB:.2f}",
             ])  # fmt: skip
-            before = work
+            before = work if plain else 0.0
         show(
             f"compd compare, start of Python included; budget {BUDGET_S:g} s, {BUDGET_MB:g} MB at {ROWS[-1]} rows",
             ["rows", "s", "processor s", "processor us/row beyond the start", "times the line above", "MB",
