@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compd.workbench.adequacy import LEAST_SHARE, PER_NUMBER
+from compd.workbench.adequacy import PER_NUMBER
 from compd.workbench.contest import Contest, Entry, Members
 from compd.workbench.significance import Projection
 
@@ -14,9 +14,9 @@ from compd.workbench.significance import Projection
 SAME = 2.0
 # Fewer numbers win where the difference is within this many (Breiman's rule), or within PER_NUMBER.
 SIMPLER = 1.0
-# Nor are losses that differ by less than this, in squares of the floor, or than LEAST_SHARE of what is explained: that
-# much the disturbances that a machine always has can add on either side.
-ALIKE = 0.12
+# Nor are losses that differ by less than this, in squares of the floor: that much the two disturbances of a fifth of it
+# that a machine always has can add on either side, and the form of an effect.
+ALIKE = 0.1
 # A candidate that misses more than this share of what another explains is no rival, whatever the errors.
 FAR = 0.3
 
@@ -66,8 +66,7 @@ def rivals(contest: Contest, members: Members, place: int) -> tuple[Rival, ...]:
         cosine = likeness(contest, members, place, k)
         # one with more numbers is bound to do about as well where it holds the other as a special case
         general = contest.candidates[k].numbers > contest.candidates[members[place]].numbers
-        alike = 0.0 if general else min(ALIKE, LEAST_SHARE * (worth - own))
-        if excess > max(SAME * std, alike) or not contest.is_plausible(other.members):
+        if excess > max(SAME * std, 0.0 if general else ALIKE) or not contest.is_plausible(other.members):
             continue
         found.append(Rival(k, contest.name(k), cosine, excess, std))
     return tuple(found)
