@@ -84,9 +84,17 @@ def drifting(monkeypatch):
 
 @contextmanager
 def record_command(directory, *arguments):
-    """`compd record` as a process, once it has begun to write."""
+    """`compd record` as a process, once it has begun to write.
+
+    It heeds SIGINT also where this process does not, as one that a script started with `&`.
+    """
     command = [sys.executable, "-m", "compd", "record", str(directory / "run"), "--daemon", str(directory / "s")]
-    with subprocess.Popen([*command, *arguments], stderr=subprocess.PIPE, text=True) as process:
+    heeded = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen([*command, *arguments], stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, heeded)
+    with process:
         try:
             assert "run-0001.csv begins" in process.stderr.readline()
             yield process
