@@ -18,7 +18,7 @@ LEAST_GAIN = 0.2
 LEAST_SHARE = 0.005
 # For each number that is saved a simpler explanation may leave so much more, in squares of the floor: a flexible one
 # also describes a part of the disturbances that a machine always has.
-PER_NUMBER = 0.01
+PER_NUMBER = 0.005
 # A description fits anything a little: it must say more than an effect whose physics is known; and with the constant
 # that it brings it does two things at once. An effect that contradicts what the sidecar declares must say more, too.
 DESCRIPTION_COSTS = 2.5
