@@ -10,13 +10,13 @@ from compd.model.effect import Fitted
 from compd.workbench.candidates import UM_PER_MM, Candidate, Pool
 from compd.workbench.compare import Comparison
 from compd.workbench.contest import Contest, Members
-from compd.workbench.dependence import Whitener
 from compd.workbench.evidence import Block, Evidence
 from compd.workbench.fit import blocks_of
 from compd.workbench.folds import schemes
 from compd.workbench.recording import BoolArray
 from compd.workbench.screening import outliers
 from compd.workbench.table import FloatArray, IntArray
+from compd.workbench.whitener import Whitener
 
 
 class Bench:

@@ -16,7 +16,6 @@ from compd.workbench.table import FloatArray, IntArray
 
 # Pairs that are extended to triples, and sets that are looked at for a plausible one.
 BEST_PAIRS = 15
-MOST_MEMBERS = 3
 
 # What a member must take away of the error that is above the floor without it.
 LEAST_REMOVED = 0.6

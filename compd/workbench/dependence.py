@@ -11,13 +11,12 @@ import numpy as np
 
 from compd.model.effect import Effect
 from compd.workbench.adequacy import PER_NUMBER
-from compd.workbench.candidates import SEARCH_COUNTS, UM_PER_MM, Candidate
+from compd.workbench.candidates import SEARCH_COUNTS, Candidate
 from compd.workbench.descriptions import Description, descriptions, finer
 from compd.workbench.evidence import Block, Evidence, sums
-from compd.workbench.observed import Observed
-from compd.workbench.recording import BoolArray
 from compd.workbench.significance import Projection, chances
 from compd.workbench.table import FloatArray
+from compd.workbench.whitener import Whitener
 
 # Places between neighbours of a grid that are tried for a step, a knee or a period.
 FINER = 9
@@ -91,36 +90,6 @@ class Dependence:
             "formula_effect": self.formula_effects[0], "formula_effects": list(self.formula_effects),
             "fitted": list(self.numbers), "beside": list(self.beside), "note": "a description, not a cause",
         }  # fmt: skip
-
-
-class Whitener:
-    """Columns of a description in standard deviations of the noise, on the rows that count."""
-
-    def __init__(self, seen: Observed, rows: BoolArray, sigma_um: FloatArray) -> None:
-        self.seen, self._rows, self._sigma_um = seen, rows, sigma_um
-
-    def columns_um(self, description: Description, effect: Effect, constant: float | None) -> FloatArray:
-        """(N, m, P): all numbers of the first axis, then of the next."""
-        shape = {} if constant is None else {description.constant: constant}
-        if description.axes == ("",):
-            return self.seen.columns(effect, shape) * UM_PER_MM
-        factors, _ = effect.basis(self.seen.rows, shape, None)
-        factors = factors[:, "xyz".index(description.axes[0])] * UM_PER_MM
-        along = self._along(description)
-        return np.asarray((along[:, :, :, None] * factors[:, None, None, :]).reshape(*along.shape[:2], -1))
-
-    def _along(self, description: Description) -> FloatArray:
-        """(N, m, axes) what is measured of a displacement along each axis at the port."""
-        axes = ["xyz".index(axis) for axis in description.axes]
-        if description.port == "reference":
-            return np.broadcast_to(
-                np.eye(3)[list(self.seen.axes)][:, axes], (len(self.seen.rows), len(self.seen.axes), len(axes))
-            )
-        return self.seen.sensitivity(["tool"])["tool"].tip[:, list(self.seen.axes)][:, :, axes]
-
-    def __call__(self, columns_um: FloatArray) -> FloatArray:
-        """(R, m, P)."""
-        return np.asarray(columns_um[self._rows] / self._sigma_um[:, None])
 
 
 class Everything:

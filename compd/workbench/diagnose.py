@@ -66,9 +66,10 @@ def _diagnosis(bench: Bench, found: Explanation, covariance: FloatArray | None) 
     effects = _worth_naming(found)
     chance = _chances(contest, effects)
     current, joint = before.fitted, covariance
-    for k in effects:
+    for number, k in enumerate(effects, start=1):
         result = search(seen, current, contest.candidates[k].effect, bench.sigma_um)
-        result = with_disturbances(result, seen, bench.sigma_um, bench.pool.candidates)
+        if number == len(effects):
+            result = with_disturbances(result, seen, bench.sigma_um, bench.pool.candidates)
         current, joint = result.fitted, result.covariance
     after = compare(seen, current, joint) if effects else before
     quiet = not found.described and at_floor(after.floor_ratio, contest.base - 1.0 if effects else 0.0)
