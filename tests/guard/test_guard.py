@@ -1,0 +1,68 @@
+"""What release 0.1.0 computed and wrote stays so: its setpoints bit for bit, its verdicts and comparisons.
+
+replay/: runs of both machines in both modes, recorded by 0.1.0: effects applied and as a shadow, gauges lost and
+frozen, jumps, machine zero taken anew. verdicts/: `compare --json` and `diagnose --json` of the example recordings.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from compd.live.replay import Transcripts, replay
+from tests.live_machine import machine
+from tests.scoreboard.trial import at_once
+
+HERE = Path(__file__).parent
+EXAMPLES = Path(__file__).parents[3] / "shared" / "recordings"
+RUNS = {
+    "tripod-cmm-cmm-hold": ("tripod-cmm.yaml", "hold", "clamp"),
+    "tripod-cmm-machine_tool-fade": ("tripod-cmm.yaml", "fade", "refuse"),
+    "hexapod-cmm-fade": ("hexapod.yaml", "fade", "refuse"),
+    "hexapod-machine_tool-hold": ("hexapod.yaml", "hold", "clamp"),
+}
+VERDICTS = sorted(path.name for path in (HERE / "verdicts").glob("*.json"))
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_setpoints_are_bit_for_bit_those_of_0_1_0(run):
+    name, on_stale, on_limit = RUNS[run]
+    configuration = machine(name, on_stale=on_stale, on_limit=on_limit).configuration
+    cycles = list(replay(configuration, Transcripts(HERE / "replay" / run)))
+    assert len(cycles) == 20
+    assert [cycle.where for cycle in cycles if cycle.differs] == []
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+@pytest.mark.skipif(not EXAMPLES.is_dir(), reason=f"no example recordings in {EXAMPLES}")
+def test_examples_are_judged_as_by_0_1_0(name):
+    example, *which, command, _ = name.split(".")
+    recording = EXAMPLES / example / f"{which[0] if which else 'train'}.csv"
+    now = json.loads(at_once(command, str(recording), "--json"))
+    before = json.loads((HERE / "verdicts" / name).read_text(encoding="utf-8"))
+    assert differences(before, now) == []
+
+
+def differences(before, now, where=""):
+    """Where two JSON values differ; numbers may by a millionth, as another processor's sums do."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        return [
+            text
+            for key in sorted(before.keys() | now.keys())
+            for text in differences(before.get(key, "absent"), now.get(key, "absent"), f"{where}.{key}")
+        ]
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        return [
+            text
+            for index, (one, other) in enumerate(zip(before, now, strict=True))
+            for text in differences(one, other, f"{where}[{index}]")
+        ]
+    if isinstance(before, float) and isinstance(now, float) and math.isclose(before, now, rel_tol=1e-6, abs_tol=1e-9):
+        return []
+    if isinstance(before, str) and isinstance(now, str) and os.sep in before:
+        before, now = Path(before).name, Path(now).name
+    return [] if before == now else [f"{where}: {before} became {now}"]
