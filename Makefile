@@ -31,7 +31,7 @@ demo: $(STAMP)
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. One takes a
 # third of a processor: four at a time leave two processors enough for everything to be in time.
-HIDDEN := tests/test_tutorial.py tests/test_hidden_effect.py
+HIDDEN := tests/system/test_tutorial.py tests/system/test_hidden_effect.py
 SIDE_BY_SIDE ?= 4
 
 test: $(STAMP)

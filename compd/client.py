@@ -46,11 +46,13 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
             connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
     except ValueError as error:
         raise DaemonError(
-            Problem("address", "not an address", text, "host:port, or the path of a Unix socket")
+            Problem(
+                where="address", what="not an address", value=text, allowed="host:port, or the path of a Unix socket"
+            )
         ) from error
     except OSError as error:
         raise DaemonError(
-            Problem(text, f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
+            Problem(where=text, what=f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
         ) from error
     try:
         return Client(connection, text)
@@ -175,8 +177,8 @@ class Client:
             raise self._lost("it closed the connection")
         message: Message = json.loads(line)
         if message["class"] == "ERROR":
-            raise DaemonError(Problem(self._address, message["text"], message["code"]))
+            raise DaemonError(Problem(where=self._address, what=message["text"], value=message["code"]))
         return line, message
 
     def _lost(self, why: str) -> DaemonError:
-        return DaemonError(Problem(self._address, f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))
+        return DaemonError(Problem(where=self._address, what=f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))

@@ -13,19 +13,19 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
-from compd.model.acting import Remembered, Sight, act, whole, with_all
-from compd.model.arrangement import Contact, ToolOnPlate
+from compd.model.apply_effects import EffectInputs, EffectMemory, act, whole, with_all
 from compd.model.frame import Frame, solve_frame
-from compd.model.jit import Floats, Ints
+from compd.model.joint_correction import joint_shortening, link_length_mm, scale_for_length_mm
+from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kinematics import Pose, forward_kinematics, inverse_kinematics
-from compd.model.links import joint_shortening, link_length_mm, scale_for_length_mm
 from compd.model.machine import MachineModel
-from compd.model.prediction import Altered
-from compd.model.rotation import compose, rotation_matrix
+from compd.model.prediction import PerturbedMachine
+from compd.model.tool import Contact, ToolOnPlate
 from compd.model.transform import to_inner
 
-Sources: TypeAlias = Mapping[str, Floats]
+Sources: TypeAlias = Mapping[str, FloatArray]
 
 # An effect is looked up where the scales will stand, which effects themselves shift. What is wrong after the first look
 # is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
@@ -40,11 +40,11 @@ class GaugeValues(NamedTuple):
     time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
     """
 
-    scale_mm: Floats
-    joint_mm: Floats
-    frame_mm: Floats
-    quantities: Mapping[str, Floats]
-    time_s: Floats | float = math.nan
+    scale_mm: FloatArray
+    joint_mm: FloatArray
+    frame_mm: FloatArray
+    quantities: Mapping[str, FloatArray]
+    time_s: FloatArray | float = math.nan
 
 
 class WarmStart(NamedTuple):
@@ -54,10 +54,10 @@ class WarmStart(NamedTuple):
     effects : what the model's effects remember; of N rows after the last one.
     """
 
-    supports_M_mm: Floats
-    origin_M_mm: Floats
-    rotation_M_P: Floats
-    effects: Remembered = Remembered()
+    supports_M_mm: FloatArray
+    origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    effects: EffectMemory = EffectMemory()
 
     @classmethod
     def at_zero(cls, model: MachineModel) -> WarmStart:
@@ -83,18 +83,18 @@ class Compensation(NamedTuple):
     reason : (...), a Reason, of the step that failed first.
     """
 
-    tip_M_mm: Floats
-    tip_B0_mm: Floats
-    tip_P_mm: Floats
-    rotation_M_P: Floats
+    tip_M_mm: FloatArray
+    tip_B0_mm: FloatArray
+    tip_P_mm: FloatArray
+    rotation_M_P: FloatArray
     frame: Frame
-    link_length_mm: Floats
-    target_B_mm: Floats
-    nominal_scale_mm: Floats
-    scale_setpoint_mm: Floats
-    correction_mm: Floats
+    link_length_mm: FloatArray
+    target_B_mm: FloatArray
+    nominal_scale_mm: FloatArray
+    scale_setpoint_mm: FloatArray
+    correction_mm: FloatArray
     sources: Sources
-    reason: Ints
+    reason: IntArray
 
 
 def compensate_machine_tool(
@@ -175,9 +175,9 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
 class _Command(NamedTuple):
     """What the scales are to show, without compensation and with it; (..., n) mm each."""
 
-    nominal_scale_mm: Floats
-    scale_setpoint_mm: Floats
-    correction_mm: Floats
+    nominal_scale_mm: FloatArray
+    scale_setpoint_mm: FloatArray
+    correction_mm: FloatArray
     sources: Sources
 
 
@@ -189,11 +189,11 @@ class _Found(NamedTuple):
     made: Contact
     wanted: Contact
     command: _Command
-    reason: Ints
+    reason: IntArray
 
 
 def _command(
-    model: MachineModel, nominal: Pose, nominal_scale_mm: Floats, needed: Pose, joint_shortening_mm: Floats
+    model: MachineModel, nominal: Pose, nominal_scale_mm: FloatArray, needed: Pose, joint_shortening_mm: FloatArray
 ) -> _Command:
     """The joints' share is what they take from the links; the frame's is what its moving makes of the lengths."""
     setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, needed.link_length_mm, joint_shortening_mm)
@@ -201,18 +201,22 @@ def _command(
     return _Command(nominal_scale_mm, setpoint_mm, setpoint_mm - nominal_scale_mm, sources)
 
 
-def _sight(values: GaugeValues, scale_mm: Floats, frame: Frame, pose: Pose, at: Contact) -> Sight:
-    return Sight(scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, at.tip_M_mm)
+def _sight(values: GaugeValues, scale_mm: FloatArray, frame: Frame, pose: Pose, at: Contact) -> EffectInputs:
+    return EffectInputs(
+        scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, at.tip_M_mm
+    )
 
 
-def _with_effects(model: MachineModel, found: _Found, machine: Altered, attitude: Floats) -> _Found:
+def _with_effects(model: MachineModel, found: _Found, machine: PerturbedMachine, attitude: FloatArray) -> _Found:
     """The command that reaches the target on the machine that the effects make; an effect's share is what it adds to
     those before it."""
     before = found.command
     tool_on_plate = isinstance(model.arrangement, ToolOnPlate)
-    contact = Contact(machine.tool_mm, found.wanted.tip_P_mm) if tool_on_plate else Contact(
-        found.wanted.tip_M_mm, machine.tool_mm
-    )  # fmt: skip
+    contact = (
+        Contact(machine.tool_mm, found.wanted.tip_P_mm)
+        if tool_on_plate
+        else Contact(found.wanted.tip_M_mm, machine.tool_mm)
+    )
     each = inverse_kinematics(machine.mechanism, *contact, attitude)
     setpoints_mm = scale_for_length_mm(
         model.zero.link_length_mm, each.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
@@ -221,25 +225,34 @@ def _with_effects(model: MachineModel, found: _Found, machine: Altered, attitude
     ids = [one.effect.id for one in model.acting]
     setpoint_mm = setpoints_mm[-1]
     command = _Command(
-        before.nominal_scale_mm, setpoint_mm, setpoint_mm - before.nominal_scale_mm,
+        before.nominal_scale_mm,
+        setpoint_mm,
+        setpoint_mm - before.nominal_scale_mm,
         {**before.sources, **dict(zip(ids, shares_mm, strict=True))},
-    )  # fmt: skip
+    )
     reasons = np.maximum(machine.reason, each.reason)
     worst = reasons.max(axis=0) if reasons.ndim > found.reason.ndim else reasons
     return found._replace(
-        frame=whole(machine.frame, found.frame), pose=whole(each, found.pose), command=command,
+        frame=whole(machine.frame, found.frame),
+        pose=whole(each, found.pose),
+        command=command,
         reason=np.maximum(found.reason, worst),
-    )  # fmt: skip
+    )
 
 
-def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> Floats:
+def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> FloatArray:
     """The attitude wanted of a hexapod in {M}; for a tripod the guess to start from."""
     if not model.attitude_is_free:
         if target_rotation_B0_rad is not None:
             raise KinematicsError(
-                Problem("target", "a tripod's attitude follows from its tip", str(target_rotation_B0_rad),
-                        "a position alone", "leave the attitude out")
-            )  # fmt: skip
+                Problem(
+                    where="target",
+                    what="a tripod's attitude follows from its tip",
+                    value=str(target_rotation_B0_rad),
+                    allowed="a position alone",
+                    next_step="leave the attitude out",
+                )
+            )
         return warm.rotation_M_P
     if target_rotation_B0_rad is None:
         return model.zero.rotation_M_P
@@ -277,7 +290,7 @@ def _result(model: MachineModel, found: _Found, warm: WarmStart, after: WarmStar
 def _blanked(result: Compensation) -> Compensation:
     """nan for every number in the rows that failed; the frame has a reason of its own."""
 
-    def blank(vector: Floats) -> Floats:
+    def blank(vector: FloatArray) -> FloatArray:
         return _where(result.reason, np.nan, vector, 1)
 
     return result._replace(
@@ -294,6 +307,6 @@ def _blanked(result: Compensation) -> Compensation:
     )
 
 
-def _where(failed: Ints, instead: Floats | float, values: Floats, core: int) -> Floats:
+def _where(failed: IntArray, instead: FloatArray | float, values: FloatArray, core: int) -> FloatArray:
     """`instead` in the rows that failed; each row of `values` has `core` axes."""
     return np.where(np.reshape(failed, np.shape(failed) + (1,) * core) != 0, instead, values)

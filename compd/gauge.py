@@ -140,13 +140,17 @@ class GaugeOptions(BaseModel):
     driver: str = Field(description="entry point in `compd.gauges`, or /absolute/file.py:ClassName")
     line: str = Field(description="the line (under `lines:`) that this gauge is wired to")
     stale_after_s: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False,
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
         description="a reading older than this is stale; the loop's own stale_after_s if left out",
-    )  # fmt: skip
+    )
     noise_um: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False,
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
         description="standard deviation of one reading of a length, um; where it is missing nobody knows the tip's",
-    )  # fmt: skip
+    )
 
 
 LineT = TypeVar("LineT", ByteLine, RegisterLine)

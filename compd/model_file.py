@@ -16,10 +16,10 @@ import numpy as np
 import yaml
 
 from compd import __version__
+from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effect import Fitted
-from compd.model.effects import find
-from compd.model.jit import Floats
+from compd.model.effect import FittedEffect
+from compd.model.library import find
 
 FORMAT = 1
 Kind = Literal["add", "remove", "fit", "undo"]
@@ -31,7 +31,7 @@ NOTHING: State = {"effects": [], "covariance": []}
 
 
 @dataclass(frozen=True)
-class Step:
+class ModelStep:
     """One command that changed the model; um per coordinate.
 
     effect : what was added or removed, "" for a fit of all.  date : UTC, ISO 8601.
@@ -56,7 +56,7 @@ class Stored:
 
     machine: str
     state: State = field(default_factory=lambda: NOTHING)
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ModelStep, ...] = ()
     geometry: str = ""
 
 
@@ -71,9 +71,9 @@ class ModelFile:
 
     machine: str
     declared: tuple[Declaration, ...] = ()
-    fitted: tuple[Fitted, ...] = ()
-    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    steps: tuple[Step, ...] = ()
+    fitted: tuple[FittedEffect, ...] = ()
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    steps: tuple[ModelStep, ...] = ()
     geometry: str = ""
 
     def state(self, links: int) -> State:
@@ -99,22 +99,34 @@ def read_stored(path: Path) -> Stored:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StateError(
-            Problem(where, f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
+            Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
         ) from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise StateError(Problem(where, "is not YAML", str(error).splitlines()[0])) from error
+        raise StateError(Problem(where=where, what="is not YAML", value=str(error).splitlines()[0])) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         found = data.get("format") if isinstance(data, dict) else None
-        raise StateError(Problem(where, "is no model file of this version", f"format: {found}", f"format: {FORMAT}"))
+        raise StateError(
+            Problem(
+                where=where,
+                what="is no model file of this version",
+                value=f"format: {found}",
+                allowed=f"format: {FORMAT}",
+            )
+        )
     try:
-        steps = tuple(Step(**step) for step in data.get("steps") or ())
+        steps = tuple(ModelStep(**step) for step in data.get("steps") or ())
     except (TypeError, AttributeError) as error:
-        raise StateError(Problem(where, f"a step cannot be read: {error}")) from error
+        raise StateError(Problem(where=where, what=f"a step cannot be read: {error}")) from error
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
     for key, value in state.items():
         if not isinstance(value, list):
             raise StateError(
-                Problem(f"{where}, {key}", "is no list", str(value)[:80], "as `compd effect add` writes it")
+                Problem(
+                    where=f"{where}, {key}",
+                    what="is no list",
+                    value=str(value)[:80],
+                    allowed="as `compd effect add` writes it",
+                )
             )
     return Stored(str(data.get("machine")), state, steps, str(data.get("geometry") or ""))
 
@@ -129,21 +141,31 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
     stored = read_stored(path)
     if stored.machine != machine:
         raise StateError(
-            Problem(str(path), "belongs to another machine", stored.machine, machine,
-                    "give this machine's model file, or begin a new one")
-        )  # fmt: skip
+            Problem(
+                where=str(path),
+                what="belongs to another machine",
+                value=stored.machine,
+                allowed=machine,
+                next_step="give this machine's model file, or begin a new one",
+            )
+        )
     if geometry and stored.geometry and stored.geometry != geometry:
         raise StateError(
-            Problem(str(path), "was fitted on another geometry of this machine", stored.geometry, geometry,
-                    "fit it again with `compd effect fit`")
-        )  # fmt: skip
+            Problem(
+                where=str(path),
+                what="was fitted on another geometry of this machine",
+                value=stored.geometry,
+                allowed=geometry,
+                next_step="fit it again with `compd effect fit`",
+            )
+        )
     return _opened(stored, links, str(path))
 
 
 def _opened(stored: Stored, links: int, where: str) -> ModelFile:
     problems: list[Problem] = []
     declared: list[Declaration] = []
-    fitted: list[Fitted] = []
+    fitted: list[FittedEffect] = []
     for number, entry in enumerate(stored.state["effects"], start=1):
         place = f"{where}, effect {number}"
         try:
@@ -152,15 +174,25 @@ def _opened(stored: Stored, links: int, where: str) -> ModelFile:
         except CompdError as error:
             problems += error.problems
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            problems.append(Problem(place, f"cannot be read: {error!r}", allowed="effect, shape, parameters"))
+            problems.append(
+                Problem(where=place, what=f"cannot be read: {error!r}", allowed="effect, shape, parameters")
+            )
     count = sum(len(one.theta) for one in fitted)
     try:
         covariance = np.array(stored.state["covariance"] or np.zeros((0, 0)), dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise StateError([*problems, Problem(f"{where}, covariance", f"is no matrix of numbers: {error}")]) from error
+        raise StateError(
+            [*problems, Problem(where=f"{where}, covariance", what=f"is no matrix of numbers: {error}")]
+        ) from error
     if not problems and covariance.shape != (count, count):
-        problems.append(Problem(f"{where}, covariance", "has another size than the parameters",
-                                str(covariance.shape), f"({count}, {count})"))  # fmt: skip
+        problems.append(
+            Problem(
+                where=f"{where}, covariance",
+                what="has another size than the parameters",
+                value=str(covariance.shape),
+                allowed=f"({count}, {count})",
+            )
+        )
     if problems:
         raise StateError(problems)
     return ModelFile(
@@ -198,11 +230,15 @@ def write_stored(path: Path, stored: Stored) -> None:
         if temporary:
             Path(temporary).unlink(missing_ok=True)
         raise StateError(
-            Problem(str(path), f"cannot be written: {error.strerror}", next_step="choose a place that may be written")
+            Problem(
+                where=str(path),
+                what=f"cannot be written: {error.strerror}",
+                next_step="choose a place that may be written",
+            )
         ) from error
 
 
-def _each_its_own(fitted: Sequence[Fitted], covariance: Floats) -> tuple[Fitted, ...]:
+def _each_its_own(fitted: Sequence[FittedEffect], covariance: FloatArray) -> tuple[FittedEffect, ...]:
     """The effects, each with its block of the joint covariance."""
     ends = np.cumsum([0, *(len(one.theta) for one in fitted)])
     return tuple(
@@ -210,36 +246,44 @@ def _each_its_own(fitted: Sequence[Fitted], covariance: Floats) -> tuple[Fitted,
     )
 
 
-def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Problem]) -> Fitted:
+def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Problem]) -> FittedEffect:
     effect = find(entry["effect"], where)
     values = {number["name"]: number["value"] for number in entry["parameters"]}
     columns = effect.columns(links)
     names = [column.name for column in columns]
     if sorted(values) != sorted(names):
         problems.append(
-            Problem(where, f"has not the parameters of {effect.id}", ", ".join(values), ", ".join(names),
-                    "fit it again with `compd effect fit`")
-        )  # fmt: skip
-        return Fitted(effect, np.zeros(len(columns)))
+            Problem(
+                where=where,
+                what=f"has not the parameters of {effect.id}",
+                value=", ".join(values),
+                allowed=", ".join(names),
+                next_step="fit it again with `compd effect fit`",
+            )
+        )
+        return FittedEffect(effect, np.zeros(len(columns)))
     theta = np.array([column.parameter.fitted(float(values[column.name])) for column in columns])
     shape = {name: float(value) for name, value in (entry.get("shape") or {}).items()}
     absent = [constant.name for constant in effect.constants if constant.name not in shape]
     if absent:
-        problems.append(Problem(where, f"has not the shape constants of {effect.id}", allowed=", ".join(absent)))
-    return Fitted(effect, theta, shape)
+        problems.append(
+            Problem(where=where, what=f"has not the shape constants of {effect.id}", allowed=", ".join(absent))
+        )
+    return FittedEffect(effect, theta, shape)
 
 
-def _numbers(one: Fitted, links: int) -> list[dict[str, Any]]:
+def _numbers(one: FittedEffect, links: int) -> list[dict[str, Any]]:
     """Each number as people read it: value, standard error, unit."""
     found = []
     for k, column in enumerate(one.effect.columns(links)):
         std = float(np.sqrt(one.covariance[k, k])) if k < len(one.covariance) else float("nan")
         value, value_std = column.parameter.shown(float(one.theta[k]), std)
-        found.append({"name": column.name, "value": float(value), "std": float(value_std),
-                      "unit": column.parameter.unit})  # fmt: skip
+        found.append(
+            {"name": column.name, "value": float(value), "std": float(value_std), "unit": column.parameter.unit}
+        )
     return found
 
 
-def numbers_of(fitted: Sequence[Fitted], links: int) -> list[tuple[str, dict[str, Any]]]:
+def numbers_of(fitted: Sequence[FittedEffect], links: int) -> list[tuple[str, dict[str, Any]]]:
     """(effect id, {name, value, std, unit}) of every number."""
     return [(one.effect.id, number) for one in fitted for number in _numbers(one, links)]

@@ -34,16 +34,25 @@ def load(group: str, name: str, where: str) -> Any:
     points: dict[str, EntryPoint] = {point.name: point for point in entry_points(group=group)}
     if name not in points:
         raise PluginError(
-            Problem(where, f"no such {_KIND.get(group, group)}", name, ", ".join(sorted(points)) or "none installed",
-                    "choose one of these, or write /absolute/file.py:Name")
-        )  # fmt: skip
+            Problem(
+                where=where,
+                what=f"no such {_KIND.get(group, group)}",
+                value=name,
+                allowed=", ".join(sorted(points)) or "none installed",
+                next_step="choose one of these, or write /absolute/file.py:Name",
+            )
+        )
     try:
         return points[name].load()
     except (ImportError, AttributeError, SyntaxError) as error:
         raise PluginError(
-            Problem(where, f"{points[name].value} cannot be loaded: {error}", name,
-                    next_step="reinstall the package that offers it")
-        ) from error  # fmt: skip
+            Problem(
+                where=where,
+                what=f"{points[name].value} cannot be loaded: {error}",
+                value=name,
+                next_step="reinstall the package that offers it",
+            )
+        ) from error
 
 
 def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
@@ -52,21 +61,30 @@ def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
     try:
         mode = file.stat().st_mode
     except OSError as error:
-        raise PluginError(Problem(where, f"cannot read the {kind}'s file: {error.strerror}", value)) from error
+        raise PluginError(
+            Problem(where=where, what=f"cannot read the {kind}'s file: {error.strerror}", value=value)
+        ) from error
     if mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise PluginError(
-            Problem(where, f"the {kind}'s file may be written by group or others", value,
-                    "mode 644 or stricter", f"chmod go-w {file}")
-        )  # fmt: skip
+            Problem(
+                where=where,
+                what=f"the {kind}'s file may be written by group or others",
+                value=value,
+                allowed="mode 644 or stricter",
+                next_step=f"chmod go-w {file}",
+            )
+        )
     # one name per path: its classes look their own module up by it (pydantic resolves annotations there)
     module_name = "compd_file_" + re.sub(r"\W", "_", str(file))
     spec = importlib.util.spec_from_file_location(module_name, file)
     if spec is None or spec.loader is None:
-        raise PluginError(Problem(where, "not a Python file", value))
+        raise PluginError(Problem(where=where, what="not a Python file", value=value))
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
         return getattr(module, name)
     except (ImportError, SyntaxError, AttributeError) as error:
-        raise PluginError(Problem(where, f"the {kind}'s file cannot be loaded: {error}", value)) from error
+        raise PluginError(
+            Problem(where=where, what=f"the {kind}'s file cannot be loaded: {error}", value=value)
+        ) from error

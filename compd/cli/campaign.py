@@ -48,18 +48,25 @@ def campaign(
 
     from compd.configuration import load
     from compd.errors import CompdError, Problem
-    from compd.simulation.given_plan import read_plan
-    from compd.simulation.hidden import asked, drawn, seal
-    from compd.simulation.mechanism import Mechanism
-    from compd.simulation.recorded import record
-    from compd.workbench.write import write_recording
+    from compd.recording.writer import write_recording
+    from compd.simulation.campaign.plan_reader import read_plan
+    from compd.simulation.campaign.simulated_recording import record
+    from compd.simulation.causes.catalogue import asked, drawn, seal
+    from compd.simulation.truth.mechanism import Mechanism
 
     configuration = load(config)
     path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
     mechanism = Mechanism(configuration.geometry)
     if plan is not None and reference is ReferenceKind.ball_plate:
-        raise CompdError(Problem("--reference", "a ball plate's balls are not where the plan goes", reference.value,
-                                 "tracker, interferometer", "leave --plan or --reference out"))  # fmt: skip
+        raise CompdError(
+            Problem(
+                where="--reference",
+                what="a ball plate's balls are not where the plan goes",
+                value=reference.value,
+                allowed="tracker, interferometer",
+                next_step="leave --plan or --reference out",
+            )
+        )
     given = () if plan is None else read_plan(plan, mechanism)
     wanted = asked(effect or [])
     if hidden is not None:

@@ -25,9 +25,9 @@ def check(
         return
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
-    from compd.assembly import build_model
     from compd.cli.line_plan import print_line_plan
     from compd.configuration import load
+    from compd.machine_builder import build_model
 
     configuration = load(config)
     build_model(configuration.geometry, configuration.wiring)

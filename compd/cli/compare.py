@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from compd.comparison.aligned_recording import AlignedRecording
+    from compd.comparison.compare import Comparison
     from compd.configuration import Configuration
     from compd.model_file import ModelFile
-    from compd.workbench.compare import Comparison
-    from compd.workbench.observed import Observed
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -34,8 +34,8 @@ def compare(
     ] = None,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
+    from compd.comparison.compare import compare as compared
     from compd.errors import CompdError, Problem
-    from compd.workbench.compare import compare as compared
 
     problems: list[Problem] = []
     found: list[Comparison] = []
@@ -50,7 +50,7 @@ def compare(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
-        from compd.workbench.report import write_report
+        from compd.report.comparison_page import write_report
 
         write_page_to(html)
         write_report(html, found, file)
@@ -63,16 +63,16 @@ def compare(
         typer.echo(f"The same as pictures: {html}")
 
 
-def open_recording(path: Path, machine: Path | None) -> tuple[Observed, Configuration | None]:
+def open_recording(path: Path, machine: Path | None) -> tuple[AlignedRecording, Configuration | None]:
     """A recording on its machine. Raises RecordingError with every problem."""
     from compd.cli.recording import read_with_machine
-    from compd.workbench.observed import observed
+    from compd.comparison.aligned_recording import observed
 
     recording, configuration = read_with_machine(path, machine)
     return observed(recording, configuration), configuration
 
 
-def open_model(path: Path | None, seen: Observed) -> ModelFile:
+def open_model(path: Path | None, seen: AlignedRecording) -> ModelFile:
     """The model file, or the model without effects where none is named. Raises StateError."""
     from compd.model_file import ModelFile, read_model_file
 
@@ -85,7 +85,9 @@ def write_page_to(path: Path) -> None:
     from compd.errors import CompdError, Problem
 
     if not path.parent.is_dir():
-        raise CompdError(Problem(str(path), "its directory does not exist", str(path.parent), next_step="make it"))
+        raise CompdError(
+            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
+        )
 
 
 def print_comparisons(found: list[Comparison]) -> None:
@@ -93,7 +95,7 @@ def print_comparisons(found: list[Comparison]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.workbench.report import name_of, nothing_found, summary
+    from compd.report.comparison_page import name_of, nothing_found, summary
 
     console = Console(highlight=False)
     numbers = summary(found)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.cli.demo_session import Session
+    from compd.demo.session import DemoSession
 
 # Twenty seconds of demo are forty minutes of weather and warm-up.
 SPEEDUP = 120.0
@@ -26,11 +26,11 @@ def demo(
     from rich.console import Console
     from rich.live import Live
 
-    from compd.cli.background import Command, running
-    from compd.cli.demo_page import progress, summarise, verdict, write_demo_page
-    from compd.cli.demo_session import run_session
     from compd.configuration import load
-    from compd.shipped import shipped_configuration
+    from compd.configuration.shipped import shipped_configuration
+    from compd.demo.page import progress, summarise, verdict, write_demo_page
+    from compd.demo.processes import Command, running
+    from compd.demo.session import run_session
 
     console = Console()
     config = config or shipped_configuration("tripod-cmm.yaml")
@@ -50,7 +50,7 @@ def demo(
         console.print("Starting the simulated machine and the daemon (the very first start compiles the kernels) ...")
         with running(commands, log=directory / "output.log"), Live(console=console, refresh_per_second=8) as live:
 
-            def show(session: Session, elapsed_s: float, setpoint: dict[str, Any]) -> None:
+            def show(session: DemoSession, elapsed_s: float, setpoint: dict[str, Any]) -> None:
                 live.update(progress(session, elapsed_s, seconds, setpoint))
 
             session = run_session(configuration, directory, seconds, seed, show)

@@ -12,9 +12,9 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from compd.workbench.dependence import Dependence
-    from compd.workbench.sealed import Sealed
-    from compd.workbench.verdict import Diagnosis, Step
+    from compd.diagnosis.empirical_search import EmpiricalFinding
+    from compd.diagnosis.holdout import Holdout
+    from compd.diagnosis.verdict import Diagnosis, DiagnosisStep
 
 # Covariates that are listed; --json has them all.
 SHOWN = 8
@@ -42,9 +42,9 @@ def diagnose(
 
     from compd.cli.compare import open_model, open_recording, write_page_to
     from compd.cli.progress import steps_shown
-    from compd.model.effects import library
-    from compd.workbench.diagnose import diagnose as diagnosed
-    from compd.workbench.sealed import opened
+    from compd.diagnosis.diagnose import diagnose as diagnosed
+    from compd.diagnosis.holdout import opened
+    from compd.model.library import library
 
     if html is not None:
         write_page_to(html)
@@ -56,7 +56,7 @@ def diagnose(
         found = diagnosed(seen, file.fitted, file.covariance, effects, progress)
     checked = [opened(found, one) for one in sealed]
     if html is not None:
-        from compd.workbench.diagnosis_page import write_diagnosis
+        from compd.report.diagnosis_page import write_diagnosis
 
         write_diagnosis(html, found, checked)
     if as_json:
@@ -68,7 +68,7 @@ def diagnose(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _print(console: Console, found: Diagnosis, checked: list[Sealed]) -> None:
+def _print(console: Console, found: Diagnosis, checked: list[Holdout]) -> None:
     """Verdict first."""
     console.print(f"[bold]{found.verdict}[/]: {found.said}")
     for number, step in enumerate(found.steps, start=1):
@@ -92,7 +92,7 @@ def _print(console: Console, found: Diagnosis, checked: list[Sealed]) -> None:
                 console.print(f"    more: compd plan {path} --rivals {pair} --rows 40", soft_wrap=True)
 
 
-def _print_step(console: Console, number: int, step: Step) -> None:
+def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
     effect = step.effect
     console.print(f"\n[bold]{number}. {effect.id}[/]: {effect.physics}")
     console.print(f"    {effect.equation}", markup=False)
@@ -111,7 +111,7 @@ def _print_step(console: Console, number: int, step: Step) -> None:
         console.print(f"    told apart by: {effect.separated_by}")
 
 
-def _print_dependence(console: Console, one: Dependence) -> None:
+def _print_dependence(console: Console, one: EmpiricalFinding) -> None:
     console.print(
         f"    {one.covariate}, {one.form}, at the {one.port}: {100 * one.explained_fraction:.3g} % on rows left out "
         f"({one.heldout_rms_um:.3g} um left), chance {one.p_adjusted:.3g}"
@@ -119,7 +119,7 @@ def _print_dependence(console: Console, one: Dependence) -> None:
     )
 
 
-def _print_formulas(console: Console, one: Dependence) -> None:
+def _print_formulas(console: Console, one: EmpiricalFinding) -> None:
     import yaml
 
     console.print("    To use it until the cause is known, each in a file of its own for `compd effect add`:")
@@ -138,8 +138,13 @@ def _print_candidates(console: Console, found: Diagnosis) -> None:
         if one.status in ("no_gain", "not_testable"):
             continue
         known = math.isfinite(one.explained_fraction)
-        table.add_row(one.effect, one.status, f"{100 * max(one.explained_fraction, 0):.0f} %" if known else "-",
-                      f"{one.heldout_rms_um:.3g}" if known else "-", one.why)  # fmt: skip
+        table.add_row(
+            one.effect,
+            one.status,
+            f"{100 * max(one.explained_fraction, 0):.0f} %" if known else "-",
+            f"{one.heldout_rms_um:.3g}" if known else "-",
+            one.why,
+        )
     if table.row_count:
         console.print("\n[bold]Effects of the library[/], each alone, on rows left out:")
         console.print(table)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.conformance.cases import Result
-    from compd.conformance.report import Driver
+    from compd.commissioning.conformance.cases import Result
+    from compd.commissioning.conformance.report import Driver
 
 app = typer.Typer(no_args_is_help=True, help="Gauge drivers.")
 
@@ -36,7 +36,7 @@ def try_on_wires(
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
-    from compd.conformance.report import find
+    from compd.commissioning.conformance.report import find
     from compd.errors import PluginError
     from compd.plugins import GAUGES, names
 
@@ -58,7 +58,7 @@ def try_on_wires(
 
 def _try(driver: Driver, quick: bool) -> int:
     """Print each case as it ends, and the table; the number that failed."""
-    from compd.conformance.report import try_driver
+    from compd.commissioning.conformance.report import try_driver
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
     found: list[tuple[str, Result]] = []

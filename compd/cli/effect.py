@@ -22,7 +22,7 @@ def list_effects() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model.effects import library
+    from compd.model.library import library
 
     table = Table("effect", "port", "needs", "physics")
     table.columns[0].no_wrap = True
@@ -46,14 +46,14 @@ def show(
     from rich.console import Console
 
     from compd.configuration import load
-    from compd.model.effects import find
-    from compd.shipped import shipped_configuration
+    from compd.configuration.shipped import shipped_configuration
+    from compd.model.library import find
 
     one = find(name, "compd effect show")
     configuration = load(machine or shipped_configuration("tripod-cmm.yaml"))
     Console().print(_card(one, configuration))
     if html is not None:
-        from compd.cli.effect_page import write_signature
+        from compd.report.effect_page import write_signature
 
         write_signature(html, one, configuration)
         typer.echo(f"{one.id} on {configuration.machine}: {html}")
@@ -64,9 +64,9 @@ def _card(one: Effect, configuration: Configuration) -> RenderableType:
     from rich.console import Group
     from rich.table import Table
 
-    from compd.assembly import build_model
+    from compd.machine_builder import build_model
     from compd.model.effect import PORTS, missing
-    from compd.model.rows import settings
+    from compd.model.observations import settings
 
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None
@@ -89,8 +89,13 @@ def _card(one: Effect, configuration: Configuration) -> RenderableType:
 
     numbers = Table("parameter", "unit", "plausible", "one per", "where the range comes from")
     for parameter in one.parameters:
-        numbers.add_row(parameter.name, parameter.unit, f"{parameter.low:g} to {parameter.high:g}",
-                        parameter.per.replace("_", " and "), parameter.source)  # fmt: skip
+        numbers.add_row(
+            parameter.name,
+            parameter.unit,
+            f"{parameter.low:g} to {parameter.high:g}",
+            parameter.per.replace("_", " and "),
+            parameter.source,
+        )
     for constant in one.constants:
         how = f"from {constant.setting}, else searched" if constant.setting else "searched"
         numbers.add_row(constant.name, constant.unit, f"{constant.low:g} to {constant.high:g}", how, constant.source)

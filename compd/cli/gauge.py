@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.cli.gauge_statistics import GaugeStatistics
-    from compd.cli.gauge_target import Target
+    from compd.commissioning.gauge_statistics import GaugeStatistics
+    from compd.commissioning.open_gauge import GaugeTarget
     from compd.gauge import Reading
 
 app = typer.Typer(no_args_is_help=True, help="Gauges: list, show, find, read, watch, learn.")
@@ -38,8 +38,13 @@ def list_gauges() -> None:
         driver = load(GAUGES, name, name)
         needs = [key for key, field in driver.Options.model_fields.items() if field.is_required()]
         said = _first_line(driver)
-        table.add_row(name, driver.line_kind, said, ", ".join(key.rstrip("_") for key in needs if key not in
-                      ("driver", "line")), "yes" if name in simulated else "no")  # fmt: skip
+        table.add_row(
+            name,
+            driver.line_kind,
+            said,
+            ", ".join(key.rstrip("_") for key in needs if key not in ("driver", "line")),
+            "yes" if name in simulated else "no",
+        )
     Console().print(table)
     typer.echo('An unknown gauge: `compd gauge learn`. README.md, "Add a gauge", says the rest.')
 
@@ -71,7 +76,7 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, look which preset gets an answer."""
-    from compd.cli.gauge_scan import candidates, ports, probe_port
+    from compd.commissioning.scan import candidates, ports, probe_port
 
     found = ports()
     if not found:
@@ -81,13 +86,17 @@ def scan(
         typer.echo(f"{port.path}\n    {port.device}  {port.description}")
     if not probe:
         return
-    typer.echo("Every preset's read request now goes to every port, at that preset's usual baud rate. A device that\n"
-               "is no gauge may take it for a command.")  # fmt: skip
+    typer.echo(
+        "Every preset's read request now goes to every port, at that preset's usual baud rate. A device that\n"
+        "is no gauge may take it for a command."
+    )
     typer.confirm("Is nothing dangerous connected?", abort=True)
     for port in found:
         for candidate in candidates():
-            typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: "
-                       f"{probe_port(port.path, candidate)}")  # fmt: skip
+            typer.echo(
+                f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: "
+                f"{probe_port(port.path, candidate)}"
+            )
 
 
 @app.command()
@@ -101,8 +110,8 @@ def read(
     assignments: Set = None,
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
-    from compd.cli.gauge_target import open_seen
     from compd.clock import MonotonicClock
+    from compd.commissioning.open_gauge import open_seen
     from compd.gauge import LineFault
 
     found = _target(target, name, port, baud, format_, timeout_s, assignments)
@@ -141,9 +150,9 @@ def watch(
     from rich.console import Console
     from rich.live import Live
 
-    from compd.cli.gauge_statistics import GaugeStatistics
-    from compd.cli.gauge_target import polled
     from compd.clock import MonotonicClock
+    from compd.commissioning.gauge_statistics import GaugeStatistics
+    from compd.commissioning.open_gauge import polled
 
     found = _target(target, name, port, baud, format_, timeout_s, assignments)
     clock = MonotonicClock()
@@ -177,16 +186,16 @@ def learn(
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
     import yaml
 
-    from compd.cli.gauge_capture import capture_live, read_capture
-    from compd.cli.gauge_target import Wire, byte_settings_of
-    from compd.learning import learn as learn_from
-    from compd.learning import verify
+    from compd.commissioning.capture import capture_live, read_capture
+    from compd.commissioning.describe import learn as learn_from
+    from compd.commissioning.describe import verify
+    from compd.commissioning.open_gauge import TappedWire, byte_settings_of
     from compd.plugins import GAUGES, load
 
     if capture is not None:
         request, seen = read_capture(capture)
     elif port:
-        settings = byte_settings_of(Wire(port, baud, format_, timeout_s))
+        settings = byte_settings_of(TappedWire(port, baud, format_, timeout_s))
         request, seen = capture_live(settings, out, replies, _between_captures, typer.echo)
     else:
         raise typer.BadParameter("name a capture file, or a --port")
@@ -212,16 +221,21 @@ def _between_captures(done: int, wanted: int) -> None:
 
 
 def _target(
-    target: str, name: str | None, port: str, baud: int | None, form: str | None, timeout_s: float,
+    target: str,
+    name: str | None,
+    port: str,
+    baud: int | None,
+    form: str | None,
+    timeout_s: float,
     assignments: Sequence[str] | None,
-) -> Target:  # fmt: skip
-    from compd.cli.gauge_target import Wire, by_driver, configured
+) -> GaugeTarget:
+    from compd.commissioning.open_gauge import TappedWire, by_driver, configured
 
     if target.endswith((".yaml", ".yml")):
         return configured(Path(target), name)
     if not port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
-    return by_driver(target, Wire(port, baud, form, timeout_s), assignments or ())
+    return by_driver(target, TappedWire(port, baud, form, timeout_s), assignments or ())
 
 
 def _first_line(driver: Any) -> str:
@@ -239,11 +253,22 @@ def _watched(name: str, statistics: GaugeStatistics, now_s: float) -> Any:
     from rich.table import Table
 
     faults = ", ".join(f"{quality} {count}" for quality, count in statistics.faults.items()) or "none"
-    table = Table("channel", "value", "mean", "noise (1 sigma)", "age, ms",
-                  title=f"{name}: {statistics.polls} polls, {statistics.rate_hz:.1f} Hz, faults: {faults}")  # fmt: skip
+    table = Table(
+        "channel",
+        "value",
+        "mean",
+        "noise (1 sigma)",
+        "age, ms",
+        title=f"{name}: {statistics.polls} polls, {statistics.rate_hz:.1f} Hz, faults: {faults}",
+    )
     for k, (channel, reading) in enumerate(zip(statistics.channels, statistics.last, strict=True)):
         scale, unit = (1e3, "um") if channel.unit == "mm" else (1.0, channel.unit)
         noise, age_ms = statistics.noise(k) * scale, statistics.age_s(k, now_s) * 1e3
-        table.add_row(channel.name, _shown(reading, channel.unit), f"{statistics.mean(k):.6f} {channel.unit}",
-                      f"{noise:.3f} {unit}", f"{age_ms:.1f}")  # fmt: skip
+        table.add_row(
+            channel.name,
+            _shown(reading, channel.unit),
+            f"{statistics.mean(k):.6f} {channel.unit}",
+            f"{noise:.3f} {unit}",
+            f"{age_ms:.1f}",
+        )
     return table

@@ -37,10 +37,10 @@ def join(
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
 ) -> None:
     """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
-    from compd.workbench.instrument import read_track
-    from compd.workbench.join import Instrument
-    from compd.workbench.join import join as put_together
-    from compd.workbench.reader import read_recording
+    from compd.recording.instrument_export import read_track
+    from compd.recording.join import Instrument
+    from compd.recording.join import join as put_together
+    from compd.recording.reader import read_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
     recording = read_recording(gauges, needs_reference=False)

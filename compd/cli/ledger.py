@@ -18,7 +18,7 @@ def ledger(
 
     from compd.cli.compare import write_page_to
     from compd.model_file import read_stored
-    from compd.workbench.report import LEDGER_HEAD, ledger_rows, write_ledger
+    from compd.report.comparison_page import LEDGER_HEAD, ledger_rows, write_ledger
 
     stored = read_stored(model)
     steps = stored.steps

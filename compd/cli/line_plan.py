@@ -7,26 +7,38 @@ import math
 from rich.console import Console
 from rich.table import Table
 
+from compd.commissioning.line_budget import plan, warnings
 from compd.configuration import Configuration
 from compd.errors import Problem
-from compd.planning import plan, warnings
 
 
 def print_line_plan(configuration: Configuration) -> list[Problem]:
     """Print bytes, milliseconds and rate per line; the warnings that follow."""
     plans = plan(configuration)
-    table = Table("line", "gauges", "exchanges", "bytes", "ms a round", "ms, 10 ms turnaround", "rate, Hz",
-                  title="What the lines can carry", title_justify="left")  # fmt: skip
+    table = Table(
+        "line",
+        "gauges",
+        "exchanges",
+        "bytes",
+        "ms a round",
+        "ms, 10 ms turnaround",
+        "rate, Hz",
+        title="What the lines can carry",
+        title_justify="left",
+    )
     for column in table.columns[1:]:
         column.justify = "right"
     table.columns[-1].no_wrap = True
     for one in plans:
         table.add_row(
-            one.name, str(one.gauges), str(one.exchanges), str(one.bytes) if one.known else "?",
+            one.name,
+            str(one.gauges),
+            str(one.exchanges),
+            str(one.bytes) if one.known else "?",
             f"{one.ideal_s * 1e3:.1f}" if one.known else "?",
             f"{one.usual_s * 1e3:.1f}" if one.known else "?",
             _rates(one.usual_hz, one.ideal_hz),
-        )  # fmt: skip
+        )
     Console().print(table)
     return warnings(configuration, plans)
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from compd.comparison.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
+    from compd.diagnosis.model_changes import Change
     from compd.model.effect import Effect
     from compd.model_file import Declaration, ModelFile
-    from compd.workbench.ledger import Change
-    from compd.workbench.observed import Observed
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
 MachineOption = Annotated[
@@ -34,7 +34,7 @@ def add(
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.cli.compare import open_recording
-    from compd.workbench.ledger import add as added
+    from compd.diagnosis.model_changes import add as added
 
     declared, found = declaration_of(effect)
     seen, configuration = open_recording(recording, machine)
@@ -51,7 +51,7 @@ def remove(
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.cli.compare import open_recording
-    from compd.workbench.ledger import remove as removed
+    from compd.diagnosis.model_changes import remove as removed
 
     seen, configuration = open_recording(recording, machine)
     _finish(model, removed(_opened(model, seen, configuration), effect, seen, _now()), f"removed {effect}", dry_run)
@@ -62,7 +62,7 @@ def fit(
 ) -> None:
     """Fit all effects of a model again, on another recording."""
     from compd.cli.compare import open_recording
-    from compd.workbench.ledger import refit
+    from compd.diagnosis.model_changes import refit
 
     seen, configuration = open_recording(recording, machine)
     _finish(model, refit(_opened(model, seen, configuration), seen, _now()), "fitted again", dry_run)
@@ -70,8 +70,8 @@ def fit(
 
 def undo(model: ModelOption) -> None:
     """Take back the last step; undo again for the step before it. The ledger keeps both."""
+    from compd.diagnosis.model_changes import undo as undone
     from compd.model_file import read_stored, write_stored
-    from compd.workbench.ledger import undo as undone
 
     after = undone(read_stored(model), _now(), str(model))
     write_stored(model, after)
@@ -86,7 +86,7 @@ def _name(declared: Declaration) -> str:
 def declaration_of(text: str) -> tuple[Declaration, Effect]:
     """What the person named, and the effect it stands for. Raises CompdError with every problem."""
     from compd.configuration.document import read
-    from compd.model.effects import find
+    from compd.model.library import find
 
     if Path(text).suffix in (".yaml", ".yml"):
         declared = read(Path(text)).data
@@ -94,7 +94,7 @@ def declaration_of(text: str) -> tuple[Declaration, Effect]:
     return text, find(text, "compd effect add")
 
 
-def _opened(path: Path, seen: Observed, configuration: Configuration | None) -> ModelFile:
+def _opened(path: Path, seen: AlignedRecording, configuration: Configuration | None) -> ModelFile:
     """All its numbers are about to be fitted again, on this geometry."""
     from compd.model_file import read_model_file
 
@@ -102,7 +102,7 @@ def _opened(path: Path, seen: Observed, configuration: Configuration | None) -> 
     return replace(file, geometry=_geometry(configuration))
 
 
-def _begun(seen: Observed, configuration: Configuration | None) -> ModelFile:
+def _begun(seen: AlignedRecording, configuration: Configuration | None) -> ModelFile:
     from compd.model_file import ModelFile
 
     return ModelFile(seen.recording.machine, geometry=_geometry(configuration))
@@ -136,8 +136,9 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
     )
     ranges = {
         (one.effect.id, column.name): column.parameter
-        for one in change.file.fitted for column in one.effect.columns(links)
-    }  # fmt: skip
+        for one in change.file.fitted
+        for column in one.effect.columns(links)
+    }
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
     for effect, number in numbers_of(change.file.fitted, links):
         parameter = ranges[effect, number["name"]]

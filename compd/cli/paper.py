@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.cli.paper_reading import Reduction
-    from compd.workbench.page import Panel
+    from compd.paper.reduction import Reduction
+    from compd.report.page import Panel
 
 Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")]
 Seed = Annotated[int, typer.Option(min=0, help="Joints, weather and noise follow from it.")]
@@ -32,12 +32,16 @@ def fig18(
     seed: Seed = 1,
 ) -> None:
     """One link under load and temperature: scale against laser interferometer, compensated or not."""
-    from compd.cli import paper_link
     from compd.configuration import load
+    from compd.paper import link_experiment
 
-    experiment = paper_link.run(load(_machine(config)), seed)
-    _tell(page, "Figure 18: scale unit against laser interferometer", paper_link.reductions(experiment),
-          paper_link.panels(experiment))  # fmt: skip
+    experiment = link_experiment.run(load(_machine(config)), seed)
+    _tell(
+        page,
+        "Figure 18: scale unit against laser interferometer",
+        link_experiment.reductions(experiment),
+        link_experiment.panels(experiment),
+    )
 
 
 @app.command()
@@ -47,12 +51,16 @@ def fig20(
     seed: Seed = 1,
 ) -> None:
     """Distances between the 17 balls of a 3D ball plate, joints compensated or not."""
-    from compd.cli import paper_plate
     from compd.configuration import load
+    from compd.paper import plate_experiment
 
-    experiment = paper_plate.run(load(_machine(config)), seed)
-    _tell(page, "Figure 20: distances between the balls of a 3D ball plate", paper_plate.reductions(experiment),
-          paper_plate.panels(experiment))  # fmt: skip
+    experiment = plate_experiment.run(load(_machine(config)), seed)
+    _tell(
+        page,
+        "Figure 20: distances between the balls of a 3D ball plate",
+        plate_experiment.reductions(experiment),
+        plate_experiment.panels(experiment),
+    )
 
 
 @app.command()
@@ -62,16 +70,20 @@ def fig21(
     seed: Seed = 1,
 ) -> None:
     """A reference ball on the surface plate, measured again and again while the machine warms up."""
-    from compd.cli import paper_drift
     from compd.configuration import load
+    from compd.paper import drift_experiment
 
-    experiment = paper_drift.run(load(_machine(config)), seed)
-    _tell(page, "Figure 21: a ball on the surface plate during warm-up", paper_drift.reductions(experiment),
-          paper_drift.panels(experiment))  # fmt: skip
+    experiment = drift_experiment.run(load(_machine(config)), seed)
+    _tell(
+        page,
+        "Figure 21: a ball on the surface plate during warm-up",
+        drift_experiment.reductions(experiment),
+        drift_experiment.panels(experiment),
+    )
 
 
 def _machine(config: Path | None) -> Path:
-    from compd.shipped import shipped_configuration
+    from compd.configuration.shipped import shipped_configuration
 
     return config or shipped_configuration("tripod-cmm.yaml")
 
@@ -81,8 +93,8 @@ def _tell(page: Path, title: str, reductions: Sequence[Reduction], panels: Seque
     from rich.console import Console
     from rich.table import Table as TerminalTable
 
-    from compd.cli.paper_reading import HEAD, row
-    from compd.workbench.page import Panel, Table, write_page
+    from compd.paper.reduction import HEAD, row
+    from compd.report.page import PageTable, Panel, write_page
 
     table = TerminalTable(*HEAD, title=title, title_justify="left")
     for reduction in reductions:
@@ -95,7 +107,10 @@ def _tell(page: Path, title: str, reductions: Sequence[Reduction], panels: Seque
         f"{first.with_um:.2f} um with it, {first.percent:.0f} % less. The paper: {first.paper}."
     )
     page.parent.mkdir(parents=True, exist_ok=True)
-    numbers = Panel("In numbers", "What was measured here, beside what the paper states.",
-                    Table(HEAD, [row(reduction) for reduction in reductions]))  # fmt: skip
+    numbers = Panel(
+        "In numbers",
+        "What was measured here, beside what the paper states.",
+        PageTable(HEAD, [row(reduction) for reduction in reductions]),
+    )
     write_page(page, title, verdict, [*panels, numbers], _FOOTER)
     console.print(f"The same as a picture: {page}")

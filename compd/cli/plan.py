@@ -29,23 +29,38 @@ def plan(
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
     from compd.cli.compare import open_model, open_recording
+    from compd.comparison.compare import compare
+    from compd.comparison.shape_search import search
+    from compd.diagnosis.measurement_programmes import limits_of
+    from compd.diagnosis.next_measurement import plan as planned
     from compd.errors import CompdError, Problem
-    from compd.model.effects import find
-    from compd.workbench.compare import compare
-    from compd.workbench.experiment import plan as planned
-    from compd.workbench.search import search
-    from compd.workbench.segments import limits_of
+    from compd.model.library import find
 
     names = [name.strip() for name in rivals.split(",")]
     if len(names) != 2 or names[0] == names[1]:
-        raise CompdError(Problem("--rivals", "needs two effects", rivals, "A,B", "`compd diagnose` names rivals"))
+        raise CompdError(
+            Problem(
+                where="--rivals",
+                what="needs two effects",
+                value=rivals,
+                allowed="A,B",
+                next_step="`compd diagnose` names rivals",
+            )
+        )
     effects = [find(name, "--rivals") for name in names]
     seen, _ = open_recording(recording, machine)
     file = open_model(model, seen)
     present = [one.effect.id for one in file.fitted if one.effect.id in names]
     if present:
-        raise CompdError(Problem("--rivals", "is in the model already", ", ".join(present), "effects that are not",
-                                 "`compd effect remove` takes it out"))  # fmt: skip
+        raise CompdError(
+            Problem(
+                where="--rivals",
+                what="is in the model already",
+                value=", ".join(present),
+                allowed="effects that are not",
+                next_step="`compd effect remove` takes it out",
+            )
+        )
     limits = limits_of(seen)
     if workspace is not None:
         x0, x1, y0, y1, z0, z1 = _numbers("--workspace", workspace, 6)
@@ -83,5 +98,12 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
         values = []
     rising = all(low < high for low, high in zip(values[::2], values[1::2], strict=False))
     if len(values) != count or not rising:
-        raise CompdError(Problem(option, "is not understood", text, f"{count} numbers with commas, low before high"))
+        raise CompdError(
+            Problem(
+                where=option,
+                what="is not understood",
+                value=text,
+                allowed=f"{count} numbers with commas, low before high",
+            )
+        )
     return values

@@ -44,17 +44,19 @@ def record(
     """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs."""
     from compd.client import connect
     from compd.clock import MonotonicClock
-    from compd.live.recorder import Keeping, Recorder
+    from compd.live.record.recorder import Keeping, Recorder
 
-    keeping = Keeping(round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB),
-                      when_full is WhenFull.DROP_OLDEST)  # fmt: skip
+    keeping = Keeping(
+        round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB), when_full is WhenFull.DROP_OLDEST
+    )
     for_s = burst if burst is not None else seconds
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with connect(unix_address(address), max(_TIMEOUT_S, 3 / rate_hz)) as client:
         lines = client.readings(None if burst is not None else rate_hz)
         _, watch = next(lines)
-        recorder = Recorder(name, client.version, watch, keeping, lambda text: typer.echo(text, err=True),
-                            MonotonicClock())  # fmt: skip
+        recorder = Recorder(
+            name, client.version, watch, keeping, lambda text: typer.echo(text, err=True), MonotonicClock()
+        )
         recorder.start()
         try:
             recorder.follow(lines, for_s)

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from compd.configuration import Configuration
     from compd.errors import Problem
-    from compd.workbench.recording import Recording
+    from compd.recording.recording import Recording
 
 recording = typer.Typer(no_args_is_help=True, help="Recordings: readings of the machine beside a reference.")
 
@@ -45,7 +45,7 @@ def read_with_machine(
     None for an external model. Raises RecordingError with the problems of both files and of the machine together.
     """
     from compd.errors import RecordingError
-    from compd.workbench.reader import read_recording
+    from compd.recording.reader import read_recording
 
     problems: list[Problem] = []
     configuration = _configuration(path.with_suffix(".yaml"), machine, problems)
@@ -60,9 +60,9 @@ def read_with_machine(
 
 def _configuration(sidecar_path: Path, machine: Path | None, problems: list[Problem]) -> Configuration | None:
     from compd.configuration import load
+    from compd.configuration.shipped import shipped_configuration
     from compd.errors import CompdError, Problem
-    from compd.shipped import shipped_configuration
-    from compd.workbench.sidecar import EXTERNAL, read_sidecar
+    from compd.recording.sidecar import EXTERNAL, read_sidecar
 
     if machine is not None:
         return load(machine)
@@ -76,9 +76,13 @@ def _configuration(sidecar_path: Path, machine: Path | None, problems: list[Prob
         shipped = shipped_configuration(f"{name}.yaml")
     except CompdError:
         problems.append(
-            Problem(str(sidecar_path), "no configuration of this machine comes with compd", repr(sidecar.machine),
-                    next_step="give it with --machine PATH, or mend `machine:` in the sidecar")
-        )  # fmt: skip
+            Problem(
+                where=str(sidecar_path),
+                what="no configuration of this machine comes with compd",
+                value=repr(sidecar.machine),
+                next_step="give it with --machine PATH, or mend `machine:` in the sidecar",
+            )
+        )
         return None
     return load(shipped)
 

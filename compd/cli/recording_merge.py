@@ -21,11 +21,13 @@ def merge(
     """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
     from compd.cli.recording import read_with_machine
     from compd.errors import CompdError, Problem
-    from compd.workbench.merge import ASSUMED_GAP_S
-    from compd.workbench.merge import merge as put_together
+    from compd.recording.merge import ASSUMED_GAP_S
+    from compd.recording.merge import merge as put_together
 
     if len(recordings) < 2:
-        raise CompdError(Problem("compd recording merge", "needs two recordings or more", str(recordings[0])))
+        raise CompdError(
+            Problem(where="compd recording merge", what="needs two recordings or more", value=str(recordings[0]))
+        )
     problems: list[Problem] = []
     found = []
     for path in recordings:

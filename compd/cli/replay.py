@@ -22,14 +22,17 @@ def replay(
     Exit code 1 when one differs.
     """
     from compd.configuration import load
-    from compd.live.replay import ReplayedCycle, Transcripts
-    from compd.live.replay import replay as replay_cycles
+    from compd.live.record.replay import RecordedCycles, ReplayedCycle
+    from compd.live.record.replay import replay as replay_cycles
 
     configuration = load(machine)
-    transcripts = Transcripts(name)
+    transcripts = RecordedCycles(name)
     if others := transcripts.config_hashes() - {configuration.config_hash}:
-        typer.echo(f"warning: recorded with another configuration ({', '.join(sorted(others))}, this is "
-                   f"{configuration.config_hash}): setpoints may differ by that", err=True)  # fmt: skip
+        typer.echo(
+            f"warning: recorded with another configuration ({', '.join(sorted(others))}, this is "
+            f"{configuration.config_hash}): setpoints may differ by that",
+            err=True,
+        )
     cycles = differing = 0
     first: ReplayedCycle | None = None
     for cycle in replay_cycles(configuration, transcripts, model or ()):

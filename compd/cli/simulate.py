@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from compd.configuration import Configuration
-    from compd.simulation.server import Simulation
-    from compd.simulation.sizing import Sized
+    from compd.simulation.campaign.sizing import Sized
+    from compd.simulation.wires.server import Simulation
 
 LOOK_EVERY_S = 0.25
 SEALED = "hidden.answer.json"
@@ -62,21 +62,27 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
-    from compd.simulation.given_plan import read_plan
-    from compd.simulation.hidden import seal
-    from compd.simulation.mechanism import Mechanism
-    from compd.simulation.server import Simulation
-    from compd.simulation.strengths import SEEN
-    from compd.simulation.world import World
+    from compd.simulation.campaign.plan_reader import read_plan
+    from compd.simulation.causes.catalogue import seal
+    from compd.simulation.truth.mechanism import Mechanism
+    from compd.simulation.truth.strengths import SEEN
+    from compd.simulation.truth.world import World
+    from compd.simulation.wires.server import Simulation
 
     configuration = load(config)
     measured = [quantity.name for quantity in configuration.wiring.quantities]
     rows = () if plan is None else read_plan(plan, Mechanism(configuration.geometry), measured)
     hid = [_hidden(configuration, seed, number) for number in hidden or ()]
     world = World(
-        configuration.geometry, configuration.wiring, seed, speedup, zero_hold,
-        strengths=SEEN if hid else None, causes=[one.cause for one in hid], rows=rows,
-    )  # fmt: skip
+        configuration.geometry,
+        configuration.wiring,
+        seed,
+        speedup,
+        zero_hold,
+        strengths=SEEN if hid else None,
+        causes=[one.cause for one in hid],
+        rows=rows,
+    )
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -105,8 +111,8 @@ def simulate(
 
 
 def _hidden(configuration: Configuration, seed: int, number: int) -> Sized:
-    from compd.simulation.hidden import drawn
-    from compd.simulation.sizing import Sizing
+    from compd.simulation.campaign.sizing import Sizing
+    from compd.simulation.causes.catalogue import drawn
 
     sizing = Sizing(configuration.geometry, configuration.wiring, seed)
     return sizing.cause(drawn(number, sizing.mechanism))
@@ -164,7 +170,7 @@ def _status(simulation: Simulation) -> Text:
     """One line: what it does, where its tip is, how warm it is, how far its frame has moved."""
     from rich.text import Text
 
-    from compd.simulation.frame import DISTANCES
+    from compd.simulation.truth.frame import DISTANCES
 
     truth, sense = simulation.truth(), simulation.world.sense
     doing = {

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from compd.units import UM_PER_MM
+
 _ANSWER_TIMEOUT_S = 15.0
-_UM_PER_MM = 1e3
 # So long at rest, every gauge has been read anew.
 _REST_S = 0.5
 
@@ -26,12 +27,14 @@ def tracker(
     """
     import numpy as np
 
-    from compd.cli.demo_session import MachineController
     from compd.client import connect
+    from compd.demo.session import MachineController
     from compd.errors import CompdError, Problem
 
     if not out.parent.is_dir():
-        raise CompdError(Problem(str(out), "its directory does not exist", str(out.parent), next_step="make it"))
+        raise CompdError(
+            Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
+        )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     looks, apart_mm, at_rest = [], [], 0
     with (
@@ -51,14 +54,16 @@ def tracker(
         except KeyboardInterrupt:
             pass  # the usual end
     if not looks:
-        raise CompdError(Problem(str(out), "the tracker has not looked once", next_step="let it look for longer"))
+        raise CompdError(
+            Problem(where=str(out), what="the tracker has not looked once", next_step="let it look for longer")
+        )
     table = np.array(looks)
     table[:, 0] -= table[0, 0]
     lines = [",".join(f"{value:.6f}" for value in row) for row in table]
     out.write_text("\n".join(["time_s,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
     typer.echo(f"{len(looks)} looks in {table[-1, 0]:.0f} s")
     if apart_mm:
-        rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * _UM_PER_MM
+        rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * UM_PER_MM
         typer.echo(
             f"at rest the daemon's tip and the tracker's differ by {rms_um:.2f} um, rms per coordinate; "
             f"{seen['sigma_um']:g} um of it is the tracker's own noise"

@@ -14,8 +14,8 @@ from rich.text import Text
 
 from compd.cli.zero import unix_address
 from compd.client import DEFAULT_ADDRESS, Client, connect
+from compd.units import UM_PER_MM
 
-_MM_TO_UM = 1e3
 _BAR_WIDTH = 21  # odd: one cell is zero
 _STATUS_EVERY_S = 1.0
 _COLOURS = {"ok": "green", "slewing": "yellow", "hold": "yellow", "fade": "yellow", "clamped": "yellow"}
@@ -80,9 +80,11 @@ def _headline(version: dict[str, Any], setpoint: dict[str, Any]) -> Text:
     state = setpoint["state"]
     age = f", oldest gauge {setpoint['age_s'] * 1e3:.0f} ms" if "age_s" in setpoint else ""
     return Text.assemble(
-        (version["machine"], "bold"), "  ", (state.upper(), f"bold {_COLOURS.get(state, 'red')}"),
+        (version["machine"], "bold"),
+        "  ",
+        (state.upper(), f"bold {_COLOURS.get(state, 'red')}"),
         f"  {setpoint['mode']}, setpoint {setpoint['seq']}{age}",
-    )  # fmt: skip
+    )
 
 
 def _position(setpoint: dict[str, Any]) -> Table:
@@ -90,7 +92,7 @@ def _position(setpoint: dict[str, Any]) -> Table:
     tip = "tip_P_mm" if "tip_P_mm" in setpoint else "tip_M_mm"
     table.add_row(f"{tip.removesuffix('_mm')}, mm", *(f"{value:12.5f}" for value in setpoint[tip]))
     frame = setpoint["frame"]
-    table.add_row("frame moved, um", *(f"{value * _MM_TO_UM:12.2f}" for value in frame["displacement_M_mm"]))
+    table.add_row("frame moved, um", *(f"{value * UM_PER_MM:12.2f}" for value in frame["displacement_M_mm"]))
     table.add_row("frame turned, urad", *(f"{value * 1e6:12.2f}" for value in frame["rotation_M_rad"]))
     return table
 
@@ -98,16 +100,20 @@ def _position(setpoint: dict[str, Any]) -> Table:
 def _corrections(setpoint: dict[str, Any]) -> Table:
     sources = setpoint["sources_mm"]
     corrections = setpoint["correction_mm"]
-    table = Table("link", "length, mm", "correction, um", "", *(f"{name}, um" for name in sources),
-                  box=None, pad_edge=False)  # fmt: skip
+    table = Table(
+        "link", "length, mm", "correction, um", "", *(f"{name}, um" for name in sources), box=None, pad_edge=False
+    )
     for column in table.columns[:3] + table.columns[4:]:
         column.justify = "right"
     largest = max(map(abs, corrections))
     for i, correction in enumerate(corrections):
         table.add_row(
-            str(i + 1), f"{setpoint['link_length_mm'][i]:.5f}", f"{correction * _MM_TO_UM:+.2f}",
-            bar(correction, largest), *(f"{values[i] * _MM_TO_UM:+.2f}" for values in sources.values()),
-        )  # fmt: skip
+            str(i + 1),
+            f"{setpoint['link_length_mm'][i]:.5f}",
+            f"{correction * UM_PER_MM:+.2f}",
+            bar(correction, largest),
+            *(f"{values[i] * UM_PER_MM:+.2f}" for values in sources.values()),
+        )
     return table
 
 

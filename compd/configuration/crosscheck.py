@@ -42,18 +42,25 @@ def warnings(parts: Parts) -> list[Problem]:
     found: list[Problem] = []
     used = {options.line for options in parts.gauges.values()}
     found += [
-        Problem(parts.document.where(("lines", name)), "no gauge uses this line", next_step="remove it or wire a gauge")
+        Problem(
+            where=parts.document.where(("lines", name)),
+            what="no gauge uses this line",
+            next_step="remove it or wire a gauge",
+        )
         for name in parts.lines or {}
         if name not in used
     ]
     if parts.wiring is not None:
         wired = {reference.split(".")[0] for _, reference, _ in _references(parts.wiring)}
         found += [
-            Problem(parts.document.where(("gauges", name)), "polled but wired to nothing",
-                    next_step="name it under `wiring:` or remove it")
+            Problem(
+                where=parts.document.where(("gauges", name)),
+                what="polled but wired to nothing",
+                next_step="name it under `wiring:` or remove it",
+            )
             for name in parts.gauges
             if name not in wired
-        ]  # fmt: skip
+        ]
     return found
 
 
@@ -78,9 +85,12 @@ def _ports(parts: Parts) -> Iterator[Problem]:
                 port = f"{line.host}:{line.port}"
         if port in seen:
             yield Problem(
-                parts.document.where(("lines", name, "port")), f"line `{seen[port]}` has the same port", port,
-                "one line per port", "hang both gauges on one line",
-            )  # fmt: skip
+                where=parts.document.where(("lines", name, "port")),
+                what=f"line `{seen[port]}` has the same port",
+                value=port,
+                allowed="one line per port",
+                next_step="hang both gauges on one line",
+            )
         seen[port] = name
 
 
@@ -93,17 +103,20 @@ def _gauges_on_lines(parts: Parts) -> Iterator[Problem]:
         if line is None:
             if options.line not in (parts.document.data.get("lines") or {}):
                 yield Problem(
-                    parts.document.where(location), "no such line", options.line, ", ".join(parts.lines),
-                    "write the name of a line under `lines:`",
-                )  # fmt: skip
+                    where=parts.document.where(location),
+                    what="no such line",
+                    value=options.line,
+                    allowed=", ".join(parts.lines),
+                    next_step="write the name of a line under `lines:`",
+                )
             continue
         carries: Literal["bytes", "registers"] = "registers" if line.kind.startswith("modbus") else "bytes"
         if carries != parts.drivers[name].line_kind:
             yield Problem(
-                parts.document.where(location),
-                f"driver {options.driver} needs a line that carries {parts.drivers[name].line_kind}",
-                f"{options.line} (kind {line.kind})",
-                "kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
+                where=parts.document.where(location),
+                what=f"driver {options.driver} needs a line that carries {parts.drivers[name].line_kind}",
+                value=f"{options.line} (kind {line.kind})",
+                allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
 
 
@@ -124,21 +137,35 @@ def _channels(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
         where = parts.document.where(location)
         if name not in parts.gauges:
             if name not in written:  # a gauge with a problem of its own is reported there
-                yield Problem(where, "no such gauge", reference, ", ".join(written), "write a name under `gauges:`")
+                yield Problem(
+                    where=where,
+                    what="no such gauge",
+                    value=reference,
+                    allowed=", ".join(written),
+                    next_step="write a name under `gauges:`",
+                )
             continue
         channels = {c.name: c.unit for c in parts.drivers[name](parts.gauges[name]).channels}
         full = resolve(reference, parts.gauges, parts.drivers)
         if full is None:
             yield Problem(
-                where, f"gauge `{name}` has no such single channel", reference,
-                ", ".join(f"{name}.{channel}" for channel in channels), "write gauge.channel",
-            )  # fmt: skip
+                where=where,
+                what=f"gauge `{name}` has no such single channel",
+                value=reference,
+                allowed=", ".join(f"{name}.{channel}" for channel in channels),
+                next_step="write gauge.channel",
+            )
             continue
         delivers = channels[full.split(".")[1]]
         if delivers != unit:
-            yield Problem(where, f"needs a gauge in {unit}, this one delivers {delivers}", reference)
+            yield Problem(where=where, what=f"needs a gauge in {unit}, this one delivers {delivers}", value=reference)
         if full in seen:
-            yield Problem(where, f"wired already at {parts.document.where(seen[full])}", reference, "each channel once")
+            yield Problem(
+                where=where,
+                what=f"wired already at {parts.document.where(seen[full])}",
+                value=reference,
+                allowed="each channel once",
+            )
         seen[full] = location
 
 
@@ -148,13 +175,16 @@ def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
     for distance in DISTANCES:
         if counts[distance] != 1:
             yield Problem(
-                where(("wiring", "frame")), f"frame distance {distance} is wired {counts[distance]} times",
+                where=where(("wiring", "frame")),
+                what=f"frame distance {distance} is wired {counts[distance]} times",
                 allowed="t1..t3 and u1..u6, each exactly once",
-            )  # fmt: skip
+            )
     names = Counter(quantity.name for quantity in wiring.quantities)
     for name, count in names.items():
         if count > 1:
-            yield Problem(where(("wiring", "quantities")), f"{name} is wired {count} times", allowed="each name once")
+            yield Problem(
+                where=where(("wiring", "quantities")), what=f"{name} is wired {count} times", allowed="each name once"
+            )
     if parts.geometry is None:
         return
     links = parts.geometry.links
@@ -162,18 +192,20 @@ def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
     for link in sorted({*range(1, links + 1), *scales}):
         if scales[link] != (1 if link <= links else 0):
             yield Problem(
-                where(("wiring", "scale")), f"link {link} has {scales[link]} scales",
+                where=where(("wiring", "scale")),
+                what=f"link {link} has {scales[link]} scales",
                 allowed=f"links 1..{links}, each exactly one",
-            )  # fmt: skip
+            )
     by_link: dict[int, list[JointWire]] = defaultdict(list)
     for wire in wiring.joint:
         by_link[wire.link].append(wire)
     for link, wires in sorted(by_link.items()):
         roles = Counter(wire.role for wire in wires)
         if link > links:
-            yield Problem(where(("wiring", "joint")), f"there is no link {link}", allowed=f"1..{links}")
+            yield Problem(where=where(("wiring", "joint")), what=f"there is no link {link}", allowed=f"1..{links}")
         if max(roles.values()) > 1 or roles["Ra"] != roles["Rb"] or (roles["B"] and roles["Ra"]):
             yield Problem(
-                where(("wiring", "joint")), f"link {link} has comparators {', '.join(sorted(roles.elements()))}",
+                where=where(("wiring", "joint")),
+                what=f"link {link} has comparators {', '.join(sorted(roles.elements()))}",
                 allowed="at most one S, and either one B or Ra and Rb together",
-            )  # fmt: skip
+            )

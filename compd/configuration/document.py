@@ -19,10 +19,13 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag not in {
-        "tag:yaml.org,2002:bool", "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp"}]
+    first: [
+        (tag, pattern)
+        for tag, pattern in resolvers
+        if tag not in {"tag:yaml.org,2002:bool", "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp"}
+    ]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}  # fmt: skip
+}
 _Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|false|False)$"), list("tTfF"))
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
@@ -72,7 +75,7 @@ def read(path: Path) -> Document:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigurationError(
-            Problem(str(path), f"cannot be read: {error}", next_step="give the path of a configuration file")
+            Problem(where=str(path), what=f"cannot be read: {error}", next_step="give the path of a configuration file")
         ) from error
     loader = _Loader(text)
     try:
@@ -83,13 +86,16 @@ def read(path: Path) -> Document:
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ConfigurationError(
-            Problem(f"{path}:{line}", f"not YAML: {error.problem or error.context}",
-                    next_step="mend this line; indent with spaces, write `key: value`")
-        ) from error  # fmt: skip
+            Problem(
+                where=f"{path}:{line}",
+                what=f"not YAML: {error.problem or error.context}",
+                next_step="mend this line; indent with spaces, write `key: value`",
+            )
+        ) from error
     finally:
         loader.dispose()
     if not isinstance(data, dict):
-        raise ConfigurationError(Problem(str(path), "must hold `key: value` sections at its top"))
+        raise ConfigurationError(Problem(where=str(path), what="must hold `key: value` sections at its top"))
     if problems:
         raise ConfigurationError(problems)
     return Document(path, data, lines)
@@ -113,9 +119,12 @@ def _plain(
             line = key_node.start_mark.line + 1
             if key in result:
                 problems.append(
-                    Problem(f"{path}:{line} {dotted(here)}", f"said twice, first in line {lines[here]}",
-                            next_step="keep one of them")
-                )  # fmt: skip
+                    Problem(
+                        where=f"{path}:{line} {dotted(here)}",
+                        what=f"said twice, first in line {lines[here]}",
+                        next_step="keep one of them",
+                    )
+                )
             lines[here] = line
             result[key] = _plain(loader, value_node, here, lines, problems, path)
         return result

@@ -82,7 +82,7 @@ class MovingPlatform(Section):
     weight_at_P_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="where the weight acts, in {P}")
 
 
-class ToolOnPlatform(Section):
+class ToolOnPlatformSettings(Section):
     """The usual arrangement: the tool moves, the work lies on the surface plate."""
 
     on: Literal["platform"]
@@ -93,7 +93,7 @@ class ToolOnPlatform(Section):
     )
 
 
-class ToolOnPlate(Section):
+class ToolOnPlateSettings(Section):
     """Figure 15 of the paper: the tool stands on the surface plate, the work moves."""
 
     on: Literal["plate"]
@@ -110,7 +110,7 @@ class Geometry(Section):
     kinematics: Literal["tripod_3spr", "hexapod_6ups"]
     base: BasePlatform
     platform: MovingPlatform
-    tool: Annotated[ToolOnPlatform | ToolOnPlate, Field(discriminator="on")]
+    tool: Annotated[ToolOnPlatformSettings | ToolOnPlateSettings, Field(discriminator="on")]
     plate_points_M_mm: tuple[Vector, Vector, Vector] = Field(description="reference points m1, m2, m3, in {M}")
     link_length_mm: tuple[Positive, Positive] | None = Field(
         default=None, description="shortest and longest length of a link, joint to joint; a target beyond is refused"

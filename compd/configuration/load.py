@@ -17,7 +17,7 @@ from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings
-from compd.configuration.operation import Limits, Loop, Sockets, State, Wiring
+from compd.configuration.operation import LimitSettings, LoopSettings, SocketSettings, StateSettings, Wiring
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
@@ -28,10 +28,10 @@ SECTIONS: Mapping[str, Any] = {
     "geometry": Geometry,
     "lines": dict[str, LineSettings],
     "wiring": Wiring,
-    "loop": Loop,
-    "limits": Limits,
-    "sockets": Sockets,
-    "state": State,
+    "loop": LoopSettings,
+    "limits": LimitSettings,
+    "sockets": SocketSettings,
+    "state": StateSettings,
 }
 
 
@@ -46,10 +46,10 @@ class Configuration:
     gauges: Mapping[str, GaugeOptions]
     drivers: Mapping[str, type[Gauge[Any]]]
     wiring: Wiring
-    loop: Loop
-    limits: Limits
-    sockets: Sockets
-    state: State
+    loop: LoopSettings
+    limits: LimitSettings
+    sockets: SocketSettings
+    state: StateSettings
     warnings: tuple[Problem, ...] = ()
 
     def gauge_objects(self) -> dict[str, Gauge[Any]]:
@@ -84,7 +84,7 @@ def load(path: Path) -> Configuration:
     found: dict[str, Any] = {}
     for name, kind in SECTIONS.items():
         if name not in document.data:
-            problems.append(Problem(str(path), f"section `{name}` is missing", next_step=f"add `{name}:`"))
+            problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
             continue
         try:
             found[name] = TypeAdapter(kind).validate_python(document.data[name])
@@ -104,14 +104,25 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
     drivers: dict[str, type[Gauge[Any]]] = {}
     section = document.data.get("gauges")
     if not isinstance(section, dict) or not section:
-        problems.append(Problem(document.where(("gauges",)), "section `gauges` is missing or empty",
-                                next_step="add `gauges:` with one entry per device"))  # fmt: skip
+        problems.append(
+            Problem(
+                where=document.where(("gauges",)),
+                what="section `gauges` is missing or empty",
+                next_step="add `gauges:` with one entry per device",
+            )
+        )
         return gauges, drivers
     for name, raw in section.items():
         location: Location = ("gauges", name)
         if not isinstance(raw, dict) or not isinstance(raw.get("driver"), str):
-            problems.append(Problem(document.where(location), "needs `driver:`", str(raw),
-                                    next_step="`compd check --drivers` lists them"))  # fmt: skip
+            problems.append(
+                Problem(
+                    where=document.where(location),
+                    what="needs `driver:`",
+                    value=str(raw),
+                    next_step="`compd check --drivers` lists them",
+                )
+            )
             continue
         try:
             driver = load_plugin(GAUGES, raw["driver"], document.where((*location, "driver")))
@@ -133,7 +144,7 @@ def _problem(document: Document, root: Location, kind: Any, detail: ErrorDetails
     if detail["type"] == "extra_forbidden":
         return _unknown(document, location, _keys_beside(kind, detail["loc"]))
     if detail["type"] == "missing":
-        return Problem(document.where(location), "is missing", next_step=f"add `{location[-1]}:`")
+        return Problem(where=document.where(location), what="is missing", next_step=f"add `{location[-1]}:`")
     allowed = {
         "literal_error": str(context.get("expected", "")),
         "union_tag_invalid": str(context.get("expected_tags", "")),
@@ -147,7 +158,7 @@ def _problem(document: Document, root: Location, kind: Any, detail: ErrorDetails
     message = detail["msg"].removeprefix("Value error, ")
     value = document.value(location)
     shown = "" if isinstance(value, dict | list) and len(str(value)) > 80 else repr(value)
-    return Problem(document.where(location), message, shown, allowed)
+    return Problem(where=document.where(location), what=message, value=shown, allowed=allowed)
 
 
 def _in_file(document: Document, root: Location, loc: Location) -> Location:
@@ -164,9 +175,12 @@ def _in_file(document: Document, root: Location, loc: Location) -> Location:
 def _unknown(document: Document, location: Location, allowed: list[str]) -> Problem:
     close = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
     return Problem(
-        document.where(location), "unknown key", repr(document.value(location)), ", ".join(allowed),
-        f"did you mean `{close[0]}`?" if close else "remove it",
-    )  # fmt: skip
+        where=document.where(location),
+        what="unknown key",
+        value=repr(document.value(location)),
+        allowed=", ".join(allowed),
+        next_step=f"did you mean `{close[0]}`?" if close else "remove it",
+    )
 
 
 def _keys_beside(kind: Any, loc: Location) -> list[str]:

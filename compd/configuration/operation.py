@@ -60,7 +60,7 @@ class Wiring(Section):
     quantities: tuple[QuantityWire, ...] = ()
 
 
-class Loop(Section):
+class LoopSettings(Section):
     """The compute loop."""
 
     rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)]
@@ -74,7 +74,7 @@ class Loop(Section):
     lock_memory: bool = Field(default=True, description="mlockall, where permitted")
 
 
-class Limits(Section):
+class LimitSettings(Section):
     """What a correction may be: per link."""
 
     correction_mm: Positive = Field(description="largest correction of one link")
@@ -111,7 +111,7 @@ class UdpTarget(Section):
     port: Annotated[int, Field(ge=1, le=65535)]
 
 
-class Sockets(Section):
+class SocketSettings(Section):
     """Where clients connect."""
 
     tcp: TcpSocket | None = None
@@ -120,7 +120,7 @@ class Sockets(Section):
     valid_for_s: Positive = Field(description="how long a setpoint may be used: valid_until = time + this")
 
 
-class State(Section):
+class StateSettings(Section):
     """What the daemon keeps across restarts, and what it starts with."""
 
     directory: str = Field(pattern=r"^/", description="absolute directory for machine zero")

@@ -101,11 +101,8 @@ class RtuMaster:
     def _may_extend(self, block: tuple[int, int, int, int]) -> bool:
         _, _, address, count = block
         return (
-            self._alternate
-            and count < MOST_REGISTERS
-            and address + count < 0x10000
-            and block not in self._ends_there
-        )  # fmt: skip
+            self._alternate and count < MOST_REGISTERS and address + count < 0x10000 and block not in self._ends_there
+        )
 
     def _transact(self, unit: int, function: int, address: int, count: int) -> tuple[float, int, tuple[int, ...]]:
         """Time of asking (s), exception code or 0, registers."""

@@ -53,9 +53,15 @@ class SerialPort:
         is_device = "://" not in port
         try:
             self._port = serial.serial_for_url(
-                port, baudrate=baud, bytesize=data_bits, parity=parity, stopbits=stop_bits,
-                timeout=SLICE_S, write_timeout=write_timeout_s, exclusive=True if is_device else None,
-            )  # fmt: skip
+                port,
+                baudrate=baud,
+                bytesize=data_bits,
+                parity=parity,
+                stopbits=stop_bits,
+                timeout=SLICE_S,
+                write_timeout=write_timeout_s,
+                exclusive=True if is_device else None,
+            )
         except (*PORT_FAULTS, ValueError) as error:
             raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error}") from error
         # Behind a URL the baud rate is the device server's affair.

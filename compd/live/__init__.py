@@ -1,0 +1,1 @@
+"""The daemon: gauges are read, setpoints computed at a fixed rate, clients served, runs recorded."""

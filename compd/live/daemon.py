@@ -13,22 +13,23 @@ from compd import __version__
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
-from compd.live.acquisition import Acquisition
-from compd.live.adopting import ModelAdopter
-from compd.live.chain import build_chain
-from compd.live.directions import Directions
-from compd.live.loop import Loop, Orders
-from compd.live.models import Models, ModelShelf
-from compd.live.notify import Notifier
-from compd.live.packets import PacketSender
-from compd.live.protocol import PROTOCOL, TargetKeys
-from compd.live.publisher import Publisher
-from compd.live.requests import Requests
-from compd.live.setpoint import Setpoint, State
-from compd.live.status import StatusReport
-from compd.live.transcript import Transcript
-from compd.live.zero import MachineZero, load_zero
-from compd.live.zero_taking import ZeroTaker
+from compd.live.acquisition.acquisition import Acquisition
+from compd.live.loop.commands import Commands
+from compd.live.loop.directions import Directions
+from compd.live.loop.loop import Loop
+from compd.live.loop.machine_zero import MachineZero, load_zero
+from compd.live.loop.model_loader import ModelLoader, Models
+from compd.live.loop.setpoint import Setpoint, State
+from compd.live.pipeline import build_pipeline
+from compd.live.service.messages import PROTOCOL, TargetKeys
+from compd.live.service.model_switch import ModelSwitch
+from compd.live.service.publisher import Publisher
+from compd.live.service.readings_message import ReadingsMessage
+from compd.live.service.requests import Requests
+from compd.live.service.status_message import StatusReport
+from compd.live.service.udp_sender import UdpSender
+from compd.live.service.zero_capture import ZeroCapture
+from compd.live.systemd import Notifier
 
 # How soon the daemon notices that one of its threads has ended.
 _LOOK_EVERY_S = 0.5
@@ -46,9 +47,9 @@ class Daemon:
         self.configuration = configuration
         self._notifier = notifier or Notifier.from_environment()
         gauges = configuration.gauge_objects()
-        self.latest, self._wires, cycle, shelf = build_chain(configuration, gauges)
-        self.orders = Orders(self._zero_on_disk(), models=_first_models(configuration, shelf))
-        self._model_adopter = ModelAdopter(shelf, self.orders)
+        self.latest, self._wires, cycle, shelf = build_pipeline(configuration, gauges)
+        self.orders = Commands(self._zero_on_disk(), models=_first_models(configuration, shelf))
+        self._model_adopter = ModelSwitch(shelf, self.orders)
         by_line = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
@@ -57,12 +58,12 @@ class Daemon:
         period_s = 1.0 / configuration.loop.rate_hz
         self.publisher = Publisher(configuration.sockets, period_s, self._note_state)
         udp = configuration.sockets.udp
-        self._packets = PacketSender(udp, configuration.config_hash) if udp is not None else None
+        self._packets = UdpSender(udp, configuration.config_hash) if udp is not None else None
         directions = Directions(self._wires.scale.wires)
         packets = [] if self._packets is None else [self._packets.deliver]
         outlets = [*packets, directions.saw, self.publisher.deliver]
         self.loop = Loop(configuration.loop, cycle, self.latest, self.orders, outlets, self._notifier, clock)
-        self._zero_taker = ZeroTaker(
+        self._zero_taker = ZeroCapture(
             self._wires, self.latest, self.orders, _directory(configuration), configuration.zero_hash, clock
         )
         version: dict[str, Any] = {
@@ -74,17 +75,30 @@ class Daemon:
             "links": configuration.geometry.links,
         }
         report = StatusReport(
-            version, configuration, self.latest, self._wires, self.orders, self.loop, self.publisher, self._packets,
-            self.acquisition.status, clock,
-        )  # fmt: skip
+            version,
+            configuration,
+            self.latest,
+            self._wires,
+            self.orders,
+            self.loop,
+            self.publisher,
+            self._packets,
+            self.acquisition.status,
+            clock,
+        )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
             rotation=configuration.geometry.kinematics == "hexapod_6ups",
         )
         self._requests = Requests(
-            version, keys, self.orders, report.message, self._zero_taker.take,
-            Transcript(self._wires, self.latest.channels, directions), self._model_adopter.take,
-        )  # fmt: skip
+            version,
+            keys,
+            self.orders,
+            report.message,
+            self._zero_taker.take,
+            ReadingsMessage(self._wires, self.latest.channels, directions),
+            self._model_adopter.take,
+        )
         self._state: State | None = None
 
     def start(self) -> None:
@@ -146,9 +160,14 @@ def run(configuration: Configuration) -> bool:
         _log.warning("configuration", where=warning.where, what=warning.what)
     daemon = Daemon(configuration)
     daemon.start()
-    _log.info("running", machine=configuration.machine, config_hash=configuration.config_hash,
-              rate_hz=configuration.loop.rate_hz, unix=configuration.sockets.unix.path,
-              tcp_port=daemon.publisher.tcp_port)  # fmt: skip
+    _log.info(
+        "running",
+        machine=configuration.machine,
+        config_hash=configuration.config_hash,
+        rate_hz=configuration.loop.rate_hz,
+        unix=configuration.sockets.unix.path,
+        tcp_port=daemon.publisher.tcp_port,
+    )
     received = None
     while received is None and daemon.healthy:
         received = signal.sigtimedwait(signals, _LOOK_EVERY_S)
@@ -163,7 +182,7 @@ def run(configuration: Configuration) -> bool:
     return not healthy
 
 
-def _first_models(configuration: Configuration, shelf: ModelShelf) -> Models:
+def _first_models(configuration: Configuration, shelf: ModelLoader) -> Models:
     """Those of the configuration. Raises CompdError for a model file that cannot be used: it was asked for."""
     file = configuration.state.model_file
     if file is None:

@@ -15,13 +15,13 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from compd.arrays import FloatArray
 from compd.errors import Problem
-from compd.model.jit import Floats
-from compd.model.rows import Rows
+from compd.model.observations import Observations
 
 Port: TypeAlias = Literal[
     "scale", "joint", "frame", "link", "base_joint", "platform_joint", "revolute_axis", "plate", "tool", "reference"
-]  # fmt: skip
+]
 PORTS: dict[Port, str] = {
     "scale": "reading of each linear scale, mm (n)",
     "joint": "reading of each joint comparator, mm (k)",
@@ -40,8 +40,8 @@ Per: TypeAlias = Literal["machine", "link", "axis", "link_axis"]
 
 Shape: TypeAlias = Mapping[str, float]
 # What an effect remembers from row to row; None at the start. Only the effect knows what is in it.
-Memory: TypeAlias = tuple[Floats, ...] | None
-Basis: TypeAlias = Callable[[Rows, Shape, Memory], tuple[Floats, Memory]]
+Memory: TypeAlias = tuple[FloatArray, ...] | None
+Basis: TypeAlias = Callable[[Observations, Shape, Memory], tuple[FloatArray, Memory]]
 
 _WORDS = {
     "force": ("force_x_N", "force_y_N", "force_z_N"),
@@ -173,7 +173,7 @@ class Effect:
             for suffix in parameter.suffixes(links)
         ]
 
-    def shapes(self, rows: Rows) -> list[dict[str, float]]:
+    def shapes(self, rows: Observations) -> list[dict[str, float]]:
         """Every combination of shape constants to try on these rows; one, maybe empty, where nothing is searched."""
         found: list[dict[str, float]] = [{}]
         for constant in self.constants:
@@ -184,32 +184,40 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedEffect:
     """An effect with its numbers: what a machine model carries.
 
     theta : (P,), in the order of `effect.columns`.  covariance : (P, P), nan where it is not known.
     """
 
     effect: Effect
-    theta: Floats
+    theta: FloatArray
     shape: Shape = field(default_factory=dict)
-    covariance: Floats = field(default_factory=lambda: np.full((1, 1), np.nan))
+    covariance: FloatArray = field(default_factory=lambda: np.full((1, 1), np.nan))
 
 
-Deltas: TypeAlias = dict[Port, Floats]
+Deltas: TypeAlias = dict[Port, FloatArray]
 Memories: TypeAlias = Mapping[str, Memory]
 
 
-def port_size(port: Port, rows: Rows) -> int:
+def port_size(port: Port, rows: Observations) -> int:
     """How many numbers a port takes on this machine."""
     n = rows.links
     return {
-        "scale": n, "joint": int(rows.joint_mm.shape[1]), "frame": 9, "link": n, "base_joint": 3 * n,
-        "platform_joint": 3 * n, "revolute_axis": 3 * len(rows.revolute_axes_P), "plate": 9, "tool": 3, "reference": 6,
-    }[port]  # fmt: skip
+        "scale": n,
+        "joint": int(rows.joint_mm.shape[1]),
+        "frame": 9,
+        "link": n,
+        "base_joint": 3 * n,
+        "platform_joint": 3 * n,
+        "revolute_axis": 3 * len(rows.revolute_axes_P),
+        "plate": 9,
+        "tool": 3,
+        "reference": 6,
+    }[port]
 
 
-def by_port(effect: Effect, rows: Rows, values: NDArray[np.float64]) -> Deltas:
+def by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> Deltas:
     """Split axis 1 of (N, sum of sizes, ...) into the effect's ports."""
     if len(effect.ports) == 1:
         return {effect.ports[0]: values}
@@ -217,7 +225,7 @@ def by_port(effect: Effect, rows: Rows, values: NDArray[np.float64]) -> Deltas:
     return dict(zip(effect.ports, np.split(values, ends, axis=1), strict=True))
 
 
-def delta(fitted: Fitted, rows: Rows, memory: Memory = None) -> tuple[Deltas, Memory]:
+def delta(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
     """What one effect adds at its ports: (N, size) each, in mm (rad for directions); and its memory after."""
     basis, memory = fitted.effect.basis(rows, fitted.shape, memory)
     # summed column by column: a matrix product may add up differently for one row than for many
@@ -227,7 +235,9 @@ def delta(fitted: Fitted, rows: Rows, memory: Memory = None) -> tuple[Deltas, Me
     return by_port(fitted.effect, rows, total), memory
 
 
-def deltas(fitted: Sequence[Fitted], rows: Rows, memories: Memories) -> tuple[dict[str, Deltas], dict[str, Memory]]:
+def deltas(
+    fitted: Sequence[FittedEffect], rows: Observations, memories: Memories
+) -> tuple[dict[str, Deltas], dict[str, Memory]]:
     """What each effect adds, by id, and all memories after. Start with no memories: {}."""
     found: dict[str, Deltas] = {}
     after: dict[str, Memory] = {}
@@ -265,39 +275,53 @@ def missing(effect: Effect, available: Collection[str], links: int) -> list[Prob
         (`Rows.available`, or `settings` beside the wiring's quantities).
     """
     problems = [
-        Problem(f"effect {effect.id}", f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name))
+        Problem(
+            where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
+        )
         for name in quantities(effect, links)
         if name not in available
     ]
     problems += [
-        Problem(f"effect {effect.id}", f"needs {need}, which this machine does not have", next_step=_SETTINGS[need])
+        Problem(
+            where=f"effect {effect.id}",
+            what=f"needs {need}, which this machine does not have",
+            next_step=_SETTINGS[need],
+        )
         for need in effect.needs
         if need in _SETTINGS and need not in available
     ]
     if effect.live and not links:
         problems.append(
-            Problem(f"effect {effect.id}", f"acts at the port {effect.port}, which an external model has not",
-                    allowed="effects at the port `reference`", next_step="write a machine configuration")
-        )  # fmt: skip
+            Problem(
+                where=f"effect {effect.id}",
+                what=f"acts at the port {effect.port}, which an external model has not",
+                allowed="effects at the port `reference`",
+                next_step="write a machine configuration",
+            )
+        )
     return problems
 
 
 def _gauge_to_add(name: str) -> str:
     kind = re.split(r"_", name, maxsplit=1)[0]
-    gauge = {"temperature": "a thermometer", "force": "a force gauge", "pressure": "a barometer",
-             "humidity": "a hygrometer"}.get(kind, "a gauge")  # fmt: skip
+    gauge = {
+        "temperature": "a thermometer",
+        "force": "a force gauge",
+        "pressure": "a barometer",
+        "humidity": "a hygrometer",
+    }.get(kind, "a gauge")
     return f"wire {gauge} under `wiring: quantities:` as `name: {name}`, or record a column of that name"
 
 
-def memoryless(columns: Callable[[Rows, Shape], Floats]) -> Basis:
+def memoryless(columns: Callable[[Observations, Shape], FloatArray]) -> Basis:
     """A basis whose rows stand alone."""
 
-    def basis(rows: Rows, shape: Shape, memory: Memory) -> tuple[Floats, Memory]:
+    def basis(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
         return columns(rows, shape), memory
 
     return basis
 
 
-def one_per_link(values: Floats) -> Floats:
+def one_per_link(values: FloatArray) -> FloatArray:
     """(N, n) values, each link with a parameter of its own -> (N, n, n)."""
     return np.asarray(values[:, :, None] * np.eye(values.shape[1]))

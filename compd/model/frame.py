@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compd.model.jit import MATRIX, VECTOR, Floats, Ints, kernel
-from compd.model.octahedron import edges, octahedron, place_base
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.jit import MATRIX, VECTOR, kernel
+from compd.model.kernels.octahedron import edges, octahedron, place_base
 from compd.model.transform import to_inner, to_outer
 
 
@@ -23,12 +24,12 @@ class FrameGeometry(NamedTuple):
     zero_origin_M_mm : (..., 3), zero_rotation_M_B : (..., 3, 3): {B0} in {M}.
     """
 
-    plate_points_M_mm: Floats
-    joint_offsets_B_mm: Floats
-    support_of_joint: Ints
-    zero_supports_M_mm: Floats
-    zero_origin_M_mm: Floats
-    zero_rotation_M_B: Floats
+    plate_points_M_mm: FloatArray
+    joint_offsets_B_mm: FloatArray
+    support_of_joint: IntArray
+    zero_supports_M_mm: FloatArray
+    zero_origin_M_mm: FloatArray
+    zero_rotation_M_B: FloatArray
 
 
 class Frame(NamedTuple):
@@ -42,15 +43,15 @@ class Frame(NamedTuple):
     iterations, residual_mm, reason : (...); where reason is not OK every number is nan.
     """
 
-    supports_M_mm: Floats
-    origin_M_mm: Floats
-    rotation_M_B: Floats
-    base_joints_M_mm: Floats
-    displacement_M_mm: Floats
-    rotation_M_rad: Floats
-    iterations: Ints
-    residual_mm: Floats
-    reason: Ints
+    supports_M_mm: FloatArray
+    origin_M_mm: FloatArray
+    rotation_M_B: FloatArray
+    base_joints_M_mm: FloatArray
+    displacement_M_mm: FloatArray
+    rotation_M_rad: FloatArray
+    iterations: IntArray
+    residual_mm: FloatArray
+    reason: IntArray
 
 
 def solve_frame(
@@ -71,7 +72,7 @@ def solve_frame(
 
 
 @kernel([MATRIX, VECTOR, MATRIX], "(d,d)->(d),(d,d)")
-def base_pose(supports_M: Floats, origin_M: Floats, R: Floats) -> None:
+def base_pose(supports_M: FloatArray, origin_M: FloatArray, R: FloatArray) -> None:
     """Supports b1..b3 (..., 3, 3) -> origin (..., 3) and axes (..., 3, 3) of {B} in {M}.
 
     Origin in the centroid, z_B along (b2-b1) x (b3-b1), y_B from the origin to b1, x_B = y_B x z_B.
@@ -81,7 +82,7 @@ def base_pose(supports_M: Floats, origin_M: Floats, R: Floats) -> None:
         R[:, :] = math.nan
 
 
-def distances_mm(supports_M_mm: ArrayLike, plate_points_M_mm: ArrayLike) -> tuple[Floats, Floats]:
+def distances_mm(supports_M_mm: ArrayLike, plate_points_M_mm: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """The nine distances between reference points, equation (3), and their derivatives.
 
     supports_M_mm, plate_points_M_mm : (..., 3, 3), b1..b3 and m1..m3 in {M}.
@@ -95,14 +96,16 @@ def distances_mm(supports_M_mm: ArrayLike, plate_points_M_mm: ArrayLike) -> tupl
 
 
 @kernel([MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], "(s,d),(s,d),(l)->(l),(l,l)")
-def _distances(supports_M: Floats, plate_points_M: Floats, nine: Floats, lengths_mm: Floats, J: Floats) -> None:
+def _distances(
+    supports_M: FloatArray, plate_points_M: FloatArray, nine: FloatArray, lengths_mm: FloatArray, J: FloatArray
+) -> None:
     """`nine` says nothing but how long the result is: a gufunc takes its sizes from what goes in."""
     if not edges(supports_M, plate_points_M, lengths_mm, J):
         lengths_mm[:] = math.nan
         J[:, :] = math.nan
 
 
-def target_now(geometry: FrameGeometry, frame: Frame, target_B0_mm: ArrayLike) -> Floats:
+def target_now(geometry: FrameGeometry, frame: Frame, target_B0_mm: ArrayLike) -> FloatArray:
     """Equation (8): the target (..., 3) of {B0} in today's {B}, in mm; it keeps its place on the surface plate.
 
     target_B = T_M_B^-1 T_M_B0 target_B0; nan where the frame is.
@@ -111,7 +114,7 @@ def target_now(geometry: FrameGeometry, frame: Frame, target_B0_mm: ArrayLike) -
     return np.asarray(to_inner(frame.rotation_M_B, frame.origin_M_mm, target_M_mm))
 
 
-def tip_at_zero(geometry: FrameGeometry, frame: Frame, tip_B_mm: ArrayLike) -> Floats:
+def tip_at_zero(geometry: FrameGeometry, frame: Frame, tip_B_mm: ArrayLike) -> FloatArray:
     """Equation (9): the tip (..., 3) of today's {B} in {B0}, in mm; nan where the frame is.
 
     tip_B0 = T_M_B0^-1 T_M_B tip_B.

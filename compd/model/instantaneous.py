@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from compd.arrays import FloatArray
 from compd.errors import KinematicsError, Problem
 from compd.model.frame import Frame, FrameGeometry, distances_mm
-from compd.model.jit import Floats
-from compd.model.reason import AMPLIFICATION_LIMIT
+from compd.model.solve_status import AMPLIFICATION_LIMIT
 
 
 class InstantaneousFrame(NamedTuple):
@@ -23,9 +23,9 @@ class InstantaneousFrame(NamedTuple):
     rotation_M_rad : (..., 3), of {B} since machine zero, about {M}'s axes.
     """
 
-    supports_M_mm: Floats
-    displacement_M_mm: Floats
-    rotation_M_rad: Floats
+    supports_M_mm: FloatArray
+    displacement_M_mm: FloatArray
+    rotation_M_rad: FloatArray
 
 
 class FrameDifference(NamedTuple):
@@ -34,12 +34,12 @@ class FrameDifference(NamedTuple):
     supports_mm : (...), of the support that differs most.  origin_mm, rotation_rad : (...).
     """
 
-    supports_mm: Floats
-    origin_mm: Floats
-    rotation_rad: Floats
+    supports_mm: FloatArray
+    origin_mm: FloatArray
+    rotation_rad: FloatArray
 
 
-def inverse_frame_jacobian(geometry: FrameGeometry) -> Floats:
+def inverse_frame_jacobian(geometry: FrameGeometry) -> FloatArray:
     """J^-1 of equation (5) at machine zero, (9, 9): d (b1, b2, b3) / d (t1..t3, u1..u6), pure numbers.
 
     The paper's J has six columns, for a base platform that is rigid; with nine the shape may change as well.
@@ -49,14 +49,18 @@ def inverse_frame_jacobian(geometry: FrameGeometry) -> Floats:
     smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
     if not smallest * AMPLIFICATION_LIMIT > 1.0:
         raise KinematicsError(
-            Problem("frame at machine zero", "the nine distances do not fix the supports",
-                    f"smallest singular value {smallest:.3g}", f"more than {1.0 / AMPLIFICATION_LIMIT:g}",
-                    "check supports and plate points")
-        )  # fmt: skip
+            Problem(
+                where="frame at machine zero",
+                what="the nine distances do not fix the supports",
+                value=f"smallest singular value {smallest:.3g}",
+                allowed=f"more than {1.0 / AMPLIFICATION_LIMIT:g}",
+                next_step="check supports and plate points",
+            )
+        )
     return np.asarray(np.linalg.inv(J), dtype=np.float64)
 
 
-def base_pose_jacobian(geometry: FrameGeometry) -> Floats:
+def base_pose_jacobian(geometry: FrameGeometry) -> FloatArray:
     """d (displacement, rotation vector) / d (b1, b2, b3) of {B} at machine zero, (6, 9); rows 3..5 in rad/mm."""
     b1, b2, b3 = geometry.zero_supports_M_mm
     axes = geometry.zero_rotation_M_B
@@ -89,7 +93,7 @@ def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> Insta
 def difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
     """How far the two ways of the paper differ, row by row; nan where the exact one failed."""
 
-    def length(vector: Floats) -> Floats:
+    def length(vector: FloatArray) -> FloatArray:
         return np.asarray(np.sqrt((vector * vector).sum(-1)))
 
     return FrameDifference(

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from compd.model.closure import closure
-from compd.model.forward import forward
-from compd.model.inverse import inverse
-from compd.model.jit import Floats, Ints
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.closure import closure
+from compd.model.kernels.forward import forward
+from compd.model.kernels.inverse import inverse
 
 
 class Mechanism(NamedTuple):
@@ -27,9 +27,9 @@ class Mechanism(NamedTuple):
     revolute_axes_P : (..., k, 3), along the revolute axis of link i; k = 3 for the tripod, 0 for the hexapod.
     """
 
-    base_joints_M_mm: Floats
-    platform_joints_P_mm: Floats
-    revolute_axes_P: Floats
+    base_joints_M_mm: FloatArray
+    platform_joints_P_mm: FloatArray
+    revolute_axes_P: FloatArray
 
 
 class Pose(NamedTuple):
@@ -41,12 +41,12 @@ class Pose(NamedTuple):
     reason : (...), a Reason; where it is not OK everything else is nan.
     """
 
-    origin_M_mm: Floats
-    rotation_M_P: Floats
-    link_length_mm: Floats
-    iterations: Ints
-    residual_mm: Floats
-    reason: Ints
+    origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    link_length_mm: FloatArray
+    iterations: IntArray
+    residual_mm: FloatArray
+    reason: IntArray
 
 
 class Closure(NamedTuple):
@@ -59,13 +59,13 @@ class Closure(NamedTuple):
     reason : (...), a Reason; where it is not OK everything else is nan.
     """
 
-    length_mm: Floats
-    length_by_displacement: Floats
-    length_by_rotation_mm: Floats
-    offset_mm: Floats
-    offset_by_displacement: Floats
-    offset_by_rotation_mm: Floats
-    reason: Ints
+    length_mm: FloatArray
+    length_by_displacement: FloatArray
+    length_by_rotation_mm: FloatArray
+    offset_mm: FloatArray
+    offset_by_displacement: FloatArray
+    offset_by_rotation_mm: FloatArray
+    reason: IntArray
 
 
 def checked(mechanism: Mechanism) -> Mechanism:

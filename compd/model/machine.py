@@ -9,15 +9,15 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
-from compd.model.arrangement import Arrangement, Contact
-from compd.model.effect import Fitted
+from compd.model.effect import FittedEffect
 from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_frame
-from compd.model.jit import Floats, Ints
+from compd.model.kernels.rotation import compose
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
-from compd.model.reason import require
-from compd.model.rotation import compose
-from compd.model.rows import Constants
+from compd.model.observations import Constants
+from compd.model.solve_status import require
+from compd.model.tool import Arrangement, Contact
 from compd.model.transform import to_inner
 
 
@@ -29,12 +29,12 @@ class AtZero(NamedTuple):
     link_length_mm : (n,), l0.  distances_mm : (9,), t0_1..t0_3, u0_1..u0_6.
     """
 
-    base_joints_M_mm: Floats
-    platform_origin_M_mm: Floats
-    rotation_M_P: Floats
+    base_joints_M_mm: FloatArray
+    platform_origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
     contact: Contact
-    link_length_mm: Floats
-    distances_mm: Floats
+    link_length_mm: FloatArray
+    distances_mm: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,22 +43,22 @@ class MachineModel:
 
     frame : supports, plate points, base joints.  platform_joints_P_mm : (n, 3).
     revolute_axes_P : (3, 3) unit vectors for the tripod, (0, 3) for the hexapod.
-    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.links`.
+    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.joint_correction`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
     constants : what effects ask of the description beyond the kinematics; None where nothing was given.
     """
 
     frame: FrameGeometry
-    platform_joints_P_mm: Floats
-    revolute_axes_P: Floats
+    platform_joints_P_mm: FloatArray
+    revolute_axes_P: FloatArray
     arrangement: Arrangement
-    joint_weights: Floats
+    joint_weights: FloatArray
     weight_N: float
-    weight_at_P_mm: Floats
+    weight_at_P_mm: FloatArray
     zero: AtZero
-    effects: tuple[Fitted, ...] = ()
-    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    effects: tuple[FittedEffect, ...] = ()
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     constants: Constants | None = None
 
     @property
@@ -72,7 +72,7 @@ class MachineModel:
         return len(self.revolute_axes_P) == 0
 
     @cached_property
-    def acting(self) -> tuple[Fitted, ...]:
+    def acting(self) -> tuple[FittedEffect, ...]:
         """The effects that belong to the machine; those at the reference instrument never act on it."""
         return tuple(one for one in self.effects if one.effect.live)
 
@@ -85,7 +85,7 @@ class MachineModel:
         """The same machine with its effects counting `weight`, 0 to 1."""
         return replace(self, effects=tuple(replace(one, theta=one.theta * weight) for one in self.effects))
 
-    def mechanism(self, base_joints_M_mm: Floats) -> Mechanism:
+    def mechanism(self, base_joints_M_mm: FloatArray) -> Mechanism:
         """The links with the base joints (..., n, 3) where they are now."""
         return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P)
 
@@ -117,7 +117,7 @@ def machine_model(
     supports, base_joints = _frozen(supports_M_mm), _frozen(base_joints_M_mm)
     axes = np.asarray(revolute_axes_P, dtype=np.float64).reshape(-1, 3)
     axes = _frozen(axes / np.sqrt((axes * axes).sum(-1, keepdims=True)))
-    carriers: Ints = np.array(support_of_joint, dtype=np.int64)
+    carriers: IntArray = np.array(support_of_joint, dtype=np.int64)
     carriers.flags.writeable = False
     plate, platform_joints, weights = _frozen(plate_points_M_mm), _frozen(platform_joints_P_mm), _frozen(joint_weights)
     _check_shapes(supports, plate, base_joints, carriers, platform_joints, weights)
@@ -126,9 +126,10 @@ def machine_model(
     offsets = to_inner(rotation, np.zeros(3), base_joints - supports[carriers])
     frame = FrameGeometry(plate, _frozen(offsets), carriers, supports, _frozen(origin), _frozen(rotation))
     require(
-        solve_frame(frame, distances).reason, "frame at machine zero",
+        solve_frame(frame, distances).reason,
+        "frame at machine zero",
         "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
-    )  # fmt: skip
+    )
     mechanism = Mechanism(base_joints, platform_joints, axes)
     attitude = _facing(base_joints, platform_joints) if zero_rotation_M_P is None else zero_rotation_M_P
     pose = inverse_kinematics(mechanism, *zero_contact, attitude)
@@ -141,15 +142,19 @@ def machine_model(
         check,
     )
     zero = AtZero(
-        base_joints, _frozen(pose.origin_M_mm), _frozen(pose.rotation_M_P), Contact(*map(_frozen, zero_contact)),
-        _frozen(pose.link_length_mm), _frozen(distances),
-    )  # fmt: skip
+        base_joints,
+        _frozen(pose.origin_M_mm),
+        _frozen(pose.rotation_M_P),
+        Contact(*map(_frozen, zero_contact)),
+        _frozen(pose.link_length_mm),
+        _frozen(distances),
+    )
     return MachineModel(
         frame, platform_joints, axes, arrangement, weights, float(weight_N), _frozen(weight_at_P_mm), zero
     )
 
 
-def _facing(base_joints_M_mm: Floats, platform_joints_P_mm: Floats) -> Floats:
+def _facing(base_joints_M_mm: FloatArray, platform_joints_P_mm: FloatArray) -> FloatArray:
     """Attitude at which the triangle of the platform joints lies as that of the base joints does: near a tripod's."""
     _, base = base_pose(base_joints_M_mm)
     _, platform = base_pose(platform_joints_P_mm)
@@ -157,7 +162,12 @@ def _facing(base_joints_M_mm: Floats, platform_joints_P_mm: Floats) -> Floats:
 
 
 def _check_shapes(
-    supports: Floats, plate: Floats, base_joints: Floats, carriers: Ints, platform_joints: Floats, weights: Floats
+    supports: FloatArray,
+    plate: FloatArray,
+    base_joints: FloatArray,
+    carriers: IntArray,
+    platform_joints: FloatArray,
+    weights: FloatArray,
 ) -> None:
     """Kernels trust indices and sizes: refuse here what would lead them astray."""
     links = base_joints.shape[0]
@@ -174,11 +184,16 @@ def _check_shapes(
         raise ValueError("; ".join(wrong))
     if carriers.min() < 0 or carriers.max() > 2:
         raise KinematicsError(
-            Problem("support_of_joint", "names a support that is not there", str(carriers.tolist()), "0, 1 or 2")
+            Problem(
+                where="support_of_joint",
+                what="names a support that is not there",
+                value=str(carriers.tolist()),
+                allowed="0, 1 or 2",
+            )
         )
 
 
-def _frozen(values: ArrayLike) -> Floats:
+def _frozen(values: ArrayLike) -> FloatArray:
     """A contiguous read-only copy."""
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compd.arrays import FloatArray
 from compd.model.frame import solve_frame
-from compd.model.jit import Floats
+from compd.model.joint_correction import joint_shortening, link_length_mm
 from compd.model.kinematics import Pose, forward_kinematics
-from compd.model.links import joint_shortening, link_length_mm
 from compd.model.machine import MachineModel
-from compd.model.rows import Constants, Rows
+from compd.model.observations import Constants, Observations
 from compd.model.statics import link_forces
 from compd.model.transform import to_outer
 
@@ -40,9 +40,9 @@ class Movement(NamedTuple):
     velocity_mm_per_s (N, n), joint_velocity_mm_per_s (N, k): of the readings.
     """
 
-    direction: Floats
-    velocity_mm_per_s: Floats
-    joint_velocity_mm_per_s: Floats
+    direction: FloatArray
+    velocity_mm_per_s: FloatArray
+    joint_velocity_mm_per_s: FloatArray
 
 
 def constants(model: MachineModel, details: Details) -> Constants:
@@ -58,9 +58,14 @@ def constants(model: MachineModel, details: Details) -> Constants:
         axes_M = np.where(np.linalg.norm(level, axis=1, keepdims=True) > 1e-6, level, [1.0, 0.0, 0.0])
     axes_M = axes_M - (axes_M * directions_M).sum(axis=1, keepdims=True) * directions_M
     weight_alone = link_forces(
-        model.mechanism(zero.base_joints_M_mm), zero.platform_origin_M_mm, zero.rotation_M_P, np.zeros(3),
-        zero.contact.tip_M_mm, model.weight_N, model.weight_at_P_mm,
-    )  # fmt: skip
+        model.mechanism(zero.base_joints_M_mm),
+        zero.platform_origin_M_mm,
+        zero.rotation_M_P,
+        np.zeros(3),
+        zero.contact.tip_M_mm,
+        model.weight_N,
+        model.weight_at_P_mm,
+    )
     return Constants(
         platform_joints_P_mm=model.platform_joints_P_mm,
         revolute_axes_P=model.revolute_axes_P,
@@ -82,14 +87,14 @@ def observe(
     model: MachineModel,
     common: Constants,
     *,
-    scale_mm: Floats,
-    joint_mm: Floats,
-    frame_mm: Floats,
-    quantities: Mapping[str, Floats],
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
     time_s: ArrayLike,
     session_start: NDArray[Any],
     movement: Movement,
-) -> Rows:
+) -> Observations:
     """N rows by equations (1), (3) and forward kinematics, each from machine zero, so that no row needs another.
 
     scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
@@ -105,31 +110,38 @@ def observe(
         model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
     )
     return rows_at(
-        common, frame.base_joints_M_mm, pose,
+        common,
+        frame.base_joints_M_mm,
+        pose,
         # a tool that stands on the plate is at the same place in every row
         np.broadcast_to(model.arrangement.made(pose).tip_M_mm, pose.origin_M_mm.shape),
-        scale_mm=scale_mm, joint_mm=joint_mm, frame_mm=frame_mm, quantities=quantities,
-        time_s=np.asarray(time_s, dtype=np.float64), session_start=session_start, movement=movement,
-    )  # fmt: skip
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=quantities,
+        time_s=np.asarray(time_s, dtype=np.float64),
+        session_start=session_start,
+        movement=movement,
+    )
 
 
 def rows_at(
     common: Constants,
-    base_joints_M_mm: Floats,
+    base_joints_M_mm: FloatArray,
     pose: Pose,
-    tip_M_mm: Floats,
+    tip_M_mm: FloatArray,
     *,
-    scale_mm: Floats,
-    joint_mm: Floats,
-    frame_mm: Floats,
-    quantities: Mapping[str, Floats],
-    time_s: Floats,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    time_s: FloatArray,
     session_start: NDArray[Any],
     movement: Movement,
-) -> Rows:
+) -> Observations:
     """N rows whose base joints (N, n, 3), pose and tip (N, 3) are known; the rest as in `observe`."""
     joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], common.platform_joints_P_mm)
-    return Rows(
+    return Observations(
         constants=common,
         scale_mm=scale_mm,
         joint_mm=joint_mm,
@@ -150,20 +162,44 @@ def rows_at(
 
 
 def observe_tip(
-    tip_M_mm: Floats, quantities: Mapping[str, Floats], time_s: Floats, session_start: NDArray[Any]
-) -> Rows:
-    """Rows of a machine that another model computes: of these only the tip (N, 3) is known, and what was measured.
+    tip_M_mm: FloatArray, quantities: Mapping[str, FloatArray], time_s: FloatArray, session_start: NDArray[Any]
+) -> Observations:
+    """Observations of a machine that another model computes: only the tip (N, 3) is known, and what was measured.
 
     Effects at the port `reference` can act on them; `missing` refuses the others.
     """
     count = len(tip_M_mm)
     none, no_vectors = np.zeros((count, 0)), np.zeros((0, 3))
     common = Constants(
-        no_vectors, no_vectors, np.full(3, _NAN), no_vectors, no_vectors, np.zeros(0), _NAN, np.full(3, _NAN),
-        np.full(9, _NAN), np.full((3, 3), _NAN), _NAN, _NAN, np.zeros(3),
-    )  # fmt: skip
-    return Rows(
-        common, none, none, np.full((count, 9), _NAN), quantities, time_s, session_start, none, none, none, none,
-        np.zeros((count, 0, 3)), np.zeros((count, 0, 3)), np.full((count, 3), _NAN), np.full((count, 3, 3), _NAN),
+        no_vectors,
+        no_vectors,
+        np.full(3, _NAN),
+        no_vectors,
+        no_vectors,
+        np.zeros(0),
+        _NAN,
+        np.full(3, _NAN),
+        np.full(9, _NAN),
+        np.full((3, 3), _NAN),
+        _NAN,
+        _NAN,
+        np.zeros(3),
+    )
+    return Observations(
+        common,
+        none,
+        none,
+        np.full((count, 9), _NAN),
+        quantities,
+        time_s,
+        session_start,
+        none,
+        none,
+        none,
+        none,
+        np.zeros((count, 0, 3)),
+        np.zeros((count, 0, 3)),
+        np.full((count, 3), _NAN),
+        np.full((count, 3, 3), _NAN),
         tip_M_mm,
-    )  # fmt: skip
+    )

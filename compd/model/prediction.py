@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.model.arrangement import ToolOnPlate
+from compd.arrays import FloatArray, IntArray
 from compd.model.effect import Deltas, Effect, Port, by_port, port_size, together
 from compd.model.frame import Frame, solve_frame
-from compd.model.jit import Floats, Ints
+from compd.model.joint_correction import joint_shortening, link_length_mm
+from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kinematics import Mechanism, closure_at, forward_kinematics
-from compd.model.links import joint_shortening, link_length_mm
 from compd.model.machine import MachineModel
-from compd.model.rotation import compose, rotation_matrix
-from compd.model.rows import Rows
+from compd.model.observations import Observations
+from compd.model.tool import ToolOnPlate
 from compd.model.transform import to_inner, to_outer
 
 # For derivatives of the frame: its curvature is 1 / 1 m, so that second differences vanish and rounding, 1e-13 mm,
@@ -31,10 +31,10 @@ class Prediction(NamedTuple):
     reason : (N,), a Reason; where it is not OK everything else is nan.
     """
 
-    tip_mm: Floats
-    rotation_M_P: Floats
-    link_length_mm: Floats
-    reason: Ints
+    tip_mm: FloatArray
+    rotation_M_P: FloatArray
+    link_length_mm: FloatArray
+    reason: IntArray
 
 
 class Sensitivity(NamedTuple):
@@ -45,12 +45,12 @@ class Sensitivity(NamedTuple):
     link_length : (N, n, size).
     """
 
-    tip: Floats
-    rotation: Floats
-    link_length: Floats
+    tip: FloatArray
+    rotation: FloatArray
+    link_length: FloatArray
 
 
-class Altered(NamedTuple):
+class PerturbedMachine(NamedTuple):
     """The machine with something added at its ports, before any link length is known.
 
     frame : by equation (3).  mechanism : with the base joints as they are now.
@@ -62,15 +62,15 @@ class Altered(NamedTuple):
 
     frame: Frame
     mechanism: Mechanism
-    tool_mm: Floats
-    joint_shortening_mm: Floats
-    reading_to_length_mm: Floats | float
-    reason: Ints
+    tool_mm: FloatArray
+    joint_shortening_mm: FloatArray
+    reading_to_length_mm: FloatArray | float
+    reason: IntArray
 
 
 def altered(
-    model: MachineModel, joint_mm: Floats, frame_mm: Floats, deltas: Deltas, unaltered: Frame | None = None
-) -> Altered:
+    model: MachineModel, joint_mm: FloatArray, frame_mm: FloatArray, deltas: Deltas, unaltered: Frame | None = None
+) -> PerturbedMachine:
     """The machine as the gauges and `deltas` have it; forward and inverse kinematics both start here.
 
     joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port, in mm (rad for
@@ -90,10 +90,10 @@ def altered(
     tool = model.arrangement
     tool_mm = _added(tool.tool_M_mm if isinstance(tool, ToolOnPlate) else tool.tool_P_mm, "tool", deltas)
     to_length_mm = deltas.get("scale", 0.0) + deltas.get("link", 0.0)
-    return Altered(frame, mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame.reason))
+    return PerturbedMachine(frame, mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame.reason))
 
 
-def predict(model: MachineModel, rows: Rows, deltas: Deltas) -> Prediction:
+def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Prediction:
     """Equations (1), (3) and forward kinematics with `deltas` added at the machine's ports.
 
     deltas : as in `altered`; and at the port `reference`, which no machine has.
@@ -113,11 +113,11 @@ def predict(model: MachineModel, rows: Rows, deltas: Deltas) -> Prediction:
     return Prediction(tip, rotation, pose.link_length_mm, np.maximum(machine.reason, pose.reason))
 
 
-def sensitivities(model: MachineModel, rows: Rows, ports: Collection[Port]) -> dict[Port, Sensitivity]:
+def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Port]) -> dict[Port, Sensitivity]:
     """Derivatives of `predict` by what is added at each of `ports`, where nothing is added.
 
     From the closure's derivatives; for the ports `frame` and `plate` by central differences through the octahedron.
-    Rows without a pose are nan.
+    Observations without a pose are nan.
     """
     inverse = _pose_by_closure(model, rows)
     tip_by_pose = _tip_by_pose(model, rows)
@@ -141,7 +141,7 @@ def sensitivities(model: MachineModel, rows: Rows, ports: Collection[Port]) -> d
     return found
 
 
-def _pose_by_closure(model: MachineModel, rows: Rows) -> Floats:
+def _pose_by_closure(model: MachineModel, rows: Observations) -> FloatArray:
     """(N, 6, 6): displacement and rotation of the platform by n link lengths and k offsets of revolute axes."""
     close = closure_at(model.mechanism(rows.base_joints_M_mm), rows.origin_M_mm, rows.rotation_M_P)
     lengths = np.concatenate([close.length_by_displacement, close.length_by_rotation_mm], axis=2)
@@ -153,7 +153,7 @@ def _pose_by_closure(model: MachineModel, rows: Rows) -> Floats:
     return inverse
 
 
-def _tip_by_pose(model: MachineModel, rows: Rows) -> Floats:
+def _tip_by_pose(model: MachineModel, rows: Observations) -> FloatArray:
     """(N, 3, 6): the tip by displacement and rotation of the platform; with the tool on the plate, as {P} sees it."""
     x, y, z = (rows.tip_M_mm - rows.origin_M_mm).T
     nought = np.zeros_like(x)
@@ -164,7 +164,7 @@ def _tip_by_pose(model: MachineModel, rows: Rows) -> Floats:
     return found
 
 
-def _closure_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
+def _closure_by(model: MachineModel, rows: Observations, port: Port) -> FloatArray:
     """(N, 6, size): what the closure is asked to make up for when something is added at `port`: link lengths first,
     then offsets of the revolute axes."""
     count, n, k = len(rows), rows.links, len(model.revolute_axes_P)
@@ -190,7 +190,7 @@ def _closure_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
     return moved.reshape(count, 6, 3 * n)
 
 
-def columns(effect: Effect, rows: Rows, basis: Floats, by: Mapping[Port, Sensitivity]) -> Sensitivity:
+def columns(effect: Effect, rows: Observations, basis: FloatArray, by: Mapping[Port, Sensitivity]) -> Sensitivity:
     """The prediction's derivatives by an effect's fitted numbers: (N, 3, P), (N, 3, P), (N, n, P).
 
     basis : (N, sum of port sizes, P), from `effect.basis`.  by : from `sensitivities`, for the effect's ports at least.
@@ -202,11 +202,11 @@ def columns(effect: Effect, rows: Rows, basis: Floats, by: Mapping[Port, Sensiti
     return Sensitivity(tip, rotation, link_length)
 
 
-def pull_back(link: Sensitivity, tip_residual_mm: Floats) -> Floats:
+def pull_back(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
     """The link lengths' errors (N, n), in mm, that would explain residuals (N, 3) at the tip.
 
     link : the sensitivity of the port `link`. For a hexapod, whose attitude is free, the smallest such errors.
-    Rows without a pose are nan.
+    Observations without a pose are nan.
     """
     good = np.asarray(np.isfinite(link.tip).all(axis=(1, 2)))
     found = np.full((len(good), link.tip.shape[2]), np.nan)
@@ -214,12 +214,12 @@ def pull_back(link: Sensitivity, tip_residual_mm: Floats) -> Floats:
     return found
 
 
-def shares(model: MachineModel, rows: Rows, deltas: Mapping[str, Deltas]) -> dict[str, Floats]:
+def shares(model: MachineModel, rows: Observations, deltas: Mapping[str, Deltas]) -> dict[str, FloatArray]:
     """What each effect contributes to the prediction (N, 3), in mm: what it adds to those before it.
 
     deltas : by effect id, in the model's order.  The shares add up to the whole but for rounding.
     """
-    found: dict[str, Floats] = {}
+    found: dict[str, FloatArray] = {}
     names = list(deltas)
     before = predict(model, rows, {}).tip_mm
     for count, name in enumerate(names, start=1):
@@ -229,16 +229,16 @@ def shares(model: MachineModel, rows: Rows, deltas: Mapping[str, Deltas]) -> dic
     return found
 
 
-def _added(value: Floats, port: Port, deltas: Deltas) -> Floats:
+def _added(value: FloatArray, port: Port, deltas: Deltas) -> FloatArray:
     return value + deltas[port] if port in deltas else value
 
 
-def _points(points: Floats, port: Port, deltas: Deltas) -> Floats:
+def _points(points: FloatArray, port: Port, deltas: Deltas) -> FloatArray:
     """Points (..., m, 3) and their deltas (..., 3 m)."""
     return points + deltas[port].reshape(*deltas[port].shape[:-1], -1, 3) if port in deltas else points
 
 
-def _base_joints_by(model: MachineModel, rows: Rows, port: Port) -> Floats:
+def _base_joints_by(model: MachineModel, rows: Observations, port: Port) -> FloatArray:
     """Derivatives (N, 3 n, 9) of the base joints by the frame's distances or the plate's points."""
     distances_mm = model.zero.distances_mm + rows.frame_mm
     steps = STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])

@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compd.model.closure import close, known, platform_radius
-from compd.model.jit import INTEGERS, MATRIX, VECTOR, Floats, Ints, kernel
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.closure import close, known, platform_radius
+from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
+from compd.model.kernels.linear import all_finite, factor, inverse_norm, solve
 from compd.model.kinematics import Mechanism, checked
-from compd.model.linear import all_finite, factor, inverse_norm, solve
-from compd.model.reason import AMPLIFICATION_LIMIT, Reason
+from compd.model.solve_status import AMPLIFICATION_LIMIT, Reason
 
 OK = int(Reason.OK)
 NOT_FINITE = int(Reason.NOT_FINITE)
@@ -27,9 +28,9 @@ class LinkForces(NamedTuple):
     reason : (...), a Reason; where it is not OK the forces are nan.
     """
 
-    axial_N: Floats
-    lateral_N: Floats
-    reason: Ints
+    axial_N: FloatArray
+    lateral_N: FloatArray
+    reason: IntArray
 
 
 @kernel(
@@ -37,18 +38,18 @@ class LinkForces(NamedTuple):
     "(n,d),(n,d),(k,d),(d),(d,d),(d),(d),(),(d)->(n),(k),()",
 )
 def _forces(
-    base_joints_M: Floats,
-    platform_joints_P: Floats,
-    revolute_axes_P: Floats,
-    origin_M: Floats,
-    R: Floats,
-    force_M: Floats,
-    at_M: Floats,
-    weight_N: Floats,
-    weight_at_P: Floats,
-    axial_N: Floats,
-    lateral_N: Floats,
-    reason: Ints,
+    base_joints_M: FloatArray,
+    platform_joints_P: FloatArray,
+    revolute_axes_P: FloatArray,
+    origin_M: FloatArray,
+    R: FloatArray,
+    force_M: FloatArray,
+    at_M: FloatArray,
+    weight_N: FloatArray,
+    weight_at_P: FloatArray,
+    axial_N: FloatArray,
+    lateral_N: FloatArray,
+    reason: IntArray,
 ) -> None:
     n = axial_N.shape[0]
     axial_N[:] = math.nan

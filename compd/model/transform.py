@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
-from compd.model.jit import MATRIX, VECTOR, Floats, kernel
-from compd.model.linear import all_finite
+from compd.arrays import FloatArray
+from compd.model.kernels.jit import MATRIX, VECTOR, kernel
+from compd.model.kernels.linear import all_finite
 
 
 @kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
-def to_outer(R: Floats, origin_mm: Floats, point_mm: Floats, outer_mm: Floats) -> None:
+def to_outer(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, outer_mm: FloatArray) -> None:
     """Point in the inner frame -> in the outer one: origin + R point, equation (2).
 
     R (..., 3, 3) and origin (..., 3): the inner frame's axes and origin in the outer one; point (..., 3).
@@ -23,7 +24,7 @@ def to_outer(R: Floats, origin_mm: Floats, point_mm: Floats, outer_mm: Floats) -
 
 
 @kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
-def to_inner(R: Floats, origin_mm: Floats, point_mm: Floats, inner_mm: Floats) -> None:
+def to_inner(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, inner_mm: FloatArray) -> None:
     """Point in the outer frame -> in the inner one: R^T (point - origin); the inverse of `to_outer`.
 
     nan if the point is not finite.

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.model.effect import Deltas, Fitted, Memories, Port, deltas, quantities, together
-from compd.model.jit import Floats
+from compd.arrays import FloatArray
+from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas, quantities, together
 from compd.model.machine import MachineModel
+from compd.model.observations import Observations
 from compd.model.prediction import Sensitivity, columns, sensitivities
-from compd.model.rows import Rows
 
 
 class GaugeNoise(NamedTuple):
@@ -21,22 +21,24 @@ class GaugeNoise(NamedTuple):
     A quantity that is not named has a noise that is not known.
     """
 
-    scale_mm: Floats
-    joint_mm: Floats
-    frame_mm: Floats
+    scale_mm: FloatArray
+    joint_mm: FloatArray
+    frame_mm: FloatArray
     quantities: Mapping[str, float]
 
 
-def tip_uncertainty_mm(model: MachineModel, rows: Rows, noise: GaugeNoise, memories: Memories) -> Floats:
+def tip_uncertainty_mm(model: MachineModel, rows: Observations, noise: GaugeNoise, memories: Memories) -> FloatArray:
     """Standard uncertainty of the tip (N, 3): in {M}, with the tool on the plate of the touched place in {P}.
 
     Errors of different gauges have nothing to do with each other; those of fitted numbers have the model's covariance.
     How an effect at the scales' port changes with their noise is left out: at most a few per cent of that noise.
     nan where a fitted number's error or a needed quantity's noise is not known.
     """
-    readings: tuple[tuple[Port, Floats], ...] = (
-        ("scale", noise.scale_mm), ("joint", noise.joint_mm), ("frame", noise.frame_mm)
-    )  # fmt: skip
+    readings: tuple[tuple[Port, FloatArray], ...] = (
+        ("scale", noise.scale_mm),
+        ("joint", noise.joint_mm),
+        ("frame", noise.frame_mm),
+    )
     ports = {port for one in model.acting for port in one.effect.ports}
     by = sensitivities(model, rows, {*ports, "scale", "joint", "frame"})
     variance = sum(((by[port].tip ** 2) @ sigma_mm**2 for port, sigma_mm in readings), start=np.zeros((len(rows), 3)))
@@ -46,9 +48,11 @@ def tip_uncertainty_mm(model: MachineModel, rows: Rows, noise: GaugeNoise, memor
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _by_parameters(model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivity], memories: Memories) -> Floats:
+def _by_parameters(
+    model: MachineModel, rows: Observations, by: Mapping[Port, Sensitivity], memories: Memories
+) -> FloatArray:
     """(N, 3) variance, mm2, by the errors of the numbers of the effects that act."""
-    parts: list[Floats] = []
+    parts: list[FloatArray] = []
     used: list[int] = []
     begin = 0
     for one in model.effects:
@@ -66,8 +70,8 @@ def _by_parameters(model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivit
 
 
 def _by_quantity(
-    model: MachineModel, rows: Rows, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
-) -> Floats:
+    model: MachineModel, rows: Observations, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
+) -> FloatArray:
     """(N, 3) by how many mm the tip moves when one quantity shows more by its standard deviation."""
     using = [one for one in model.acting if name in quantities(one.effect, model.links)]
     more = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
@@ -76,6 +80,6 @@ def _by_quantity(
     return np.asarray(sum(moved, start=np.zeros((len(rows), 3, 1)))[:, :, 0])
 
 
-def _added(effects: Sequence[Fitted], rows: Rows, memories: Memories) -> Deltas:
+def _added(effects: Sequence[FittedEffect], rows: Observations, memories: Memories) -> Deltas:
     each, _ = deltas(effects, rows, memories)
     return together(list(each.values()))

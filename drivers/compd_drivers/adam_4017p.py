@@ -53,12 +53,20 @@ class Adam4017p(Modbus):
     sample_options: ClassVar[Mapping[str, Any]] = {
         "unit": 1,
         "channels": [
-            {"name": "a", "input": 0, "range": "+-10V",
-             "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]}},
-            {"name": "b", "input": 7, "range": "4-20mA",
-             "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}},
+            {
+                "name": "a",
+                "input": 0,
+                "range": "+-10V",
+                "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]},
+            },
+            {
+                "name": "b",
+                "input": 7,
+                "range": "4-20mA",
+                "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]},
+            },
         ],
-    }  # fmt: skip
+    }
 
     def __init__(self, options: Adam4017pOptions) -> None:
         super().__init__(register_map(options, [_channel(one) for one in options.channels]))

@@ -15,9 +15,11 @@ class WithoutChecksumOptions(GaugeOptions):
     """Options where nothing but its shape guards a reply."""
 
     fastest_mm_per_s: float = Field(
-        default=0.5, gt=0, allow_inf_nan=False,
+        default=0.5,
+        gt=0,
+        allow_inf_nan=False,
         description="the fastest that what is measured ever moves; a value that moved faster is asked for again",
-    )  # fmt: skip
+    )
 
 
 class ExchangeOptions(WithoutChecksumOptions):

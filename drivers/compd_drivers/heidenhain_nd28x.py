@@ -38,9 +38,11 @@ class HeidenhainNd28xOptions(GaugeOptions):
         default="mm", description="what the display shows; the other one is refused, so that nobody switches it unseen"
     )
     fastest_mm_per_s: float = Field(
-        default=200.0, gt=0, allow_inf_nan=False,
+        default=200.0,
+        gt=0,
+        allow_inf_nan=False,
         description="the fastest that the link ever moves; a position that moved faster is asked for again",
-    )  # fmt: skip
+    )
 
 
 class HeidenhainNd28x(Gauge[ByteLine]):

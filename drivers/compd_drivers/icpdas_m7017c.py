@@ -58,12 +58,20 @@ class IcpdasM7017c(Modbus):
         "unit": 1,
         "data_format": "hexadecimal",
         "channels": [
-            {"name": "a", "input": 0, "range": "+-10V",
-             "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]}},
-            {"name": "b", "input": 3, "range": "4-20mA",
-             "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}},
+            {
+                "name": "a",
+                "input": 0,
+                "range": "+-10V",
+                "linearisation": {"signal": "V", "table": [[-9.5, -0.95], [9.5, 0.95]]},
+            },
+            {
+                "name": "b",
+                "input": 3,
+                "range": "4-20mA",
+                "linearisation": {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]},
+            },
         ],
-    }  # fmt: skip
+    }
 
     def __init__(self, options: IcpdasM7017cOptions) -> None:
         super().__init__(register_map(options, [_channel(one) for one in options.channels]))

@@ -91,9 +91,8 @@ class KeyenceDlEn1(Gauge[ByteLine]):
                 f"{len(fields) // 2} heads answered, {len(self._channels)} are configured: {reply!r}",
             )
         return [
-            self._reading(state, number, time_s, reply)
-            for state, number in zip(fields[::2], fields[1::2], strict=True)
-        ]  # fmt: skip
+            self._reading(state, number, time_s, reply) for state, number in zip(fields[::2], fields[1::2], strict=True)
+        ]
 
     def _reading(self, state: bytes, number: bytes, time_s: float, reply: bytes) -> Reading:
         if not (_STATE.fullmatch(state) and _NUMBER.fullmatch(number)):

@@ -36,9 +36,11 @@ class KeyenceGt2DlRs1aOptions(GaugeOptions):
         default="M0", description="M0: values; MS: values with each head's status, for units that want it"
     )
     fastest_mm_per_s: float = Field(
-        default=0.5, gt=0, allow_inf_nan=False,
+        default=0.5,
+        gt=0,
+        allow_inf_nan=False,
         description="the fastest that a head's target ever moves; a value that moved faster is asked for again",
-    )  # fmt: skip
+    )
 
 
 class KeyenceGt2DlRs1a(Gauge[ByteLine]):

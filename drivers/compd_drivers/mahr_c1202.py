@@ -112,8 +112,9 @@ class MahrC1202(Gauge[ByteLine]):
             return bad(time_s, Quality.DEVICE_ERROR, part.decode() + why)
         match = self._value.fullmatch(part)
         if match is None:
-            raise LineFault(Quality.MISMATCH, f"not a value of {self.options.digits} and {self.options.decimals} "
-                            f"digits: {reply!r}")  # fmt: skip
+            raise LineFault(
+                Quality.MISMATCH, f"not a value of {self.options.digits} and {self.options.decimals} digits: {reply!r}"
+            )
         if match[3] != self.options.unit.encode():
             raise LineFault(Quality.MISMATCH, f"it is set to {match[3].decode()}, not {self.options.unit}")
         return good(float(match[2]) * MM_PER_UNIT[self.options.unit], time_s)

@@ -118,12 +118,28 @@ class Modbus(Gauge[RegisterLine]):
         "unit": 1,
         "channels": [
             {"name": "a", "function": 4, "address": 0, "type": "float32", "unit": "mm"},
-            {"name": "b", "function": 4, "address": 2, "type": "int16", "scale": 1e-4, "unit": "mm",
-             "lowest": -3.2, "highest": 3.2},
-            {"name": "c", "function": 3, "address": 8, "type": "int32", "word_order": "low_first", "scale": 1e-6,
-             "unit": "mm", "invalid": [2147483647]},
+            {
+                "name": "b",
+                "function": 4,
+                "address": 2,
+                "type": "int16",
+                "scale": 1e-4,
+                "unit": "mm",
+                "lowest": -3.2,
+                "highest": 3.2,
+            },
+            {
+                "name": "c",
+                "function": 3,
+                "address": 8,
+                "type": "int32",
+                "word_order": "low_first",
+                "scale": 1e-6,
+                "unit": "mm",
+                "invalid": [2147483647],
+            },
         ],
-    }  # fmt: skip
+    }
 
     def __init__(self, options: ModbusOptions) -> None:
         super().__init__(options)

@@ -31,9 +31,7 @@ from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
 from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
 
-NumberType = Literal[
-    "int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"
-]  # fmt: skip
+NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
 _FLOATS: Mapping[str, str] = {"float32": "f", "float64": "d"}
 FEWEST_FIXED_BYTES = 2  # of a frame without a checksum
@@ -161,11 +159,17 @@ class SerialFrame(Gauge[ByteLine]):
         "frame": "02 41 .. .. .. .. .. .. CS CS",
         "checksum": {"kind": "crc16_modbus"},
         "channels": [
-            {"name": "a", "at": 2, "type": "int32", "byte_order": "big", "unit": "nm",
-             "invalid": {2147483647: "sensor_fault"}},
+            {
+                "name": "a",
+                "at": 2,
+                "type": "int32",
+                "byte_order": "big",
+                "unit": "nm",
+                "invalid": {2147483647: "sensor_fault"},
+            },
             {"name": "b", "at": 6, "type": "int16", "unit": "um", "scale": 0.1, "invalid": {-32768: "sensor_fault"}},
         ],
-    }  # fmt: skip
+    }
 
     def __init__(self, options: SerialFrameOptions) -> None:
         super().__init__(options)

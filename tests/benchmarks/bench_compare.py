@@ -18,10 +18,10 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from compd.comparison.aligned_recording import AlignedRecording
 from compd.model.kinematics import closure_at
-from compd.workbench.observed import Observed
 from tests.benchmarks.figures import show
-from tests.measured import gauges, hidden, record, seen
+from tests.support.measured import gauges, hidden, record, seen
 
 ROWS = (1_000, 10_000, 100_000)
 BUDGET_S = 20.0
@@ -54,19 +54,37 @@ def main() -> None:
             work = bare.processor_s - start
             plain = work > LEAST_SHARE * start
             growth = [
-                f"{work / (count - FEW_ROWS) * 1e6:.1f}" if plain else "-", f"{work / before:.1f}" if before else "-"
-            ]  # fmt: skip
-            rows.append([
-                f"{count}", f"{bare.seconds:.2f}", f"{bare.processor_s:.2f}", *growth, f"{bare.largest_MB:.0f}",
-                f"{page.seconds:.2f}", f"{page.seconds / BUDGET_S:.2f}", f"{page.largest_MB / BUDGET_MB:.2f}",
-            ])  # fmt: skip
+                f"{work / (count - FEW_ROWS) * 1e6:.1f}" if plain else "-",
+                f"{work / before:.1f}" if before else "-",
+            ]
+            rows.append(
+                [
+                    f"{count}",
+                    f"{bare.seconds:.2f}",
+                    f"{bare.processor_s:.2f}",
+                    *growth,
+                    f"{bare.largest_MB:.0f}",
+                    f"{page.seconds:.2f}",
+                    f"{page.seconds / BUDGET_S:.2f}",
+                    f"{page.largest_MB / BUDGET_MB:.2f}",
+                ]
+            )
             before = work if plain else 0.0
         show(
             f"compd compare, start of Python included; budget {BUDGET_S:g} s, {BUDGET_MB:g} MB at {ROWS[-1]} rows",
-            ["rows", "s", "processor s", "processor us/row beyond the start", "times the line above", "MB",
-             "with --html, s", "/ budget", "memory / budget"],
+            [
+                "rows",
+                "s",
+                "processor s",
+                "processor us/row beyond the start",
+                "times the line above",
+                "MB",
+                "with --html, s",
+                "/ budget",
+                "memory / budget",
+            ],
             rows,
-        )  # fmt: skip
+        )
         compare_with_scipy(seen(directory / f"rows{ROWS[0]}.csv"))
 
 
@@ -85,7 +103,7 @@ def command(arguments: list[str]) -> Cost:
     return Cost(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0)
 
 
-def compare_with_scipy(one: Observed) -> None:
+def compare_with_scipy(one: AlignedRecording) -> None:
     """One pose at a time, from machine zero, against the kernels over all rows."""
     assert one.model is not None
     zero = one.model.zero

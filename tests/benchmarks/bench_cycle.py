@@ -8,20 +8,28 @@ from dataclasses import replace
 import numpy as np
 
 from compd.gauge import good
-from compd.live.models import LiveModel, Models
-from compd.live.protocol import Target
-from compd.model.effect import Fitted, quantities
-from compd.model.effects import library
+from compd.live.loop.commands import Target
+from compd.live.loop.model_loader import LiveModel, Models
+from compd.model.effect import FittedEffect, quantities
+from compd.model.library import library
 from tests.benchmarks.figures import median_and_p99, show
-from tests.live_machine import RAW_AT_ZERO_MM, Machine, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 
 CYCLES = 5000
 BUDGET_US = 150.0  # the whole cycle with 18 comparators
 # All that the shipped machines' thermometers allow, of every port of a machine but one: cheap and dear, with memory.
 EFFECTS = (
-    "link_expansion_lag", "backlash", "tool_offset", "scale_gain", "scale_expansion", "joint_comparator_gain",
-    "frame_comparator_gain", "link_sag", "friction_hysteresis", "base_joint_position",
-)  # fmt: skip
+    "link_expansion_lag",
+    "backlash",
+    "tool_offset",
+    "scale_gain",
+    "scale_expansion",
+    "joint_comparator_gain",
+    "frame_comparator_gain",
+    "link_sag",
+    "friction_hysteresis",
+    "base_joint_position",
+)
 ARRIVING_MM = 1e-4  # every gauge shows something new in every cycle
 
 
@@ -62,7 +70,7 @@ def _with_effects(measured: Machine, count: int) -> Models:
     effects = [library()[name] for name in EFFECTS[:count]]
     links = measured.model.links
     fitted = tuple(
-        Fitted(effect, np.full(len(effect.columns(links)), 0.01), {c.name: c.grid[0] for c in effect.constants})
+        FittedEffect(effect, np.full(len(effect.columns(links)), 0.01), {c.name: c.grid[0] for c in effect.constants})
         for effect in effects
     )
     names = tuple(dict.fromkeys(name for effect in effects for name in quantities(effect, links)))
@@ -92,8 +100,9 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
         setpoint.to_packet(config_hash)
         packed = time.perf_counter()
         assert setpoint.valid, setpoint.reason
-        for durations, seconds in zip(found.values(), (computed - begin, encoded - computed, packed - encoded,
-                                                       encoded - begin), strict=True):  # fmt: skip
+        for durations, seconds in zip(
+            found.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
+        ):
             durations.append(seconds)
     return found
 

@@ -9,10 +9,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from compd.model.effects import library
-from compd.workbench.diagnose import diagnose
+from compd.diagnosis.diagnose import diagnose
+from compd.model.library import library
 from tests.benchmarks.figures import show
-from tests.diagnosed import recorded
+from tests.support.diagnosed import recorded
 
 VISITS = 480  # every fourth is repeated: 600 rows
 BUDGET_S = 5.0
@@ -37,8 +37,16 @@ def main() -> None:
             wall_s, processor_s = time.perf_counter(), time.process_time()
             found = diagnose(seen, (), None, effects)
             wall_s, processor_s = time.perf_counter() - wall_s, time.process_time() - processor_s
-            rows.append([name, found.verdict, str(len(seen.rows)), f"{wall_s:.2f}", f"{processor_s:.2f}",
-                         f"{BUDGET_S / wall_s:.1f}"])  # fmt: skip
+            rows.append(
+                [
+                    name,
+                    found.verdict,
+                    str(len(seen.rows)),
+                    f"{wall_s:.2f}",
+                    f"{processor_s:.2f}",
+                    f"{BUDGET_S / wall_s:.1f}",
+                ]
+            )
     title = f"A diagnosis with {len(effects)} effects, budget {BUDGET_S:g} s"
     show(title, ["hidden", "verdict", "rows", "wall, s", "processor, s", "budget / wall"], rows)
 

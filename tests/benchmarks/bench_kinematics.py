@@ -24,7 +24,7 @@ from compd.model.frame import distances_mm, solve_frame
 from compd.model.kinematics import forward_kinematics, inverse_kinematics
 from compd.model.transform import to_inner
 from tests.benchmarks.figures import median_and_p99, show
-from tests.model_machines import tripod
+from tests.support.model_machines import tripod
 
 SOURCE = Path(__file__).with_name("kinematics.c")
 ROWS = 10_000
@@ -65,20 +65,37 @@ def tasks() -> Mapping[str, Task]:
     pose = ((3,), real), ((3, 3), real), ((3,), real), *counted
     return {
         "frame from nine distances": Task(
-            lambda rows: solve_frame(frame, rows), changes, "frame_rows", (),
-            (frame.plate_points_M_mm, frame.zero_supports_M_mm, frame.joint_offsets_B_mm, frame.support_of_joint,
-             frame.zero_origin_M_mm, frame.zero_rotation_M_B),
+            lambda rows: solve_frame(frame, rows),
+            changes,
+            "frame_rows",
+            (),
+            (
+                frame.plate_points_M_mm,
+                frame.zero_supports_M_mm,
+                frame.joint_offsets_B_mm,
+                frame.support_of_joint,
+                frame.zero_origin_M_mm,
+                frame.zero_rotation_M_B,
+            ),
             (((3, 3), real), ((3,), real), ((3, 3), real), ((3, 3), real), ((3,), real), ((3,), real), *counted),
         ),
         "tripod forward": Task(
-            lambda rows: forward_kinematics(mechanism, rows, *start), lengths, "forward_rows", tuple(mechanism),
-            start, pose,
+            lambda rows: forward_kinematics(mechanism, rows, *start),
+            lengths,
+            "forward_rows",
+            tuple(mechanism),
+            start,
+            pose,
         ),
         "tripod inverse": Task(
-            lambda rows: inverse_kinematics(mechanism, rows, zero.contact.tip_P_mm, zero.rotation_M_P), tips,
-            "inverse_rows", tuple(mechanism), (zero.contact.tip_P_mm, zero.rotation_M_P), pose,
+            lambda rows: inverse_kinematics(mechanism, rows, zero.contact.tip_P_mm, zero.rotation_M_P),
+            tips,
+            "inverse_rows",
+            tuple(mechanism),
+            (zero.contact.tip_P_mm, zero.rotation_M_P),
+            pose,
         ),
-    }  # fmt: skip
+    }
 
 
 def compiled(directory: Path) -> ctypes.CDLL:
@@ -186,9 +203,14 @@ def main() -> None:
             us = compare(library, task)
             many, single = us["Numba rows"] / us["C rows"], us["Numba single"] / us["C single"]
             table.append(
-                [name, *(f"{us[key]:.2f}" for key in ("C rows", "Numba rows")), f"{many:.2f}",
-                 *(f"{us[key]:.2f}" for key in ("C single", "Numba single")), f"{single:.2f}"]
-            )  # fmt: skip
+                [
+                    name,
+                    *(f"{us[key]:.2f}" for key in ("C rows", "Numba rows")),
+                    f"{many:.2f}",
+                    *(f"{us[key]:.2f}" for key in ("C single", "Numba single")),
+                    f"{single:.2f}",
+                ]
+            )
     show(
         f"Kinematics, us per row, best of {TURNS}; limits {LIMIT_ROWS:g} x C in one call of {ROWS} rows, "
         f"{LIMIT_SINGLE:g} x C for one snapshot",

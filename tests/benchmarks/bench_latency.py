@@ -14,16 +14,15 @@ import threading
 from pathlib import Path
 
 from compd.clock import MonotonicClock
-from compd.configuration.operation import Loop as LoopSettings
-from compd.configuration.operation import Sockets
+from compd.configuration.operation import LoopSettings, SocketSettings
 from compd.gauge import good
-from compd.live.loop import Loop
-from compd.live.notify import Notifier
-from compd.live.protocol import TargetKeys
-from compd.live.publisher import Publisher
-from compd.live.requests import Requests
+from compd.live.loop.loop import Loop
+from compd.live.service.messages import TargetKeys
+from compd.live.service.publisher import Publisher
+from compd.live.service.requests import Requests
+from compd.live.systemd import Notifier
 from tests.benchmarks.figures import median_and_p99, quiet, show
-from tests.live_machine import RAW_AT_ZERO_MM, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 
 RATES_HZ = (200, 1000)
 READINGS = 500
@@ -60,7 +59,7 @@ def measure(rate_hz: float) -> list[tuple[float, ...]]:
 
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "s"
-        publisher = Publisher(Sockets(unix={"path": str(path)}, valid_for_s=0.1), 1 / rate_hz, lambda _: None)
+        publisher = Publisher(SocketSettings(unix={"path": str(path)}, valid_for_s=0.1), 1 / rate_hz, lambda _: None)
         version = {"class": "VERSION"}
         keys = TargetKeys("tip_B0_mm", rotation=False)
         publisher.start(Requests(version, keys, measured.orders, dict, lambda _: None))
@@ -89,10 +88,20 @@ def main() -> None:
         parts = zip(*measure(rate_hz), strict=True)
         for name, durations in zip(("reading to tick", "tick to client", "reading to client"), parts, strict=True):
             median, p99 = median_and_p99(durations)
-            rows.append([f"{rate_hz:g} Hz: {name}", f"{median * 1e6:.0f}", f"{p99 * 1e6:.0f}",
-                         f"{median * rate_hz:.2f}", f"{p99 * rate_hz:.2f}"])  # fmt: skip
-    show(f"Gauge to socket, {READINGS} readings, client in another process",
-         ["", "median us", "p99 us", "median / period", "p99 / period"], rows)  # fmt: skip
+            rows.append(
+                [
+                    f"{rate_hz:g} Hz: {name}",
+                    f"{median * 1e6:.0f}",
+                    f"{p99 * 1e6:.0f}",
+                    f"{median * rate_hz:.2f}",
+                    f"{p99 * rate_hz:.2f}",
+                ]
+            )
+    show(
+        f"Gauge to socket, {READINGS} readings, client in another process",
+        ["", "median us", "p99 us", "median / period", "p99 / period"],
+        rows,
+    )
 
 
 if __name__ == "__main__":

@@ -16,14 +16,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from compd.clock import MonotonicClock
-from compd.configuration.operation import Loop as LoopSettings
+from compd.configuration.operation import LoopSettings
 from compd.gauge import good
-from compd.live.loop import Loop
-from compd.live.notify import Notifier
-from compd.live.timing import Histogram
+from compd.live.loop.loop import Loop
+from compd.live.loop.timing import Histogram
+from compd.live.systemd import Notifier
 from compd.readings import Latest
 from tests.benchmarks.figures import quiet, show
-from tests.live_machine import RAW_AT_ZERO_MM, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 
 SECONDS = 10
 RATES_HZ = (200, 1000)
@@ -88,8 +88,15 @@ def cyclictest(rate_hz: float) -> subprocess.Popen[str] | None:
     """Started, for as long as the loop runs; None where it is not installed."""
     if shutil.which("cyclictest") is None:
         return None
-    command = ["cyclictest", "--quiet", "--mlockall", f"--priority={PRIORITY}", f"--interval={round(1e6 / rate_hz)}",
-               f"--loops={round(SECONDS * rate_hz)}", f"--histogram={HISTOGRAM_US}"]  # fmt: skip
+    command = [
+        "cyclictest",
+        "--quiet",
+        "--mlockall",
+        f"--priority={PRIORITY}",
+        f"--interval={round(1e6 / rate_hz)}",
+        f"--loops={round(SECONDS * rate_hz)}",
+        f"--histogram={HISTOGRAM_US}",
+    ]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
@@ -129,9 +136,12 @@ def run_loop(rate_hz: float) -> tuple[Loop, Histogram | None]:
         done.wait()
         loop.stop()
         reference = histogram_of(beside) if beside is not None else None
-    print(f"{rate_hz:g} Hz: six drivers made {sum(polls)} polls; "
-          + "; ".join(f"{name}: {'granted' if p.granted else 'NOT granted'} ({p.detail})"
-                      for name, p in loop.permissions.items()))  # fmt: skip
+    print(
+        f"{rate_hz:g} Hz: six drivers made {sum(polls)} polls; "
+        + "; ".join(
+            f"{name}: {'granted' if p.granted else 'NOT granted'} ({p.detail})" for name, p in loop.permissions.items()
+        )
+    )
     return loop, reference
 
 
@@ -149,8 +159,17 @@ def main() -> None:
             ratio = f"{ours.quantile_us(0.5) / median:.1f}" if histogram is reference else ""
             ratio99 = f"{ours.quantile_us(0.99) / p99:.1f}" if histogram is reference else ""
             missed = str(loop.timing.missed) if histogram is ours else ""
-            rows.append([f"{rate_hz:g} Hz: {name}", f"{median:.0f}", f"{p99:.0f}", f"{histogram.largest_us:.0f}",
-                         ratio, ratio99, missed])  # fmt: skip
+            rows.append(
+                [
+                    f"{rate_hz:g} Hz: {name}",
+                    f"{median:.0f}",
+                    f"{p99:.0f}",
+                    f"{histogram.largest_us:.0f}",
+                    ratio,
+                    ratio99,
+                    missed,
+                ]
+            )
     header = [
         "lateness of waking",
         "median us",

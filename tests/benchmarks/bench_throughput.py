@@ -3,7 +3,8 @@
     python -m tests.benchmarks.bench_throughput
 
 A slave in a process of its own answers on a pty as slowly as the wire would: each character takes its time, and the
-slave keeps its silence (or takes 10 ms) before it answers. The ideal is `compd.planning`'s, bits and silences alone.
+slave keeps its silence (or takes 10 ms) before it answers. The ideal is
+`compd.commissioning.line_budget`'s, bits and silences alone.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from compd.clock import MonotonicClock
+from compd.commissioning.line_budget import plan_line, serial_pace
 from compd.configuration.lines import ModbusRtuLine
 from compd.gauge import Gauge
 from compd.lines import open_line
 from compd.lines.modbus_rtu import crc16
-from compd.live.acquisition import Acquisition
+from compd.live.acquisition.acquisition import Acquisition
 from compd.live.realtime import sharpen_timers
-from compd.planning import plan_line, serial_pace
 from compd.plugins import GAUGES, load
 from compd.readings import Latest
 
@@ -93,10 +94,18 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
     master, far = os.openpty()
     tty.setraw(far)
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.benchmarks.bench_throughput", "slave", str(master), str(baud),
-         str(pace.turnaround_s)],
-        pass_fds=[master], stdout=subprocess.PIPE,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "tests.benchmarks.bench_throughput",
+            "slave",
+            str(master),
+            str(baud),
+            str(pace.turnaround_s),
+        ],
+        pass_fds=[master],
+        stdout=subprocess.PIPE,
+    )
     assert process.stdout is not None
     process.stdout.readline()  # it is listening
     settings = line.model_copy(update={"port": os.ttyname(far)})
@@ -159,9 +168,12 @@ def main() -> None:
     for kind, baud, turnaround_s, threaded in rows:
         reached_hz, ideal_hz = measure(kind, baud, turnaround_s, threaded)
         ratio = reached_hz / ideal_hz
-        print(f"{kind:16}{baud:8}{'silence' if turnaround_s is None else '10 ms':>12}"
-              f"{'line thread' if threaded else 'driver':>14}{ideal_hz:10.1f}{reached_hz:9.1f}{ratio:7.2f}"
-              f"{'' if ratio >= WANTED else f'  below {WANTED}'}", flush=True)  # fmt: skip
+        print(
+            f"{kind:16}{baud:8}{'silence' if turnaround_s is None else '10 ms':>12}"
+            f"{'line thread' if threaded else 'driver':>14}{ideal_hz:10.1f}{reached_hz:9.1f}{ratio:7.2f}"
+            f"{'' if ratio >= WANTED else f'  below {WANTED}'}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

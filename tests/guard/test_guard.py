@@ -13,12 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from compd.live.replay import Transcripts, replay
-from tests.live_machine import machine
+from compd.live.record.replay import RecordedCycles, replay
 from tests.scoreboard.trial import at_once
+from tests.support.live_machine import machine
+from tests.support.paths import SHARED
 
 HERE = Path(__file__).parent
-EXAMPLES = Path(__file__).parents[3] / "shared" / "recordings"
+EXAMPLES = SHARED / "recordings"
 RUNS = {
     "tripod-cmm-cmm-hold": ("tripod-cmm.yaml", "hold", "clamp"),
     "tripod-cmm-machine_tool-fade": ("tripod-cmm.yaml", "fade", "refuse"),
@@ -32,7 +33,7 @@ VERDICTS = sorted(path.name for path in (HERE / "verdicts").glob("*.json"))
 def test_setpoints_are_bit_for_bit_those_of_0_1_0(run):
     name, on_stale, on_limit = RUNS[run]
     configuration = machine(name, on_stale=on_stale, on_limit=on_limit).configuration
-    cycles = list(replay(configuration, Transcripts(HERE / "replay" / run)))
+    cycles = list(replay(configuration, RecordedCycles(HERE / "replay" / run)))
     assert len(cycles) == 20
     assert [cycle.where for cycle in cycles if cycle.differs] == []
 

@@ -24,9 +24,11 @@ from tests.scoreboard.trial import prepare, run
 def main() -> None:
     options = _options()
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    wanted = named(options.case) if options.case else cases(
-        options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs
-    )  # fmt: skip
+    wanted = (
+        named(options.case)
+        if options.case
+        else cases(options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs)
+    )
     if options.prepare:
         failed = _in_parallel(prepare, wanted[: options.most], options, lambda _: None)
         raise SystemExit(str(failed) if failed else 0)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from compd.simulation.hidden import CAUSES
+from compd.simulation.causes.catalogue import CAUSES
 
 Kind = Literal["library", "nothing", "outside", "pair"]
 KINDS: tuple[Kind, ...] = ("library", "nothing", "outside", "pair")
@@ -47,14 +47,16 @@ def cases(
     found = {
         "library": [
             Case("library", (name,), (floors,), 1000 + seed)
-            for seed in range(seeds) for floors in strengths for name in library
+            for seed in range(seeds)
+            for floors in strengths
+            for name in library
         ],
         "nothing": [Case("nothing", (), (), 2000 + seed) for seed in range(nothing)],
         "outside": [
             Case("outside", (name,), (_size(3000 + seed),), 3000 + seed) for seed in range(outside) for name in others
         ],
         "pair": [_pair(library, 4000 + seed) for seed in range(pairs)],
-    }  # fmt: skip
+    }
     return list(_evenly([found[kind] for kind in kinds]))
 
 
@@ -71,9 +73,7 @@ def _pair(library: Sequence[str], seed: int) -> Case:
 
 def _evenly(groups: Sequence[Sequence[Case]]) -> Iterator[Case]:
     """Each group spread over the whole: sorted by how far through its own group a case is."""
-    placed = [
-        ((number + 0.5) / len(group), case) for group in groups for number, case in enumerate(group)
-    ]  # fmt: skip
+    placed = [((number + 0.5) / len(group), case) for group in groups for number, case in enumerate(group)]
     return (case for _, case in sorted(placed, key=lambda pair: pair[0]))
 
 

@@ -12,8 +12,16 @@ POSITION = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 WITHIN_STD = 1.96
 # Effects whose truth has the library's own form, so that its parameters have a true value: their numbers are
 # the same quantity. Elsewhere (a round loop, a thermal chain, a stand that creeps less every day) there is none.
-SAME_FORM = ("scale_gain", "joint_comparator_gain", "frame_comparator_gain", "tool_offset", "link_zero",
-             "base_joint_position", "platform_joint_position", "revolute_axis_tilt")  # fmt: skip
+SAME_FORM = (
+    "scale_gain",
+    "joint_comparator_gain",
+    "frame_comparator_gain",
+    "tool_offset",
+    "link_zero",
+    "base_joint_position",
+    "platform_joint_position",
+    "revolute_axis_tilt",
+)
 
 Result = Mapping[str, Any]
 

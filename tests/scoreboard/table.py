@@ -49,11 +49,19 @@ def _summary(by_kind: dict[str, list[Result]]) -> Iterator[str]:
     yield _row("nothing hidden: says adequate", by_kind["nothing"], scoring.adequate, ">= 98 %")
     outside = [one for one in by_kind["outside"] if plain(one)]
     yield _row("outside the library: names none", outside, lambda one: not scoring.steps(one), "")
-    yield _row("outside: names none, right covariate first or second", outside,
-               lambda one: not scoring.steps(one) and scoring.covariate_found(one), ">= 95 %")  # fmt: skip
+    yield _row(
+        "outside: names none, right covariate first or second",
+        outside,
+        lambda one: not scoring.steps(one) and scoring.covariate_found(one),
+        ">= 95 %",
+    )
     right = [one for one in library if scoring.named_first(one)]
-    yield _row("floor ratio on the other recording <= 1.1, where named rightly", right,
-               lambda one: one["other_floor_ratio"] <= MOST_RATIO, "all")  # fmt: skip
+    yield _row(
+        "floor ratio on the other recording <= 1.1, where named rightly",
+        right,
+        lambda one: one["other_floor_ratio"] <= MOST_RATIO,
+        "all",
+    )
     covered = [inside for one in right for _, inside in scoring.intervals(one)]
     yield f"| 95 % interval holds the true parameter | {len(covered)} numbers | {_percent(covered)} | 93-97 % |"
     took = [one["took_s"] for one in every]

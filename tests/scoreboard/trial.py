@@ -17,12 +17,13 @@ from typer.testing import CliRunner
 
 from compd.cli.main import app
 from compd.configuration import load
-from compd.simulation.hidden import Hidden, seal
-from compd.simulation.recorded import record
-from compd.workbench.write import write_recording
+from compd.recording.writer import write_recording
+from compd.simulation.campaign.simulated_recording import record
+from compd.simulation.causes.catalogue import HiddenCause, seal
 from tests.scoreboard.cases import Case
+from tests.support.paths import ROOT
 
-CONFIG = Path(__file__).parents[2] / "config" / "tripod-cmm.yaml"
+CONFIG = ROOT / "config" / "tripod-cmm.yaml"
 TIMEOUT_S = 300.0
 
 
@@ -31,7 +32,7 @@ def prepare(case: Case, campaigns: Path) -> Path:
     directory = campaigns / case.name.replace(":", "_")
     if not (directory / "other.answer.json").exists():
         directory.mkdir(parents=True, exist_ok=True)
-        wanted = [Hidden(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
+        wanted = [HiddenCause(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
         sized = hide(case, wanted, directory, "train", 0)
         hide(case, sized, directory, "other", 1)
     return directory
@@ -49,17 +50,29 @@ def run(case: Case, campaigns: Path) -> dict[str, Any]:
         verdict = json.loads(said)
         ratio, fitted = add_all(directory, [step["effect"] for step in verdict["steps"]])
     secret = json.loads((prepared / "train.answer.json").read_text(encoding="utf-8"))
-    return {"case": case.name, "kind": case.kind, "verdict": verdict, "took_s": took_s, "other_floor_ratio": ratio,
-            "fitted": fitted, "secret": secret}  # fmt: skip
+    return {
+        "case": case.name,
+        "kind": case.kind,
+        "verdict": verdict,
+        "took_s": took_s,
+        "other_floor_ratio": ratio,
+        "fitted": fitted,
+        "secret": secret,
+    }
 
 
-def hide(case: Case, hidden: list[Hidden], directory: Path, name: str, other_days: int) -> list[Hidden]:
+def hide(case: Case, hidden: list[HiddenCause], directory: Path, name: str, other_days: int) -> list[HiddenCause]:
     """A campaign with these causes in it, and how strong each became; NAME.answer.json is for the scorer."""
     recorded = record(load(CONFIG), case.seed, hidden, other_days=other_days)
     write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar, overwrite=True)
-    seal(directory / f"{name}.answer.json", [one.cause for one in recorded.hidden],
-         [one.floors for one in recorded.hidden], recorded.weak, case.seed)  # fmt: skip
-    return [Hidden(one.cause.id, one.cause.strength) for one in recorded.hidden]
+    seal(
+        directory / f"{name}.answer.json",
+        [one.cause for one in recorded.hidden],
+        [one.floors for one in recorded.hidden],
+        recorded.weak,
+        case.seed,
+    )
+    return [HiddenCause(one.cause.id, one.cause.strength) for one in recorded.hidden]
 
 
 def add_all(directory: Path, effects: list[str]) -> tuple[float, list[dict[str, Any]]]:
@@ -93,9 +106,14 @@ def timed(directory: Path, *arguments: str) -> tuple[str, float]:
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     start_s = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", "compd", *arguments], cwd=directory, env=environment, timeout=TIMEOUT_S,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-m", "compd", *arguments],
+        cwd=directory,
+        env=environment,
+        timeout=TIMEOUT_S,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     took_s = time.perf_counter() - start_s
     if done.returncode:
         raise RuntimeError(f"compd {' '.join(arguments)}: {done.stderr or done.stdout}")

@@ -7,7 +7,7 @@ import struct
 from abc import abstractmethod
 from typing import ClassVar
 
-from compd.simulation.device import SimulatedRegisterDevice
+from compd.simulation.wires.device import SimulatedRegisterDevice
 from compd_drivers.simulated.transducer import signal_for
 
 # the ends of an input's range, V or mA
@@ -53,8 +53,10 @@ class SimulatedM7017c(RegisterBank):
     held = (range(8),)
 
     def bank(self) -> dict[int, int]:
-        return {one.input: self._count(one.range, signal_for(one.linearisation, self.sense(one.name)))
-                for one in self.options.channels}  # fmt: skip
+        return {
+            one.input: self._count(one.range, signal_for(one.linearisation, self.sense(one.name)))
+            for one in self.options.channels
+        }
 
     @staticmethod
     def _count(name: str, signal: float) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar
 
-from compd.simulation.device import Sense, SimulatedByteDevice
+from compd.simulation.wires.device import Sense, SimulatedByteDevice
 
 
 class CommandDevice(SimulatedByteDevice):

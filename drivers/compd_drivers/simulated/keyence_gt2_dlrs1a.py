@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from compd.simulation.device import Sense, SimulatedByteDevice
+from compd.simulation.wires.device import Sense, SimulatedByteDevice
 
 LARGEST_MM = 199.9990  # what a head shows that has no value
 COMMAND_ERROR = "ER,{},00"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from compd.simulation.device import Sense
+from compd.simulation.wires.device import Sense
 from compd_drivers.simulated.commands import CommandDevice
 
 MM_IN = {"mm": 1.0, "um": 1e-3, "inch": 25.4}

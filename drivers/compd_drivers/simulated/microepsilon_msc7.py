@@ -6,7 +6,7 @@ import math
 import struct
 from typing import Any
 
-from compd.simulation.device import Sense, SimulatedByteDevice
+from compd.simulation.wires.device import Sense, SimulatedByteDevice
 from compd_drivers.simulated.transducer import signal_for
 
 REQUEST_LENGTH = 6

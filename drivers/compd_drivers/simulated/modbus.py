@@ -6,7 +6,7 @@ import math
 import struct
 from typing import Any
 
-from compd.simulation.device import Sense, SimulatedRegisterDevice
+from compd.simulation.wires.device import Sense, SimulatedRegisterDevice
 
 # type -> struct code, smallest and largest count
 INTEGERS = {

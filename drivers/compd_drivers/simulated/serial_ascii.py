@@ -10,7 +10,7 @@ import math
 import re
 from typing import Any
 
-from compd.simulation.device import Sense, SimulatedByteDevice
+from compd.simulation.wires.device import Sense, SimulatedByteDevice
 from compd_drivers.simulated.transducer import signal_for
 
 MM_IN = {"um": 1e-3, "nm": 1e-6, "inch": 25.4, "mil": 0.0254}

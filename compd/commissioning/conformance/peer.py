@@ -1,0 +1,68 @@
+"""The far end of the wire under test: a simulated device whose sensors are known, and what happens to its replies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+from compd.commissioning.conformance.faults import NONE, Fault, Piece
+from compd.gauge import Channel
+from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
+from compd.simulation.wires.modbus_slaves import Slaves
+
+# Where a gauge does not say what it can show, by unit.
+RANGES = {"mm": (-0.9, 0.9), "degC": (5.0, 45.0), "N": (-50.0, 50.0), "hPa": (950.0, 1050.0), "pct": (10.0, 90.0)}
+OTHER_RANGE = (-0.9, 0.9)
+GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples modulo 1 spread evenly: neighbours in time are far apart
+
+
+class Truth:
+    """What the sensors see: new values for every poll, so that an old reply is a wrong one."""
+
+    def __init__(self, channels: Sequence[Channel], extent: tuple[float, float] | None) -> None:
+        self.values: dict[str, float] = {}
+        self.sensed_s = math.nan  # when the device last looked at its sensors
+        self._extents = {c.name: extent or RANGES.get(c.unit, OTHER_RANGE) for c in channels}
+        self._step = 0
+
+    def turn(self) -> None:
+        """New values, each channel its own."""
+        self._step += 1
+        for place, (name, (lowest, highest)) in enumerate(self._extents.items()):
+            share = (self._step * GOLDEN + place * 0.0719) % 1.0
+            self.values[name] = lowest + share * (highest - lowest)
+
+    def go_to(self, end: int) -> None:
+        """Every channel to its lowest (0) or highest (1) value."""
+        self.values = {name: extent[end] for name, extent in self._extents.items()}
+
+    def sense(self, channel: str) -> float:
+        return self.values[channel]
+
+
+class Peer:
+    """Hears requests, answers through the faults: each reply takes the next of `faults`, then there are none."""
+
+    def __init__(self, simulator: Callable[..., Any], options: Any, truth: Truth, over_tcp: bool) -> None:
+        device = simulator(options, truth.sense)
+        registers = isinstance(device, SimulatedRegisterDevice)
+        self._device: Slaves | SimulatedByteDevice = Slaves([device], over_tcp) if registers else device
+        self.replies = 0
+        self.longest = 0  # bytes of the longest reply
+        self._truth = truth
+        self._faults: Iterator[Fault] = iter(())
+
+    def afflict(self, faults: Iterable[Fault]) -> None:
+        """What happens to the coming replies."""
+        self._faults = iter(faults)
+
+    def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+        """The pieces that come back when `request` has arrived at `heard_s`."""
+        reply = self._device.hear(request)
+        if not reply:
+            return []
+        self._truth.sensed_s = heard_s
+        self.replies += 1
+        self.longest = max(self.longest, len(reply))
+        return next(self._faults, NONE).act(reply, timeout_s)

@@ -1,0 +1,273 @@
+"""From observed replies of an unknown gauge to a `serial_ascii` description, or to why there is none.
+
+What never changed is taken for constant text, numbers with a decimal point (and whole numbers that changed) for
+channels. The description is as narrow as what was seen: a width that never changed must not change.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from compd.errors import CompdError, Problem
+from compd.gauge import Gauge, LineFault, Quality
+
+FEWEST_REPLIES = 3
+_NUMBER = re.compile(rb" *[+-]? *\d*\.\d+| *[+-] *\d+|\d+")
+
+
+class LearningError(CompdError):
+    """Replies from which no description follows."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Options for `serial_ascii` (without `line`), and what a person should look at."""
+
+    options: Mapping[str, Any]
+    notes: tuple[str, ...]
+
+
+class _Part(NamedTuple):
+    """A piece of a reply: a number or the text between two numbers, and where it begins."""
+
+    is_number: bool
+    text: bytes
+    at: int
+
+
+def learn(
+    request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
+) -> Learned:
+    """The description of a gauge that answered `request` (b"" = it speaks unasked) by `replies`.
+
+    `unit` : of every number on the wire. `names` : of the channels, 1, 2 ... if empty.
+    `errors` : whole error replies without their terminator, and their quality.
+    Raises LearningError: too few replies, or where the first one differs from the others.
+    """
+    terminator = _terminator(replies)
+    bodies = [reply[: len(reply) - len(terminator)] for reply in replies]
+    bodies = [body for body in bodies if body not in errors]
+    if len(set(bodies)) < FEWEST_REPLIES:
+        raise LearningError(
+            Problem(
+                where="replies",
+                what="too few that differ",
+                value=str(len(set(bodies))),
+                allowed=f"{FEWEST_REPLIES} or more",
+                next_step="move the gauge between two captures: near zero, far out, and to the other side",
+            )
+        )
+    columns = _columns(bodies)
+    numbers = [k for k, column in enumerate(columns) if _is_channel(column)]
+    if not numbers:
+        raise LearningError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
+    chosen = list(names) or (["value"] if len(numbers) == 1 else [str(k + 1) for k in range(len(numbers))])
+    if len(chosen) != len(numbers):
+        raise LearningError(
+            Problem(
+                where="--names",
+                what=f"{len(chosen)} names for {len(numbers)} numbers",
+                value=", ".join(chosen),
+                next_step=f"the numbers of the first reply are {[columns[k][0].text for k in numbers]}",
+            )
+        )
+    form, notes = "", []
+    for k, column in enumerate(columns):
+        if k in numbers:
+            name = chosen[numbers.index(k)]
+            text, note = _converter([part.text for part in column], name if len(numbers) > 1 else "")
+        else:
+            text, note = _constant(column)
+        form += text
+        notes += [note] if note else []
+    options = {
+        "driver": "serial_ascii",
+        **({"out": escaped(request)} if request else {}),
+        "in": form,
+        "in_terminator": escaped(terminator),
+        "channels": [{"name": name, "unit": unit} for name in chosen],
+        **(
+            {"errors": [{"in": escaped(text, "%"), "quality": said} for text, said in errors.items()]} if errors else {}
+        ),
+    }
+    return Learned(options, (*notes, "add each channel's `range` from the manual: what is beyond it is no measurement"))
+
+
+def verify(learned: Learned, driver: type[Gauge[Any]], replies: Sequence[bytes]) -> list[str]:
+    """Read every observed reply by the description: what came, in words. LearningError names one that does not fit."""
+    try:
+        options = driver.Options.model_validate({**learned.options, "line": "learned"})
+    except ValidationError as error:
+        raise LearningError(
+            [Problem(where="description", what=detail["msg"], value=str(detail["input"])) for detail in error.errors()]
+        ) from error
+    said = []
+    for k, reply in enumerate(replies):
+        line = _Replay(reply)
+        try:
+            readings = driver(options).read(line)
+        except LineFault as fault:
+            raise LearningError(
+                Problem(
+                    where=f"reply {k + 1}",
+                    what=f"does not fit the description: {fault}",
+                    value=repr(reply),
+                    allowed=str(learned.options["in"]),
+                )
+            ) from fault
+        said.append(", ".join(f"{r.value:.6g}" if r.ok else str(r.quality) for r in readings))
+    return said
+
+
+def escaped(text: bytes, double: str = "") -> str:
+    r"""As a description writes it: \r \n \t \\ \xHH; characters of `double` twice."""
+    named = {0x0D: r"\r", 0x0A: r"\n", 0x09: r"\t", 0x5C: r"\\"}
+    shown = (named.get(b) or (chr(b) if 0x20 <= b < 0x7F else f"\\x{b:02x}") for b in text)
+    return "".join(2 * one if one in double else one for one in shown)
+
+
+def _terminator(replies: Sequence[bytes]) -> bytes:
+    """Control characters that end every reply; b"" if all are equally long without any."""
+    if not replies or not all(replies):
+        raise LearningError(
+            Problem(where="replies", what="there is none, or an empty one", next_step="check port, baud and format")
+        )
+    ending = re.search(rb"[\x00-\x1f]*$", replies[0])
+    terminator = ending[0] if ending else b""
+    while not all(reply.endswith(terminator) for reply in replies):
+        terminator = terminator[1:]
+    if not terminator and len({len(reply) for reply in replies}) > 1:
+        k = next(k for k, reply in enumerate(replies) if len(reply) != len(replies[0]))
+        raise LearningError(
+            Problem(
+                where=f"reply {k + 1}",
+                what="has no terminator in common with reply 1, and another length",
+                value=repr(replies[k]),
+                next_step="capture whole replies, each with its end",
+            )
+        )
+    return terminator
+
+
+def _parts(body: bytes) -> list[_Part]:
+    found, at = [], 0
+    for match in _NUMBER.finditer(body):
+        found += [_Part(False, body[at : match.start()], at), _Part(True, match[0], match.start())]
+        at = match.end()
+    return [*found, _Part(False, body[at:], at)]
+
+
+def _columns(bodies: Sequence[bytes]) -> list[list[_Part]]:
+    """Column by column the parts of all replies. LearningError where one reply is built differently."""
+    split = [_parts(body) for body in bodies]
+    for k, parts in enumerate(split):
+        for mine, first in zip(parts, split[0], strict=False):
+            if not mine.is_number and len(mine.text) != len(first.text):
+                raise _differs(k, mine.at, bodies[k], bodies[0])
+            if mine.is_number and (b"." in mine.text) != (b"." in first.text):
+                raise _differs(k, mine.at, bodies[k], bodies[0])
+        if len(parts) != len(split[0]):
+            raise _differs(k, min(parts[-1].at, split[0][-1].at), bodies[k], bodies[0])
+    return [list(column) for column in zip(*split, strict=True)]
+
+
+def _differs(k: int, at: int, body: bytes, first: bytes) -> LearningError:
+    return LearningError(
+        Problem(
+            where=f"reply {k + 1}, character {at + 1}",
+            what="is built differently from reply 1",
+            value=repr(body),
+            allowed=repr(first),
+            next_step="if it is an error reply, name it: --error 'TEXT=quality'; if it is damaged, capture it again",
+        )
+    )
+
+
+def _is_channel(column: Sequence[_Part]) -> bool:
+    """A number with a point or a sign always counts; a bare whole number (an address, a name) if it changed."""
+    if not column[0].is_number:
+        return False
+    bare = all(part.text.isdigit() for part in column)
+    return not bare or len({part.text for part in column}) > 1
+
+
+def _constant(column: Sequence[_Part]) -> tuple[str, str]:
+    """Text that never changed, literally; a character that did, as the set of what was seen."""
+    form, note = "", ""
+    for place in range(len(column[0].text)):
+        seen = sorted({part.text[place : place + 1] for part in column})
+        if len(seen) == 1:
+            form += escaped(seen[0], "%")
+            continue
+        form += "%*1[" + "".join(escaped(one) for one in sorted(seen, key=lambda one: one in b"-^]")) + "]"
+        note += f"{', ' if note else 'look up what else can stand where only '}{b''.join(seen)!r} were seen"
+    return form, note
+
+
+def _converter(texts: Sequence[bytes], name: str) -> tuple[str, str]:
+    """A number's converter, as narrow as what was seen, and what to look at."""
+    decimals = {len(text.partition(b".")[2]) if b"." in text else None for text in texts}
+    signed = all(re.search(rb"[+-]", text) for text in texts)
+    blank = all(text[:1] in b"+- " for text in texts) and not signed
+    fixed = len({len(text) for text in texts}) == 1
+    zeros = fixed and all(re.search(rb"[+-]?0\d", text) for text in texts)
+    note = ""
+    head = ""
+    if not fixed:
+        blanks = min(len(text) - len(text.lstrip(b" ")) for text in texts)
+        head, blank = " " * blanks, False
+        note = f"{name or 'the number'} has no fixed width: a digit lost on the wire cannot be found"
+    (places,) = decimals if len(decimals) == 1 else (None,)
+    point = any(b"." in text for text in texts)
+    if point and places is None:
+        note = f"{name or 'the number'} has no fixed count of decimals: a digit lost on the wire cannot be found"
+    if not point:
+        note = f"{name or 'the number'} is a whole number: give its channel `decimals` or `scale`"
+    return (
+        head
+        + "%"
+        + (f"({name})" if name else "")
+        + ("+" if signed else " " if blank else "")
+        + ("0" if zeros else "")
+        + (str(len(texts[0])) if fixed else "")
+        + (f".{places}" if point and places else "")
+        + ("f" if point else "d"),
+        note,
+    )
+
+
+class _Replay:
+    """A line on which always the same reply comes."""
+
+    def __init__(self, reply: bytes) -> None:
+        self._reply = reply
+        self._waiting = b""
+
+    def send(self, request: bytes) -> float:
+        self._waiting = self._reply
+        return 0.0
+
+    def listen(self) -> float:
+        """A device that speaks unasked is heard from the middle of a line on."""
+        self._waiting = 2 * self._reply
+        return 0.0
+
+    def receive(self, count: int, timeout_s: float | None = None) -> bytes:
+        if len(self._waiting) < count:
+            raise LineFault(Quality.INCOMPLETE if self._waiting else Quality.TIMEOUT, repr(self._waiting))
+        taken, self._waiting = self._waiting[:count], self._waiting[count:]
+        return taken
+
+    def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
+        end = self._waiting.find(terminator)
+        if not 0 <= end <= limit - len(terminator):
+            raise LineFault(Quality.MISMATCH, repr(self._waiting))
+        return self.receive(end + len(terminator))
+
+    def drain(self) -> bytes:
+        return self.receive(len(self._waiting))

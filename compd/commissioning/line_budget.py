@@ -1,0 +1,195 @@
+"""What a line can carry: bytes and milliseconds of a round, and the sampling rate that follows.
+
+The reckoning is the line's own limit: bits on the wire, the silence before each request, and the time that a device
+takes to answer. What the computer adds is not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from compd.configuration import Configuration
+from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
+from compd.errors import Problem
+
+QUIET_CHARACTERS = 3.5  # of silence before a frame (Modbus over Serial Line V1.02, 2.5.1.1); also kept on ASCII lines
+SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
+SHORTEST_QUIET_ASCII_S = 1e-3
+# A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
+USUAL_TURNAROUND_S = 10e-3
+# Over Ethernet: a packet there and back through a device's firmware. No bits to count.
+TCP_EXCHANGE_S = 2e-3
+
+Traffic = Sequence[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How long things take on a line.
+
+    character_s : of one character, 0 over TCP.
+    quiet_s : silence before a request.
+    turnaround_s : from a request's last bit to the reply's first.
+    """
+
+    character_s: float
+    quiet_s: float
+    turnaround_s: float
+
+    def exchange_s(self, sent: int, received: int) -> float:
+        """One request of `sent` bytes and its reply of `received` bytes, s."""
+        return self.quiet_s + (sent + received) * self.character_s + self.turnaround_s
+
+    def round_s(self, traffic: Traffic) -> float:
+        """All exchanges of a round, s."""
+        return sum(self.exchange_s(sent, received) for sent, received in traffic)
+
+
+def character_bits(form: str) -> int:
+    """Bits of one character on the wire: start, data, parity, stop; "8N1" has 10, "7E2" 11."""
+    return 1 + int(form[0]) + (form[1] != "N") + int(form[2])
+
+
+def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = None) -> Pace:
+    """A serial line's pace. `turnaround_s`: as short as the silence that a device must keep, if None."""
+    character_s = character_bits(form) / baud
+    quiet_s = max(QUIET_CHARACTERS * character_s, SHORTEST_QUIET_RTU_S if rtu else SHORTEST_QUIET_ASCII_S)
+    return Pace(character_s, quiet_s, quiet_s if turnaround_s is None else turnaround_s)
+
+
+def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
+    """A configured line's pace. Behind socket:// the device server's baud rate counts: it is the configured one."""
+    if isinstance(line, SerialLine | ModbusRtuLine):
+        return serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
+    return Pace(0.0, 0.0, TCP_EXCHANGE_S if turnaround_s is None else max(turnaround_s, TCP_EXCHANGE_S))
+
+
+@dataclass(frozen=True)
+class LinePlan:
+    """One line's round: every gauge on it once.
+
+    bytes : there and back. ideal_s, usual_s : duration of a round with the shortest and the usual turnaround.
+    absent_s : what a round costs more while one device does not answer, before its gauge is put to rest.
+    unknown : gauges whose drivers do not say what they move; they are not in the figures.
+    """
+
+    name: str
+    line: LineSettings
+    gauges: int
+    exchanges: int
+    bytes: int
+    ideal_s: float
+    usual_s: float
+    absent_s: float
+    unknown: tuple[str, ...] = field(default=())
+
+    @property
+    def known(self) -> bool:
+        """Whether there are figures at all."""
+        return self.exchanges > 0 and not self.unknown
+
+    @property
+    def ideal_hz(self) -> float:
+        """Rounds per second at best; nan if unknown. `poll_every_s` of the line is an upper limit."""
+        return self._rate_hz(self.ideal_s)
+
+    @property
+    def usual_hz(self) -> float:
+        """Rounds per second with devices that take 10 ms to answer; nan if unknown."""
+        return self._rate_hz(self.usual_s)
+
+    def _rate_hz(self, round_s: float) -> float:
+        return 1 / max(round_s, self.line.poll_every_s) if self.known else math.nan
+
+
+def plan_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None]) -> LinePlan:
+    """The plan of one line; `gauges`: each one's traffic per poll, None = unknown."""
+    known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
+    slowest = pace(line, USUAL_TURNAROUND_S)
+    # The request goes out, nothing comes for the timeout, and the line is drained for another one.
+    absent_s = max(
+        (2 * line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
+        default=2 * line.timeout_s,
+    )
+    return LinePlan(
+        name=name,
+        line=line,
+        gauges=len(gauges),
+        exchanges=len(known),
+        bytes=sum(sent + received for sent, received in known),
+        ideal_s=pace(line).round_s(known),
+        usual_s=slowest.round_s(known),
+        absent_s=absent_s,
+        unknown=tuple(gauge for gauge, traffic in gauges.items() if traffic is None),
+    )
+
+
+def plan(configuration: Configuration) -> list[LinePlan]:
+    """Every line that a gauge hangs on."""
+    gauges = configuration.gauge_objects()
+    return [
+        plan_line(name, line, {gauge: gauges[gauge].traffic() for gauge in _on(configuration, name)})
+        for name, line in configuration.lines.items()
+        if _on(configuration, name)
+    ]
+
+
+def warnings(configuration: Configuration, plans: Sequence[LinePlan]) -> list[Problem]:
+    """What will not work as configured, or will not while one device is absent."""
+    found = []
+    for one in plans:
+        stale_after_s = min(
+            configuration.gauges[gauge].stale_after_s or configuration.loop.stale_after_s
+            for gauge in _on(configuration, one.name)
+        )
+        found += line_warnings(one, stale_after_s, f"{configuration.path} lines.{one.name}")
+    return found
+
+
+def _on(configuration: Configuration, line: str) -> list[str]:
+    return [gauge for gauge, options in configuration.gauges.items() if options.line == line]
+
+
+def line_warnings(one: LinePlan, stale_after_s: float, where: str) -> list[Problem]:
+    """One line's warnings. `stale_after_s`: how old its strictest gauge lets a reading become; `where`: its place."""
+    if one.unknown:
+        text = f"cannot be planned: {', '.join(one.unknown)} does not say how many bytes it moves"
+        return [
+            Problem(where=where, what=text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")
+        ]
+    found = []
+    takes = f"a round of {one.bytes} bytes takes {one.usual_s * 1e3:.1f} ms with 10 ms turnaround"
+    # A reading is up to a whole round old when the next one comes, and must outlive that one's own reading.
+    if 2 * one.usual_s > stale_after_s:
+        found.append(
+            Problem(
+                where=where,
+                what=f"{takes}: readings go stale between two polls",
+                value=f"{stale_after_s:g} s until stale",
+                allowed=f"{2 * one.usual_s:.3g} s or more",
+                next_step="raise the baud rate, read registers in one block, or spread the gauges over more lines",
+            )
+        )
+    if one.line.poll_every_s and one.usual_s > one.line.poll_every_s:
+        found.append(
+            Problem(
+                where=where,
+                what=f"{takes}: the wanted rate cannot be reached",
+                value=f"poll_every_s {one.line.poll_every_s:g}",
+                allowed=f"{one.usual_s:.3g} s or more",
+                next_step="raise poll_every_s, or the baud rate",
+            )
+        )
+    if one.gauges > 1 and one.usual_s + one.absent_s > stale_after_s:
+        found.append(
+            Problem(
+                where=where,
+                what=f"one absent device of {one.gauges} delays the others by {one.absent_s * 1e3:.0f} ms: "
+                "they go stale whenever it is tried again",
+                value=f"{stale_after_s:g} s until stale",
+                next_step="shorten timeout_s, or give that device a line of its own",
+            )
+        )
+    return found

@@ -1,0 +1,85 @@
+"""Serial ports of this computer, and which preset gets an answer on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from serial.tools.list_ports import comports
+
+from compd.clock import MonotonicClock
+from compd.commissioning.open_gauge import TappedWire, settings_of
+from compd.gauge import Gauge, LineFault
+from compd.lines import open_line
+from compd.plugins import GAUGES, load, names
+
+BY_ID = Path("/dev/serial/by-id")
+PROBE_TIMEOUT_S = 0.5
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """`path` stays the same when the adapter moves to another socket, where the system knows such a name."""
+
+    path: str
+    device: str
+    description: str
+
+
+def ports(by_id: Path = BY_ID) -> list[FoundPort]:
+    """Every serial port, with its lasting name where there is one."""
+    lasting = {str(link.resolve()): str(link) for link in sorted(by_id.glob("*"))} if by_id.is_dir() else {}
+    found = [FoundPort(lasting.get(p.device, p.device), p.device, _description(p)) for p in comports()]
+    known = {port.device for port in found}
+    found += [FoundPort(path, device, "") for device, path in lasting.items() if device not in known]
+    return sorted(found, key=lambda port: port.path)
+
+
+def _description(port: Any) -> str:
+    parts = [port.manufacturer, port.product or port.description, port.serial_number and f"serial {port.serial_number}"]
+    return ", ".join(part for part in parts if part and part != "n/a")
+
+
+@dataclass(frozen=True)
+class PresetCandidate:
+    """A preset that can be tried without knowing more of the device."""
+
+    name: str
+    gauge: Gauge[Any]
+    baud: int
+    format: str
+
+
+def candidates() -> list[PresetCandidate]:
+    """Presets that say how their device is delivered and need no other options than their sample's."""
+    found = []
+    for name in names(GAUGES):
+        driver = load(GAUGES, name, name)
+        if driver.usual_line is not None:
+            options = driver.Options.model_validate({"driver": name, "line": "probe", **(driver.sample_options or {})})
+            found.append(PresetCandidate(name, driver(options), *driver.usual_line))
+    return found
+
+
+def probe_port(path: str, candidate: PresetCandidate) -> str:
+    """What one read gives: values, or the fault in words. A mismatch, too, means that something speaks there."""
+    registers = candidate.gauge.line_kind == "registers"
+    try:
+        settings = settings_of(TappedWire(path, candidate.baud, candidate.format, PROBE_TIMEOUT_S), registers)
+        line = open_line(settings, MonotonicClock())
+        try:
+            return shown(candidate.gauge, candidate.gauge.read(line))
+        finally:
+            line.close()
+    except LineFault as fault:
+        return str(fault)
+
+
+def shown(gauge: Gauge[Any], readings: Sequence[Any]) -> str:
+    """Readings in one line."""
+    return ", ".join(
+        f"{channel.name} {reading.value:.6g} {channel.unit}" if reading.ok else f"{channel.name} {reading.quality}"
+        for channel, reading in zip(gauge.channels, readings, strict=True)
+    )

@@ -1,0 +1,227 @@
+"""A recording on its machine: what was measured beside what the model makes of the gauges, coordinate by coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray
+from compd.comparison.registration import Registration, free_motion, lay_over
+from compd.comparison.velocity import velocities
+from compd.configuration import Configuration
+from compd.errors import CompdError, Problem, RecordingError
+from compd.machine_builder import build_model
+from compd.model.effect import Deltas, Effect, FittedEffect, Port, Shape, deltas, missing, together
+from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
+from compd.model.machine import MachineModel
+from compd.model.observations import Observations
+from compd.model.observe import Movement, observe, observe_tip
+from compd.model.prediction import Sensitivity, columns, predict, sensitivities
+from compd.model.solve_status import MEANING, Reason
+from compd.recording.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedRecording:
+    """N rows with m measured coordinates each: x, y, z of the tip, or lengths of links.
+
+    model : None for `machine: external`.
+    rows : all N rows, also those that are not used: effects with memory need their history.
+    labels : (m,) "x", "y", "z" or "link 1" ...; axes : (m,) 0, 1, 2 = x, y, z; or the links, from 0.
+    measured_mm : (N, m), in {M}; registration : how it was taken there, None where it came in {M}.
+    """
+
+    recording: Recording
+    model: MachineModel | None
+    rows: Observations
+    labels: tuple[str, ...]
+    axes: tuple[int, ...]
+    measured_mm: FloatArray
+    registration: Registration | None
+    _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
+
+    @property
+    def of_links(self) -> bool:
+        """Whether link lengths were measured, not the tip."""
+        return self.recording.reference_link_mm is not None
+
+    @property
+    def registered(self) -> bool:
+        """Whether six parameters of the instrument's frame are always fitted along."""
+        reference = self.recording.reference
+        return reference is not None and reference.frame == "instrument" and not self.of_links
+
+    def predicted_mm(self, added: Deltas, rows: Observations | None = None) -> FloatArray:
+        """(N, m) what a reference shows when the effects add `added` at their ports; nan where there is no pose."""
+        rows = self.rows if rows is None else rows
+        if self.model is None:
+            predicted = np.asarray(_external(self.recording))
+            return predicted if "reference" not in added else predicted + added["reference"][:, list(self.axes)]
+        prediction = predict(self.model, rows, added)
+        if self.of_links:
+            return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
+        return prediction.tip_mm[:, list(self.axes)]
+
+    def sensitivity(self, ports: Collection[Port]) -> Mapping[Port, Sensitivity]:
+        """Derivatives of the prediction by what is added at `ports`; each is computed once."""
+        new = [port for port in ports if port not in self._by_port]
+        if new and self.model is not None:
+            self._by_port.update(sensitivities(self.model, self.rows, new))
+        return self._by_port
+
+    def columns(self, effect: Effect, shape: Shape) -> FloatArray:
+        """(N, m, P) by how many mm each fitted number of the effect moves the prediction."""
+        basis, _ = effect.basis(self.rows, shape, None)
+        if self.model is None:
+            return np.asarray(basis[:, list(self.axes)])
+        found = columns(effect, self.rows, basis, self.sensitivity(effect.ports))
+        return (found.link_length if self.of_links else found.tip)[:, list(self.axes)]
+
+    @cached_property
+    def free_columns(self) -> FloatArray:
+        """(N, m, 6 or fewer; 0 for a reference in {M}) columns of the instrument's frame."""
+        if not self.registered:
+            return np.zeros((*self.measured_mm.shape, 0))
+        return free_motion(self.rows.tip_M_mm, self.axes)
+
+    @cached_property
+    def usable(self) -> tuple[BoolArray, Mapping[str, int]]:
+        """(N,) rows with every gauge and reference value and a pose; and reason -> rows left out."""
+        recording = self.recording
+        # a link's length needs neither the frame nor the other links' references
+        needed = [*recording.gauge_columns, *recording.reference_columns, *recording.model_columns]
+        mask, left = recording.usable(needed)
+        left_out = {**recording.left_out, **left}
+        nowhere = mask & ~np.isfinite(self.predicted_mm({})).all(axis=1)
+        if nowhere.any():
+            left_out[self._why_no_pose(nowhere)] = int(nowhere.sum())
+        return mask & ~nowhere, left_out
+
+    def attitude_residual_urad(self, added: Deltas) -> FloatArray | None:
+        """(N, 3) rotation vector from the modelled to the measured attitude, in {M}; None where none was measured."""
+        measured = self.recording.reference_rotation_rad
+        if measured is None or self.model is None:
+            return None
+        attitude = rotation_matrix(measured)
+        if self.registration is not None:
+            attitude = compose(self.registration.rotation, attitude)
+        modelled = predict(self.model, self.rows, added).rotation_M_P
+        return np.asarray(rotation_vector(compose(attitude, modelled.transpose(0, 2, 1)))) * 1e6
+
+    def _why_no_pose(self, rows: BoolArray) -> str:
+        if self.model is None:
+            return "the model's prediction is empty"
+        reasons = predict(self.model, self.rows, {}).reason[rows]
+        return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
+
+
+def observed(recording: Recording, configuration: Configuration | None) -> AlignedRecording:
+    """A recording on the machine that the configuration describes; None only for an external model.
+
+    Raises RecordingError where there is no reference, or where nothing can be computed from any row.
+    """
+    where = str(recording.path)
+    if recording.reference is None:
+        raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
+    model = None
+    if configuration is None:
+        rows = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, _starts(recording))
+    else:
+        model = build_model(configuration.geometry, configuration.wiring)
+        rows = _rows(recording, model)
+    measured = recording.reference_link_mm if recording.reference_link_mm is not None else recording.reference_mm
+    if measured is None:
+        raise RecordingError(Problem(where=where, what="has no column of the reference"))
+    if recording.reference_link_mm is not None:
+        links = recording.reference_links
+        return AlignedRecording(
+            recording, model, rows, tuple(f"link {i}" for i in links), tuple(i - 1 for i in links), measured, None
+        )
+    axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
+    registration = None
+    # with fewer than three axes a frame cannot be laid over another: it must lie near already
+    if recording.reference.frame == "instrument" and len(axes) == 3:
+        registration = lay_over(np.where(recording.excluded[:, None], np.nan, measured), rows.tip_M_mm)
+        measured = measured if registration is None else registration.into_M(measured)
+    return AlignedRecording(recording, model, rows, recording.reference_axes, axes, measured, registration)
+
+
+def added_by(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
+    """What each effect adds at its ports, by id, and all together.
+
+    Raises CompdError with everything that the effects need and the recording has not.
+    """
+    problems = [problem for one in fitted for problem in missing(one.effect, rows.available, rows.links)]
+    if problems:
+        raise CompdError(problems)
+    each, _ = deltas(fitted, rows, {})
+    return each, together(list(each.values()))
+
+
+def _rows(recording: Recording, model: MachineModel) -> Observations:
+    """Every row of the recording as effects see it; comparators that were not recorded count as unmoved."""
+    assert model.constants is not None
+    count = recording.rows
+    scale_mm = recording.scale_mm
+    if scale_mm is None:
+        raise RecordingError(
+            Problem(
+                where=str(recording.path),
+                what="has no scale columns",
+                allowed="scale_1_mm ...",
+                next_step="a machine's recording needs its scales; `machine: external` needs none",
+            )
+        )
+    comparators = model.joint_weights.shape[1]
+    joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
+    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
+    approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
+    at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
+    velocity = velocities(recording.time_s, _starts(recording), at_point, scale_mm, joint_mm)
+    movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
+    return observe(
+        model,
+        model.constants,
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=recording.quantities,
+        time_s=recording.time_s,
+        session_start=_starts(recording),
+        movement=movement,
+    )
+
+
+def _starts(recording: Recording) -> BoolArray:
+    """(N,) rows without a history: the first of each session."""
+    starts = np.zeros(recording.rows, dtype=bool)
+    starts[:1] = True
+    if recording.session is not None:
+        starts[1:] = recording.session[1:] != recording.session[:-1]
+    return starts
+
+
+def _external(recording: Recording) -> FloatArray:
+    """(N, m) the user's own model's prediction of what was measured."""
+    predicted = recording.model_mm if recording.model_link_mm is None else recording.model_link_mm
+    if predicted is None:
+        raise RecordingError(
+            Problem(
+                where=str(recording.path),
+                what="`machine: external`, but no column of the model's prediction",
+                allowed="model_x_mm ...",
+                next_step="add the model's prediction, or name the machine",
+            )
+        )
+    return predicted
+
+
+def _external_tip(recording: Recording) -> FloatArray:
+    """(N, 3) the tip as far as the user's model predicts it; nan on the other axes."""
+    tip = np.full((recording.rows, 3), np.nan)
+    if recording.model_mm is not None:
+        tip[:, ["xyz".index(axis) for axis in recording.reference_axes]] = recording.model_mm
+    return tip

@@ -1,0 +1,69 @@
+"""Processes that run beside a command: each ready before the next starts, all stopped at the end."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from compd.errors import DaemonError, Problem
+
+# The first start on a machine compiles the kernels; a slow one needs a minute or two.
+START_TIMEOUT_S = 180.0
+STOP_TIMEOUT_S = 10.0
+LOOK_EVERY_S = 0.05
+
+
+@dataclass(frozen=True)
+class Command:
+    """`compd` arguments, and the file (a socket) that exists once the process is ready."""
+
+    arguments: Sequence[str]
+    ready: Path
+
+
+@contextmanager
+def running(commands: Sequence[Command], log: Path) -> Iterator[None]:
+    """Run `commands`; what they print goes to `log`. Raises DaemonError, with that output, if one does not start."""
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        with log.open("wb") as output:
+            for command in commands:
+                process = subprocess.Popen(
+                    [sys.executable, "-m", "compd", *command.arguments],
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=output,
+                    start_new_session=True,
+                )
+                processes.append(process)
+                _wait(command, process, log)
+            yield
+    finally:
+        for process in reversed(processes):
+            process.send_signal(signal.SIGTERM)
+        for process in reversed(processes):
+            try:
+                process.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def _wait(command: Command, process: subprocess.Popen[bytes], log: Path) -> None:
+    end = time.monotonic() + START_TIMEOUT_S
+    while not command.ready.exists():
+        if process.poll() is not None or time.monotonic() > end:
+            raise DaemonError(
+                Problem(
+                    where=f"compd {' '.join(command.arguments)}",
+                    what="did not start",
+                    next_step="read what it printed:\n" + log.read_text(errors="replace")[-8000:],
+                )
+            )
+        time.sleep(LOOK_EVERY_S)

@@ -1,0 +1,1 @@
+"""Driver threads: one per line, each polls the gauges of its line."""

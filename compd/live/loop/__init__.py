@@ -1,0 +1,1 @@
+"""The compute loop: from a snapshot of readings to a setpoint, at a fixed rate."""

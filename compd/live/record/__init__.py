@@ -1,0 +1,1 @@
+"""Recording the running daemon, and replaying what was recorded."""

@@ -1,0 +1,160 @@
+"""A recorded run through the live path again: do the same readings give the same setpoints, bit for bit?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from compd.configuration import Configuration
+from compd.errors import Problem, RecordingError
+from compd.live.loop.commands import Commands
+from compd.live.loop.model_loader import LiveModel, Models
+from compd.live.pipeline import Pipeline, build_pipeline
+from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
+from compd.live.service.readings_message import RecordedCycle, parse_readings
+
+
+class ReplayedCycle(NamedTuple):
+    """One cycle: where its line is, the SETPOINT line that was sent, and the one that comes out now."""
+
+    where: str
+    tick: int
+    sent: bytes
+    replayed: bytes
+
+    @property
+    def differs(self) -> bool:
+        return self.sent != self.replayed
+
+
+class RecordedCycles:
+    """The cycles of one recording's parts, oldest first."""
+
+    def __init__(self, name: Path) -> None:
+        """`name`: as given to the recorder (all parts), or one part's own, with or without a suffix.
+
+        Raises RecordingError where there is none.
+        """
+        stem = name.name.removesuffix(CYCLES_SUFFIX).removesuffix(".csv").removesuffix(".yaml")
+        one = name.with_name(stem + CYCLES_SUFFIX)
+        self.paths = [one] if one.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
+        self.torn = 0
+        if not self.paths:
+            raise RecordingError(
+                Problem(
+                    where=str(one),
+                    what="is not there, nor parts of it",
+                    allowed=f"a recording by `compd record` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
+                    next_step="give its name",
+                )
+            )
+
+    def config_hashes(self) -> set[str]:
+        """Of the configurations that the daemon ran."""
+        found = set()
+        for path in self.paths:
+            for _, message in self._messages(path):
+                found.add(str(message.get("config_hash")))
+                break
+        return found
+
+    def model_files(self) -> list[Path]:
+        """Copies of the models that the daemon computed with, kept beside the parts."""
+        stems = [path.name.removesuffix(CYCLES_SUFFIX) for path in self.paths]
+        return [
+            copy
+            for path, stem in zip(self.paths, stems, strict=True)
+            for copy in sorted(path.parent.glob(f"{stem}{MODEL_MARK}*.yaml"))
+        ]
+
+    def cycles(self) -> Iterator[tuple[str, Message]]:
+        """(file:line, READINGS). A line that was torn when the recorder was killed is the last; it is counted."""
+        for path in self.paths:
+            for where, message in self._messages(path):
+                if message.get("class") == "READINGS":
+                    yield where, message
+
+    def _messages(self, path: Path) -> Iterator[tuple[str, Message]]:
+        with path.open("rb") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.endswith(b"\n"):
+                    self.torn += 1
+                    return
+                where = f"{path}:{number}"
+                try:
+                    message = json.loads(line)
+                except ValueError as error:
+                    raise _damaged(where, str(error)) from error
+                if not isinstance(message, dict):
+                    raise _damaged(where, f"not an object but {type(message).__name__}")
+                yield where, message
+
+
+def replay(
+    configuration: Configuration, transcripts: RecordedCycles, model_files: Sequence[Path] = ()
+) -> Iterator[ReplayedCycle]:
+    """Every recorded cycle, computed anew by the daemon's own cycle from what it computed from then.
+
+    `model_files`: applied or shadow models that are not kept beside the recording. Time is the recording's.
+    Raises RecordingError for a damaged line, readings of another machine or a model that is not given, StateError
+    for a model file that cannot be used.
+    """
+    chain = build_pipeline(configuration, configuration.gauge_objects())
+    files = [*transcripts.model_files(), *model_files]
+    models = {"": chain.shelf.bare} | {model.hash: model for model in map(chain.shelf.read, files)}
+    for where, message in transcripts.cycles():
+        recorded = _parsed(where, message, chain, configuration)
+        inputs = recorded.inputs
+        applied = _model(where, message.get("model", ""), models)
+        shadow = _model(where, message["shadow"], models) if "shadow" in message else None
+        used = Models(applied, shadow)
+        for slot, reading in enumerate(inputs.snapshot.readings):
+            chain.latest.put(slot, reading)
+        chain.cycle.resume(inputs.carried, used)
+        snapshot = chain.latest.snapshot(inputs.snapshot.time_s)
+        setpoint = chain.cycle.run(recorded.tick, snapshot, Commands(inputs.zero, inputs.target, used))
+        yield ReplayedCycle(where, recorded.tick, recorded.setpoint_line, setpoint.to_json())
+
+
+def _parsed(where: str, message: Message, chain: Pipeline, configuration: Configuration) -> RecordedCycle:
+    channels = chain.latest.channels
+    links = configuration.geometry.links
+    try:
+        if missing := [channel for channel in channels if channel not in message["readings"]]:
+            raise RecordingError(
+                Problem(
+                    where=where,
+                    what=f"has no reading of {', '.join(missing)}",
+                    next_step="give the configuration with which it was recorded",
+                )
+            )
+        recorded = parse_readings(message, channels)
+        if len(recorded.inputs.carried.correction_mm) != links:
+            raise _damaged(where, f"is of a machine without {links} links")
+    except (KeyError, TypeError, ValueError) as error:
+        raise _damaged(where, f"{type(error).__name__}: {error}") from error
+    return recorded
+
+
+def _model(where: str, hash_: str, models: Mapping[str, LiveModel]) -> LiveModel:
+    if hash_ not in models:
+        raise RecordingError(
+            Problem(
+                where=where,
+                what="was computed with a model file that is not given",
+                value=hash_,
+                allowed=", ".join(filter(None, models)) or "none is given",
+                next_step="give it with `--model`",
+            )
+        )
+    return models[hash_]
+
+
+def _damaged(where: str, what: str) -> RecordingError:
+    return RecordingError(
+        Problem(
+            where=where, what=f"is no READINGS message as the daemon sends it: {what}", next_step="restore the file"
+        )
+    )

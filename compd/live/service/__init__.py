@@ -1,0 +1,1 @@
+"""What clients see: sockets, messages, requests, and what is done on request beside the loop."""

@@ -1,0 +1,265 @@
+"""The publisher: one thread between the loop and its clients. The loop never waits for it, nor it for a client."""
+
+from __future__ import annotations
+
+import math
+import os
+import selectors
+import socket
+import threading
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from compd.configuration.operation import SocketSettings
+from compd.errors import DaemonError, Problem
+from compd.live.loop.setpoint import Setpoint, State
+from compd.live.service.client_session import ClientSession
+from compd.live.service.messages import ErrorCode, ProtocolError
+from compd.live.service.requests import Requests
+
+# Half a second at 1 kHz: longer than any pause of the publisher that is not a fault.
+_QUEUE_LENGTH = 512
+_MAX_CLIENTS = 32
+_SOCKET_MODE = 0o660  # the daemon's user and group
+_BACKLOG = 16
+
+_log = structlog.get_logger()
+
+
+class Publisher:
+    """Listens on the Unix socket and, where configured, on TCP; sends setpoints and answers."""
+
+    def __init__(self, sockets: SocketSettings, period_s: float, observe: Callable[[Setpoint], None]) -> None:
+        """`observe` sees the first setpoint of every new state, on this thread: for the log."""
+        self._sockets = sockets
+        self._half_period_s = period_s / 2
+        self._observe = observe
+        self._selector = selectors.DefaultSelector()
+        self._sessions: set[ClientSession] = set()
+        self._queue: deque[Setpoint] = deque()
+        self._answers: deque[tuple[ClientSession, bytes]] = deque()
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
+        self._requests: Requests | None = None
+        # The loop's side: when somebody wants the next setpoint, and what it last handed over.
+        self._next_due_s = math.inf
+        self._last_state: State | None = None
+        self.dropped_setpoints = 0
+        self.dropped_clients = 0
+        self.tcp_port: int | None = None
+
+    def start(self, requests: Requests) -> None:
+        """Listen and serve. Raises DaemonError where an address cannot be had."""
+        self._requests = requests
+        try:
+            if self._sockets.tcp is not None:
+                listener = _listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
+                self.tcp_port = listener.getsockname()[1]
+                self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
+            listener = _listen_unix(Path(self._sockets.unix.path))
+            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
+        except DaemonError:
+            self._close()
+            raise
+        self._selector.register(self._wake, selectors.EVENT_READ, self._woken)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Close every connection; returns when the thread has ended."""
+        self._stop.set()
+        os.eventfd_write(self._wake, 1)
+        self._thread.join()
+        Path(self._sockets.unix.path).unlink(missing_ok=True)
+        self._close()
+
+    def _close(self) -> None:
+        for key in list(self._selector.get_map().values()):
+            if isinstance(key.fileobj, socket.socket):
+                key.fileobj.close()
+        self._selector.close()
+        os.close(self._wake)
+
+    @property
+    def alive(self) -> bool:
+        """False once the thread has ended, for whatever reason."""
+        return self._thread.is_alive()
+
+    def deliver(self, setpoint: Setpoint) -> None:
+        """Called by the loop with every setpoint: queued when someone wants it or the state is new.
+
+        When the queue is full the oldest setpoint goes, and is counted.
+        """
+        if setpoint.time_s < self._next_due_s - self._half_period_s and setpoint.state is self._last_state:
+            return
+        self._last_state = setpoint.state
+        if len(self._queue) >= _QUEUE_LENGTH:
+            try:
+                self._queue.popleft()
+                self.dropped_setpoints += 1
+            except IndexError:
+                pass  # the publisher has just emptied it
+        self._queue.append(setpoint)
+        os.eventfd_write(self._wake, 1)
+
+    def summary(self) -> dict[str, Any]:
+        """For STATUS."""
+        return {
+            "clients": len(self._sessions),
+            "dropped_clients": self.dropped_clients,
+            "dropped_setpoints": self.dropped_setpoints,
+        }
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            for key, events in self._selector.select():
+                key.data(events)
+
+    def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
+        try:
+            connection, address = listener.accept()
+        except OSError as error:
+            _log.warning("a client could not be accepted", error=error.strerror)
+            return
+        if not local:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        session = ClientSession(connection, "unix" if local else f"{address[0]}:{address[1]}", local)
+        if len(self._sessions) >= _MAX_CLIENTS:
+            session.send(ProtocolError(ErrorCode.TOO_MANY_CLIENTS, f"{_MAX_CLIENTS} clients at most").to_json())
+            session.close()
+            return
+        self._sessions.add(session)
+        self._selector.register(connection, selectors.EVENT_READ, partial(self._serve, session))
+        self._send(session, self._desk.version)
+
+    def _serve(self, session: ClientSession, events: int) -> None:
+        if events & selectors.EVENT_WRITE:
+            session.flush()
+        if events & selectors.EVENT_READ:
+            for received in session.receive():
+                reply = self._reply(session, received)
+                self._schedule()  # before the answer: the next setpoint already counts
+                self._send(session, reply)
+        self._tidy(session)
+        self._schedule()
+
+    def _reply(self, session: ClientSession, received: bytes | ProtocolError) -> bytes:
+        if isinstance(received, ProtocolError):
+            return received.to_json()
+        try:
+            return self._desk.answer(session, received, partial(self._answer_later, session))
+        except ProtocolError as error:
+            return error.to_json()
+
+    def _answer_later(self, session: ClientSession, answer: bytes) -> None:
+        """From any thread."""
+        self._answers.append((session, answer))
+        os.eventfd_write(self._wake, 1)
+
+    def _woken(self, _events: int) -> None:
+        """Setpoints or late answers are waiting. Each is encoded once in each way, and only if someone takes it."""
+        os.eventfd_read(self._wake)
+        while self._answers:
+            self._send(*self._answers.popleft())
+        while self._queue:
+            setpoint = self._queue.popleft()
+            self._observe(setpoint)
+            encoded: dict[Callable[[Setpoint], bytes], bytes] = {}
+            for session in list(self._sessions):
+                if session.takes(setpoint.time_s, self._half_period_s):
+                    if session.encode not in encoded:
+                        encoded[session.encode] = session.encode(setpoint)
+                    self._send(session, encoded[session.encode])
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Tell the loop when somebody wants the next setpoint."""
+        self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
+
+    def _send(self, session: ClientSession, data: bytes) -> None:
+        if data and session.open and not session.send(data):
+            self.dropped_clients += 1
+            session.open = False
+            _log.warning("slow client dropped", client=session.name)
+        self._tidy(session)
+
+    def _tidy(self, session: ClientSession) -> None:
+        """Listen for room to write only while something waits; forget a client that has gone."""
+        if session not in self._sessions:
+            return
+        if session.open:
+            wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if session.behind else 0)
+            if self._selector.get_key(session.connection).events != wanted:
+                self._selector.modify(session.connection, wanted, partial(self._serve, session))
+            return
+        self._sessions.discard(session)
+        self._selector.unregister(session.connection)
+        self._desk.left(session)
+        session.close()
+
+    @property
+    def _desk(self) -> Requests:
+        assert self._requests is not None, "started"
+        return self._requests
+
+
+def _listen_tcp(host: str, port: int) -> socket.socket:
+    try:
+        return socket.create_server(
+            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET, backlog=_BACKLOG
+        )
+    except OSError as error:
+        raise DaemonError(
+            Problem(
+                where=f"sockets.tcp {host}:{port}",
+                what=f"cannot listen: {error.strerror}",
+                next_step="is another compd running? choose another port, or an address of this computer",
+            )
+        ) from error
+
+
+def _listen_unix(path: Path) -> socket.socket:
+    """A socket that appears complete: it is renamed into place once it listens, over one that a crash left."""
+    arriving = path.with_name(f".{path.name}.new")
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        if _answers(path):
+            raise DaemonError(
+                Problem(
+                    where=f"sockets.unix {path}", what="another daemon is listening here", next_step="stop it first"
+                )
+            )
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arriving.unlink(missing_ok=True)
+        listener.bind(str(arriving))
+        arriving.chmod(_SOCKET_MODE)
+        listener.listen(_BACKLOG)
+        arriving.rename(path)
+    except OSError as error:
+        listener.close()
+        raise DaemonError(
+            Problem(
+                where=f"sockets.unix {path}",
+                what=f"cannot listen: {error.strerror or error}",
+                next_step="give a path in a directory that the daemon's user may write",
+            )
+        ) from error
+    except DaemonError:
+        listener.close()
+        raise
+    return listener
+
+
+def _answers(path: Path) -> bool:
+    """Whether a living process listens there."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return False
+        return True

@@ -1,0 +1,53 @@
+"""The binary setpoint over UDP, for controllers that want one packet of one size per cycle."""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+
+from compd.configuration.operation import UdpTarget
+from compd.errors import DaemonError, Problem
+from compd.live.loop.setpoint import Setpoint
+
+
+class UdpSender:
+    """Sends every setpoint from the loop's own thread: a second thread would add its wake-up to each packet.
+
+    A packet that the system does not take at once is dropped and counted.
+    """
+
+    def __init__(self, target: UdpTarget, config_hash: str) -> None:
+        """Raises DaemonError for a host that has no address."""
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            raise DaemonError(
+                Problem(
+                    where="sockets.udp.host",
+                    what=f"has no address: {error.strerror}",
+                    value=target.host,
+                    next_step="write the controller's IP address",
+                )
+            ) from error
+        self._address: Any = address
+        self._socket = socket.socket(family, kind, protocol)
+        self._socket.setblocking(False)
+        self._config_hash = bytes.fromhex(config_hash)[:8]
+        self.sent = 0
+        self.dropped = 0
+
+    def deliver(self, setpoint: Setpoint) -> None:
+        """One packet; never waits."""
+        try:
+            self._socket.sendto(setpoint.to_packet(self._config_hash), self._address)
+        except OSError:
+            self.dropped += 1
+        else:
+            self.sent += 1
+
+    def summary(self) -> dict[str, Any]:
+        """For STATUS."""
+        return {"packets_sent": self.sent, "packets_dropped": self.dropped}
+
+    def close(self) -> None:
+        self._socket.close()

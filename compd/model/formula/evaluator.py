@@ -1,0 +1,138 @@
+"""What a checked formula is, and its value: our own evaluator over the tree; nothing is compiled or executed."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray
+from compd.model.memory import State, lag
+
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., FloatArray]]] = {
+    "sin": (1, np.sin),
+    "cos": (1, np.cos),
+    "exp": (1, np.exp),
+    "log": (1, np.log),
+    "sqrt": (1, np.sqrt),
+    "abs": (1, np.abs),
+    "sign": (1, np.sign),
+    "minimum": (2, np.minimum),
+    "maximum": (2, np.maximum),
+}
+OPERATORS: Mapping[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+}
+
+# One value per fitted parameter that a term is proportional to; None for what holds none.
+Terms = dict[str | None, FloatArray]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A checked formula.
+
+    linear : parameters to which it is proportional, in the order declared.  shape : the other parameters.
+    columns : names of everything else in it.  lags : how many lag(x, tau) it holds.
+    """
+
+    text: str
+    tree: ast.expr
+    linear: tuple[str, ...]
+    shape: tuple[str, ...]
+    columns: tuple[str, ...]
+    lags: int
+
+    def evaluate(
+        self,
+        columns: Mapping[str, FloatArray],
+        constants: Mapping[str, float],
+        time_s: FloatArray,
+        session_start: BoolArray,
+        states: tuple[State | None, ...],
+    ) -> tuple[dict[str, FloatArray], tuple[State | None, ...]]:
+        """What each linear parameter is multiplied by: (N, m) or what broadcasts to it; and the lags' states after.
+
+        columns : (N, m) or (N, 1) by name, all of one m or 1.  constants : the shape parameters.
+        states : one per lag, None at the start.  Where the arithmetic fails (log of a negative) the value is nan.
+        """
+        run = _Run(self, columns, constants, time_s, session_start, list(states))
+        with np.errstate(all="ignore"):
+            terms = run.terms(self.tree)
+        return {name: terms[name] for name in self.linear}, tuple(run.after)
+
+
+def finite(value: object) -> float:
+    """The number as a float; infinite where it is too large for one."""
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (OverflowError, TypeError, ValueError):
+        return math.inf
+
+
+class _Run:
+    """One evaluation: walks the tree, every value a set of terms."""
+
+    def __init__(
+        self,
+        formula: Formula,
+        columns: Mapping[str, FloatArray],
+        constants: Mapping[str, float],
+        time_s: FloatArray,
+        session_start: BoolArray,
+        states: list[State | None],
+    ) -> None:
+        self._linear = formula.linear
+        self._columns, self._constants = columns, constants
+        self._time_s, self._session_start = time_s, session_start
+        self._before = states
+        self.after: list[State | None] = []
+
+    def terms(self, node: ast.AST) -> Terms:
+        match node:
+            case ast.Constant(value=value):
+                return {None: np.full((1, 1), finite(value))}
+            case ast.Name(id=name):
+                return self._named(name)
+            case ast.UnaryOp(op=op, operand=operand):
+                sign = -1.0 if isinstance(op, ast.USub) else 1.0
+                return {name: sign * value for name, value in self.terms(operand).items()}
+            case ast.BinOp(left=left, op=op, right=right):
+                return self._combined(self.terms(left), op, self.terms(right))
+            case ast.Call(func=ast.Name(id="lag"), args=[value, tau]):
+                return {None: self._lagged(self.terms(value)[None], float(self.terms(tau)[None][0, 0]))}
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                return {None: FUNCTIONS[name][1](*(self.terms(argument)[None] for argument in arguments))}
+        raise AssertionError("parse lets no other node pass")
+
+    def _named(self, name: str) -> Terms:
+        if name in self._linear:
+            return {name: np.ones((1, 1))}
+        if name in self._constants:
+            return {None: np.full((1, 1), self._constants[name])}
+        return {None: np.full((1, 1), math.pi) if name == "pi" else self._columns[name]}
+
+    def _combined(self, left: Terms, op: ast.operator, right: Terms) -> Terms:
+        function = OPERATORS[type(op)]
+        if isinstance(op, ast.Add | ast.Sub):
+            sign = -1.0 if isinstance(op, ast.Sub) else 1.0
+            total = dict(left)
+            for name, value in right.items():
+                total[name] = total[name] + sign * value if name in total else sign * value
+            return total
+        if set(right) == {None}:
+            return {name: function(value, right[None]) for name, value in left.items()}
+        return {name: left[None] * value for name, value in right.items()}
+
+    def _lagged(self, value: FloatArray, tau_s: float) -> FloatArray:
+        values = np.broadcast_to(value, (len(self._time_s), value.shape[1]))
+        lagged, state = lag(self._time_s, values, self._session_start, tau_s, self._before[len(self.after)])
+        self.after.append(state)
+        return lagged

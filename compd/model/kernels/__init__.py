@@ -1,0 +1,1 @@
+"""Compiled numerics: one source for one snapshot and for N rows."""

@@ -1,0 +1,92 @@
+"""How kernels are compiled: ahead, for float64, into NumPy ufuncs that broadcast over leading axes."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar, cast
+
+from numba import float64, guvectorize, int64, njit
+from numba.core import config as numba_config
+
+Kernel: TypeAlias = Callable[..., Any]
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+
+# numba has no types
+_guvectorize: Any = guvectorize
+_config: Any = numba_config
+
+# The types of a kernel's arguments: () and (n) are both one-dimensional inside, as gufuncs want outputs.
+SCALAR = float64
+VECTOR = float64[:]
+MATRIX = float64[:, :]
+INTEGERS = int64[:]
+
+
+def _cache_directory() -> str:
+    """Where compiled code is kept; "" where nothing can be written: then every start compiles anew, in seconds.
+
+    numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
+    limit count as well: no machine runs last version's kernels.
+    """
+    here = Path(__file__).parents[1]  # kernels and helpers are anywhere below model/
+    texts = [file.read_bytes() for file in sorted(here.rglob("*.py"))]
+    compiled = [text for text in texts if b"@kernel" in text or b"@helper" in text or b"_LIMIT = " in text]
+    digest = hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
+    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
+    places = [Path(_config.CACHE_DIR)] if _config.CACHE_DIR else [here / "__pycache__", user]
+    for place in filter(Path.is_absolute, places):
+        directory = place / f"kernels-{digest}"
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(directory, os.W_OK):
+            return str(directory)
+    return ""
+
+
+CACHE_DIRECTORY = _cache_directory()
+
+
+@contextmanager
+def _kept() -> Iterator[None]:
+    """Within, numba keeps what it compiles in our directory; outside, where it always does.
+
+    One process at a time: numba stores a kernel and its wrapper one after the other, and a kernel of one process with
+    the wrapper of another crashes whoever loads them.
+    """
+    if not CACHE_DIRECTORY:
+        yield
+        return
+    before = _config.CACHE_DIR
+    with (Path(CACHE_DIRECTORY) / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        _config.CACHE_DIR = CACHE_DIRECTORY
+        try:
+            yield
+        finally:
+            _config.CACHE_DIR = before
+
+
+def helper(function: FunctionT) -> FunctionT:
+    """Compile `function` for use inside kernels. Division by zero gives inf or nan, as in C."""
+    return cast(FunctionT, njit(error_model="numpy")(function))  # kept inside the kernels that use it
+
+
+def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]], Kernel]:
+    """Compile a function of one row into a ufunc; `layout` as for numpy.vectorize, e.g. "(n,d),(d)->(n)".
+
+    Compilation (or loading from the cache) happens here, at import, never inside a running loop.
+    """
+
+    def compile_(function: Callable[..., None]) -> Kernel:
+        with _kept():
+            compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=bool(CACHE_DIRECTORY))(function)
+        return cast(Kernel, compiled.ufunc)  # the plain NumPy ufunc: numba's wrapper costs 0.4 us a call
+
+    return compile_

@@ -1,0 +1,173 @@
+"""What makes a link longer or shorter than its scale and joints say; added to its length, in mm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.model.effect import Constant, Effect, Memory, Parameter, Shape, memoryless, one_per_link
+from compd.model.memory import lag
+from compd.model.observations import Observations
+
+PPM = 1e-6
+UM = 1e-3  # mm
+SAG_LENGTH_MM = 500.0  # the length at which a link's sag is stated
+
+
+def _expansion(rows: Observations, shape: Shape) -> FloatArray:
+    return np.asarray(PPM * rows.link_mm * rows.link_warming_K)[:, :, None]
+
+
+def _lagged(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
+    warming_K, memory = lag(rows.time_s, rows.link_warming_K, rows.session_start, shape["tau"], memory)
+    return np.asarray(PPM * rows.link_mm * warming_K)[:, :, None], memory
+
+
+def _elasticity(rows: Observations, shape: Shape) -> FloatArray:
+    return UM * (rows.axial_force_N - rows.constants.zero_axial_force_N)[:, :, None]
+
+
+def _hertz(force_N: FloatArray) -> FloatArray:
+    return np.asarray(np.sign(force_N) * np.cbrt(force_N * force_N))
+
+
+def _contact(rows: Observations, shape: Shape) -> FloatArray:
+    return UM * (_hertz(rows.axial_force_N) - _hertz(rows.constants.zero_axial_force_N))[:, :, None]
+
+
+def _sag(rows: Observations, shape: Shape) -> FloatArray:
+    leaning = 1 - rows.directions_M[:, :, 2] ** 2
+    return np.asarray(-UM * leaning * (rows.link_mm / SAG_LENGTH_MM) ** shape["n"])[:, :, None]
+
+
+def _zero(rows: Observations, shape: Shape) -> FloatArray:
+    return one_per_link(np.full_like(rows.link_mm, UM))
+
+
+_EXPANSION_RANGE = "Super-Invar rod 0-0.8, steel 11-12.5, aluminium 23"
+
+EFFECTS = (
+    Effect(
+        id="link_expansion",
+        ports=("link",),
+        physics="The rods between joints and scale grow with temperature.",
+        equation="delta_i = a l_i dT_link_i",
+        symbols={
+            "a": "expansion coefficient, ppm/K",
+            "l_i": "length of link i, mm",
+            "dT_link_i": "temperature of link i above 20 degC, K",
+        },
+        source="Oiwa, section 2.2 and figure 5",
+        needs=("temperature_link_{link}_degC",),
+        parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
+        mistaken_for=("link_expansion_lag", "link_zero"),
+        separated_by="a change of temperature by 3 K, fast enough that a lag would show",
+        basis=memoryless(_expansion),
+    ),
+    Effect(
+        id="link_expansion_lag",
+        ports=("link",),
+        physics="The rods grow with temperature, but warm up later than the thermometer on the link's skin.",
+        equation="delta_i = a l_i y_i, tau dy_i/dt = dT_link_i - y_i",
+        symbols={
+            "a": "expansion coefficient, ppm/K",
+            "l_i": "length of link i, mm",
+            "y_i": "warming of the rod in link i, K; dT_link_i at the start of a session",
+            "dT_link_i": "temperature of link i above 20 degC, K",
+            "tau": "time constant of warming up, s",
+        },
+        source="lumped heat capacity: Incropera, Fundamentals of Heat and Mass Transfer, chapter 5",
+        needs=("temperature_link_{link}_degC", "time", "order"),
+        parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
+        mistaken_for=("link_expansion", "reference_drift"),
+        separated_by="a step of temperature, watched for three time constants",
+        basis=_lagged,
+        constants=(
+            Constant(
+                "tau",
+                "s",
+                60,
+                30000,
+                "thin rod in moving air 60 s, thick tube in still air hours",
+                (60.0, 120.0, 240.0, 480.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0, 30000.0),
+            ),
+        ),
+        remembers=True,
+    ),
+    Effect(
+        id="link_elasticity",
+        ports=("link",),
+        physics="A link stretches under its axial force.",
+        equation="delta_i = (F_i - F0_i) / k",
+        symbols={
+            "F_i": "axial force in link i from load and weight, N, tension positive",
+            "F0_i": "the same at machine zero, from the weight alone, N",
+            "k": "stiffness of a link with its joints, N/um; 1/k is fitted",
+        },
+        source="Oiwa, section 1, factor (2); statics by virtual work",
+        needs=("force",),
+        parameters=(
+            Parameter(
+                "k",
+                "N/um",
+                5,
+                200,
+                "slender screw drive 5-30, ground ball screw and preloaded joints 200",
+                reciprocal=True,
+            ),
+        ),
+        mistaken_for=("joint_contact",),
+        separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
+        basis=memoryless(_elasticity),
+    ),
+    Effect(
+        id="joint_contact",
+        ports=("link",),
+        physics="Balls flatten where they touch, less and less as the force grows.",
+        equation="delta_i = c (sgn(F_i) |F_i|^(2/3) - sgn(F0_i) |F0_i|^(2/3))",
+        symbols={
+            "c": "contact compliance, um/N^(2/3)",
+            "F_i": "axial force in link i, N, tension positive",
+            "F0_i": "the same at machine zero, N",
+        },
+        source="Hertz (1882); Johnson, Contact Mechanics (1985), chapter 4",
+        needs=("force",),
+        parameters=(Parameter("c", "um/N^(2/3)", 0.01, 1, "steel balls of 25 mm 0.05, of 5 mm on flats 0.5"),),
+        mistaken_for=("link_elasticity",),
+        separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
+        basis=memoryless(_contact),
+    ),
+    Effect(
+        id="link_sag",
+        ports=("link",),
+        physics="A leaning link bows under its own weight, and a bowed link is shorter between its ends.",
+        equation="delta_i = -s (1 - u_iz^2) (l_i / 500 mm)^n",
+        symbols={
+            "s": "shortening of a level link of 500 mm, um",
+            "u_iz": "vertical component of link i's direction, 1",
+            "l_i": "length of link i, mm",
+            "n": "7 for a beam that bends between its joints, 3 for a slender link that tension holds, 1",
+        },
+        source="arc less chord, w^2 l^3 / (24 H^2) of a catenary, 17 w^2 l^7 / (40320 (E I)^2) of a beam on two "
+        "supports: Young, Roark's Formulas for Stress and Strain, chapter 8",
+        needs=(),
+        parameters=(Parameter("s", "um", 0, 20, "stiff tube 0, slender spindle 20"),),
+        mistaken_for=("scale_gain",),
+        separated_by="equally long links at different inclinations",
+        basis=memoryless(_sag),
+        constants=(Constant("n", "1", 3, 7, "catenary 3, beam 7", (3.0, 7.0)),),
+    ),
+    Effect(
+        id="link_zero",
+        ports=("link",),
+        physics="A link is longer or shorter than the drawing says, always by the same.",
+        equation="delta_i = z_i",
+        symbols={"z_i": "error of link i's length at machine zero, um"},
+        source="Wampler, Hollerbach, Arai (1995): kinematic calibration of closed chains",
+        needs=(),
+        parameters=(Parameter("z", "um", -50, 50, "adjustment of machine zero", "link"),),
+        mistaken_for=("tool_offset",),
+        separated_by="the edges of the workspace, where the links point differently than in the middle",
+        basis=memoryless(_zero),
+    ),
+)

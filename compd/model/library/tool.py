@@ -1,0 +1,75 @@
+"""What takes the tip from where the drawing has it on the platform; added to the tool vector in {P}, in mm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.model.effect import Effect, Parameter, Shape, memoryless
+from compd.model.observations import Observations
+
+PPM = 1e-6
+UM = 1e-3  # mm
+
+
+def _expansion(rows: Observations, shape: Shape) -> FloatArray:
+    return np.asarray(PPM * rows.constants.tool_P_mm * rows.warming_K("tool")[:, None])[:, :, None]
+
+
+def _offset(rows: Observations, shape: Shape) -> FloatArray:
+    return np.broadcast_to(UM * np.eye(3), (len(rows), 3, 3))
+
+
+def _bending(rows: Observations, shape: Shape) -> FloatArray:
+    force_P_N = (rows.rotation_M_P * rows.force_M_N[:, :, None]).sum(axis=1)  # R^T F
+    return np.asarray(UM * force_P_N[:, :, None])
+
+
+EFFECTS = (
+    Effect(
+        id="tool_expansion",
+        ports=("tool",),
+        physics="The tool or stylus grows with temperature.",
+        equation="delta = a tool_P dT_tool",
+        symbols={
+            "a": "expansion coefficient of the tool, ppm/K",
+            "tool_P": "tool vector in {P}, mm",
+            "dT_tool": "temperature of the tool above 20 degC, K",
+        },
+        source="ISO 1; stylus stems: carbon fibre 0, tungsten carbide 5, ceramic 7, steel 12",
+        needs=("temperature_tool_degC",),
+        parameters=(Parameter("a", "ppm/K", 0, 25, "carbon fibre 0, tungsten carbide 5, steel 12, aluminium 23-25"),),
+        mistaken_for=("plate_bending",),
+        separated_by="two tools of different length, or warm the tool alone",
+        basis=memoryless(_expansion),
+    ),
+    Effect(
+        id="tool_offset",
+        ports=("tool",),
+        physics="The tip sits elsewhere on the platform than the drawing says.",
+        equation="delta = d",
+        symbols={"d": "displacement of the tip in {P}, um"},
+        source="ISO 10360-5: qualification of a stylus on a sphere",
+        needs=(),
+        parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis"),),
+        mistaken_for=("link_zero",),
+        separated_by="the edges of the workspace, where the platform tilts; a tool of another length",
+        basis=memoryless(_offset),
+    ),
+    Effect(
+        id="tool_bending",
+        ports=("tool",),
+        physics="The tool gives way under the force on its tip.",
+        equation="delta = C F_P",
+        symbols={
+            "C": "compliance of the tool, alike in all directions, um/N",
+            "F_P": "external force on the tip in {P}, N",
+        },
+        source="cantilever: Young, Roark's Formulas for Stress and Strain, chapter 8",
+        needs=("force",),
+        parameters=(Parameter("C", "um/N", 0.01, 1, "end mill of 20 mm 0.01, stylus of 50 mm 1"),),
+        mistaken_for=("link_elasticity",),
+        separated_by="the same force in several directions at the middle and the edges; a tool of another length",
+        basis=memoryless(_bending),
+    ),
+)

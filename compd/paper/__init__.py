@@ -1,0 +1,1 @@
+"""The experiments of the paper (T. Oiwa), again, on the simulated machine."""

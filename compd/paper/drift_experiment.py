@@ -1,0 +1,93 @@
+"""Figure 21: a reference ball on the surface plate does not move; its measured coordinates do, as the machine warms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from plotly.graph_objects import Figure
+
+from compd.arrays import FloatArray
+from compd.configuration import Configuration
+from compd.paper.reduction import Readings, Reduction
+from compd.report.page import COLOURS, Panel, styled
+from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
+from compd.simulation.truth.touch import touch
+from compd.simulation.truth.world import World
+from compd.units import UM_PER_MM
+
+HOUR_S = 3600.0
+EVERY_S = 600.0
+HOURS = 10.0
+KIND_COLOURS = {"without compensation": "worst", "with compensation": "best"}
+
+
+@dataclass(frozen=True)
+class Drift:
+    """time_h : (N,). change_um : by kind, (N, 3) of the ball's measured place since the first. frame_degC : (N,)."""
+
+    time_h: FloatArray
+    change_um: dict[str, FloatArray]
+    frame_degC: FloatArray
+
+
+def run(configuration: Configuration, seed: int) -> Drift:
+    """The machine tours its points between the measurements, every ten minutes for ten hours."""
+    world = World(configuration.geometry, configuration.wiring, seed)
+    rng = np.random.default_rng([seed, 21])
+    machine = world.mechanism
+    ball = machine.tip0_M if machine.tip_frame == "M" else machine.tip0_P
+    readings, time_h, frame_degC = Readings(), [], []
+    for _ in range(int(HOURS * HOUR_S / EVERY_S) + 1):
+        touch(world, noisy(ball, TRACKER_SIGMA_UM, rng))
+        readings.read(world)
+        time_h.append(world.time_s / HOUR_S)
+        frame_degC.append(world.sense("temperature_frame_degC"))
+        world.tour()
+        world.advance(EVERY_S)
+    change_um = {}
+    for kind, compensated in zip(KIND_COLOURS, (False, True), strict=True):
+        places = readings.tips_mm(configuration, joints=compensated, frame=compensated)
+        change_um[kind] = (places - places[0]) * UM_PER_MM
+    return Drift(np.array(time_h), change_um, np.array(frame_degC))
+
+
+def reductions(found: Drift) -> list[Reduction]:
+    without, full = found.change_um.values()
+    stated = ("change of x", "change of y", "change of z")
+    paper = ("x and y: so small because the frame is axisymmetric", "x and y: so small", "decreases; no number")
+    return [
+        Reduction(
+            f"{stated[axis]}, peak to peak", float(np.ptp(without[:, axis])), float(np.ptp(full[:, axis])), paper[axis]
+        )
+        for axis in (2, 0, 1)
+    ]
+
+
+def panels(found: Drift) -> list[Panel]:
+    def change(axes: str) -> Figure:
+        figure = Figure()
+        for kind, change_um in found.change_um.items():
+            for axis in axes:
+                dash = {"x": "dot", "y": "dash", "z": "solid"}[axis]
+                figure.add_scatter(
+                    x=found.time_h,
+                    y=change_um[:, "xyz".index(axis)],
+                    mode="lines+markers",
+                    name=kind if axes == "z" else f"{axis}, {kind}",
+                    marker={"size": 4},
+                    line={"color": COLOURS[KIND_COLOURS[kind]], "dash": dash},
+                )
+        return styled(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
+
+    warm = Figure()
+    warm.add_scatter(x=found.time_h, y=found.frame_degC, mode="lines", line={"color": COLOURS["plain"]})
+    return [
+        Panel("Z of the ball", "The ball stands still on the surface plate; what changes is the machine.", change("z")),
+        Panel(
+            "X and Y of the ball",
+            "An axisymmetric frame would leave both at zero; here a cabinet stands beside one column.",
+            change("xy"),
+        ),
+        Panel("Temperature of the frame", "Mean of the columns.", styled(warm, "time since switch-on, h", "degC", 240)),
+    ]

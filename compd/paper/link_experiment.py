@@ -1,0 +1,158 @@
+"""Figure 18: one link is pulled, pushed and warmed; its scale is compared with a laser interferometer along it.
+
+The link without the paper's device has its scale bolted to tube and screw, which stretch and grow; the one with it
+has rods of Super-Invar from ball to scale (figure 5) and comparators in its joints (figure 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from plotly.graph_objects import Figure
+
+from compd.arrays import FloatArray
+from compd.configuration import Configuration
+from compd.machine_builder import joint_weights
+from compd.paper.reduction import Readings, Reduction, rms
+from compd.report.page import COLOURS, Panel, styled
+from compd.simulation.causes.catalogue import build
+from compd.simulation.truth.cause import Cause
+from compd.simulation.truth.instruments import INTERFEROMETER_SIGMA_UM, noisy
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.warm_up import Heat
+from compd.simulation.truth.world import World
+from compd.units import UM_PER_MM
+
+LINK = 0
+# A steel tube and screw: handbook expansion, and the stiffness of a screw drive of this size.
+TUBE_PPM_PER_K = 11.0
+TUBE_UM_PER_N = 1 / 30.0
+# Loads on the tip along the link, up and down twice; N.
+LOADS_N = np.concatenate([np.linspace(0, 60, 7), np.linspace(50, -60, 12), np.linspace(-50, 0, 6)])
+LOAD_S = 10.0
+# A lamp beside the link: a few kelvin in two hours, cooling afterwards.
+LAMP_W = 4.0
+WARM_S, WARM_STEP_S = 7200.0, 240.0
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Differences scale less interferometer, um. Loading (N,): cold and warm; warming (K,)."""
+
+    axial_N: FloatArray
+    cold_um: FloatArray
+    warm_um: FloatArray
+    link_degC: FloatArray
+    warming_um: FloatArray
+
+
+@dataclass(frozen=True)
+class Experiment:
+    without: Bed
+    compensated: Bed
+
+
+def run(configuration: Configuration, seed: int) -> Experiment:
+    mechanism = Mechanism(configuration.geometry)
+    bolted = [
+        build("link_expansion", TUBE_PPM_PER_K, mechanism, seed),
+        build("link_elasticity", TUBE_UM_PER_N, mechanism, seed),
+    ]
+    return Experiment(
+        _bed(configuration, seed, bolted, compensated=False), _bed(configuration, seed, [], compensated=True)
+    )
+
+
+def _bed(configuration: Configuration, seed: int, causes: list[Cause], *, compensated: bool) -> Bed:
+    world = World(configuration.geometry, configuration.wiring, seed, causes=causes)
+    rng = np.random.default_rng([seed, 18])
+    weights = joint_weights(configuration.wiring, world.mechanism.links)[LINK]
+    machine = world.mechanism
+    along_M = machine.posture0[0] + machine.joints_P[LINK] @ machine.posture0[1:] - machine.joints0_M[LINK]
+    along_M = along_M / np.linalg.norm(along_M)
+    still = np.zeros(machine.links)
+
+    def difference_um(time_s: float) -> float:
+        """The gauges' change of the link's length less the interferometer's."""
+        world.carry(still, machine.posture0, time_s, 0.0)
+        readings = Readings()
+        readings.read(world)
+        seen_mm = readings.scale_mm[0][LINK]
+        if compensated:
+            seen_mm -= float(weights @ readings.joint_mm[0])  # equation (1)
+        true_mm = noisy(world.link_change_mm()[[LINK]], INTERFEROMETER_SIGMA_UM, rng)[0]
+        return (seen_mm - float(true_mm)) * UM_PER_MM
+
+    def loading() -> tuple[FloatArray, FloatArray]:
+        axial, differences = [], []
+        for load_N in LOADS_N:
+            world.force_M_N = load_N * along_M
+            differences.append(difference_um(LOAD_S))
+            axial.append(float(world.axial_N()[LINK]))
+        world.force_M_N = np.zeros(3)
+        return np.array(axial), np.array(differences)
+
+    axial_N, cold_um = loading()
+    world.heat(Heat(LAMP_W * (np.arange(machine.links) == LINK), 0.0, np.zeros(3), 0.0, 0.0, 0.0))
+    link_degC, warming_um = [], []
+    for _ in range(int(WARM_S / WARM_STEP_S)):
+        warming_um.append(difference_um(WARM_STEP_S))
+        link_degC.append(world.sense(f"temperature_link_{LINK + 1}_degC"))
+    _, warm_um = loading()
+    return Bed(axial_N, cold_um, warm_um, np.array(link_degC), np.array(warming_um))
+
+
+def reductions(found: Experiment) -> list[Reduction]:
+    return [
+        Reduction(
+            "difference under load, peak to peak",
+            float(np.ptp(found.without.cold_um)),
+            float(np.ptp(found.compensated.cold_um)),
+            "considerably decreases; no number",
+        ),
+        Reduction(
+            "difference while warming up, peak to peak",
+            float(np.ptp(found.without.warming_um)),
+            float(np.ptp(found.compensated.warming_um)),
+            "decreases; no number",
+        ),
+        Reduction(
+            "difference, load and warmth, rms",
+            rms([*found.without.cold_um, *found.without.warm_um]),
+            rms([*found.compensated.cold_um, *found.compensated.warm_um]),
+            "-",
+        ),
+    ]
+
+
+def panels(found: Experiment) -> list[Panel]:
+    load, warmth = Figure(), Figure()
+    for name, bed, colour in (("without", found.without, "worst"), ("with compensation", found.compensated, "best")):
+        for state, differences_um, symbol in (
+            ("20 degC", bed.cold_um, "circle"),
+            ("warm", bed.warm_um, "diamond-open"),
+        ):
+            load.add_scatter(
+                x=bed.axial_N,
+                y=differences_um,
+                name=f"{name}, {state}",
+                mode="lines+markers",
+                line={"color": COLOURS[colour], "width": 1},
+                marker={"symbol": symbol, "size": 7},
+            )
+        warmth.add_scatter(
+            x=bed.link_degC, y=bed.warming_um, name=name, mode="lines+markers", line={"color": COLOURS[colour]}
+        )
+    return [
+        Panel(
+            "Under external load",
+            "Scale unit less interferometer, at 20 degC and after two hours beside a lamp.",
+            styled(load, "axial force of the link, N", "difference, um", 440),
+        ),
+        Panel(
+            "While the link warms up",
+            "The same without load.",
+            styled(warmth, "temperature of the link, degC", "difference, um", 340),
+        ),
+    ]

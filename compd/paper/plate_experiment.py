@@ -1,0 +1,104 @@
+"""Figure 20: the balls of a 3D ball plate are measured, the distances between them compared with its certificate."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from plotly.graph_objects import Figure
+
+from compd.arrays import FloatArray
+from compd.configuration import Configuration
+from compd.paper.reduction import Readings, Reduction, rms
+from compd.report.page import COLOURS, Panel, styled
+from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, ball_plate_mm, noisy
+from compd.simulation.truth.touch import touch
+from compd.simulation.truth.world import World
+from compd.units import UM_PER_MM
+
+# One ball takes a person half a minute; the whole plate is measured twice, there and back.
+PER_BALL_S = 30.0
+ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Distances:
+    """The 136 distances between 17 balls. nominal_mm : (136,). Errors (136,), um, measured less certified."""
+
+    nominal_mm: FloatArray
+    without_um: FloatArray
+    joints_um: FloatArray
+    full_um: FloatArray
+
+
+def run(configuration: Configuration, seed: int) -> Distances:
+    """Machine zero is taken cold, and the plate measured at once, while the machine warms up."""
+    world = World(configuration.geometry, configuration.wiring, seed)
+    rng = np.random.default_rng([seed, 20])
+    machine = world.mechanism
+    balls = ball_plate_mm(machine.tip0_M if machine.tip_frame == "M" else machine.tip0_P)
+    there = range(len(balls))
+    order = [*there, *reversed(there)] * (ROUNDS // 2)
+    readings = Readings()
+    for ball in order:
+        touch(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        world.advance(PER_BALL_S)
+        touch(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        readings.read(world)
+    pairs = np.array(list(itertools.combinations(there, 2)))
+    nominal_mm = _distances(balls, pairs)
+
+    def errors_um(*, joints: bool, frame: bool) -> FloatArray:
+        tips = readings.tips_mm(configuration, joints=joints, frame=frame)
+        places = np.array([tips[np.array(order) == ball].mean(axis=0) for ball in there])
+        return (_distances(places, pairs) - nominal_mm) * UM_PER_MM
+
+    return Distances(
+        nominal_mm,
+        errors_um(joints=False, frame=False),
+        errors_um(joints=True, frame=False),
+        errors_um(joints=True, frame=True),
+    )
+
+
+def reductions(found: Distances) -> list[Reduction]:
+    without = rms(found.without_um)
+    return [
+        Reduction("distances, rms, joints compensated", without, rms(found.joints_um), "32 % by the joints"),
+        Reduction("distances, largest, joints compensated", *_largest(found.without_um, found.joints_um), "-"),
+        Reduction("distances, rms, joints and frame compensated", without, rms(found.full_um), "-"),
+    ]
+
+
+def panels(found: Distances) -> list[Panel]:
+    figure = Figure()
+    for name, errors_um, colour, symbol in (
+        ("without compensation", found.without_um, "worst", "circle-open"),
+        ("joints compensated", found.joints_um, "best", "circle"),
+    ):
+        figure.add_scatter(
+            x=found.nominal_mm,
+            y=errors_um,
+            name=name,
+            mode="markers",
+            marker={"color": COLOURS[colour], "symbol": symbol, "size": 7},
+        )
+    figure.add_hline(y=0, line={"color": COLOURS["quiet"], "width": 1})
+    return [
+        Panel(
+            "Deflection of measured distances",
+            "Each dot is one of the 136 pairs of balls, measured less certified. "
+            "How much is gained depends on how much of the error is the joints'; of the paper's machine it is not "
+            "known.",
+            styled(figure, "distance between balls, mm", "deflection, um", 440),
+        ),
+    ]
+
+
+def _distances(places_mm: FloatArray, pairs: np.ndarray[tuple[int, int], np.dtype[np.int_]]) -> FloatArray:
+    return np.asarray(np.linalg.norm(places_mm[pairs[:, 0]] - places_mm[pairs[:, 1]], axis=1))
+
+
+def _largest(without_um: FloatArray, with_um: FloatArray) -> tuple[float, float]:
+    return float(np.abs(without_um).max()), float(np.abs(with_um).max())

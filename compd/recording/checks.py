@@ -1,0 +1,157 @@
+"""What the numbers of a recording say: rules that they must keep, and limits beyond which a person should look."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.recording.columns import ID_COLUMNS
+from compd.recording.csv_table import CsvTable
+from compd.recording.problem_list import ProblemList, rows_text, values_text
+
+# (columns, lowest, highest, why): outside, the unit is probably not what the name says. Not an error.
+_LIMITS: tuple[tuple[re.Pattern[str], float, float, str], ...] = tuple(
+    (re.compile(pattern), low, high, why)
+    for pattern, low, high, why in (
+        (r"scale_\d+_mm", -2000.0, 2000.0, "a link's travel in mm; are these um?"),
+        # the comparators of the paper and of the presets reach +-1 mm at most
+        (r"joint_\d+_um|frame_[tu]\d_um", -1000.0, 1000.0, "a comparator's range in um"),
+        (r"temperature_(?:room|base|frame|platform|tool|plate_\w+|link_\d+)_degC", -20.0, 150.0, "degrees Celsius"),
+        (r"temperature_\w+_degC", -100.0, 600.0, "degrees Celsius"),
+        (r"pressure_hPa", 500.0, 1100.0, "air pressure on Earth's surface in hPa; is this Pa or kPa?"),
+        (r"humidity_pct", 0.0, 100.0, "relative humidity in percent"),
+        (r"force_[xyz]_N", -20000.0, 20000.0, "a force on the tip in N"),
+        (r"(?:reference|model)_(?:[xyz]|link_\d+)_mm", -20000.0, 20000.0, "a length in mm; are these um?"),
+        (r"(?:reference|model)_r[xyz]_rad", -3.15, 3.15, "a rotation vector in rad; are these degrees?"),
+    )
+)
+# Room air outside this is not the room where a machine is measured, but may be degrees Fahrenheit.
+_ROOM_DEGC = (0.0, 50.0)
+# Comparators of +-1 mm resolve 0.01 to 0.1 um; a whole set below that is probably in mm.
+_SMALLEST_JOINT_UM = 0.05
+
+
+def check_values(table: CsvTable, faults: ProblemList) -> None:
+    """Rules first (problems), then limits (warnings)."""
+    if "time_s" in table.columns:
+        _check_time(table, faults)
+    for name in ID_COLUMNS:
+        if name in table.columns and name not in table.labels:
+            values = table.columns[name]
+            wrong = ~np.isnan(values) & ((values != np.round(values)) | (values < 0) | (np.abs(values) > 2**53))
+            _report(table, name, wrong, faults, "not a whole number", "0, 1, 2, ...", "number them")
+    for name, values in table.columns.items():
+        if re.fullmatch(r"approach_\d+", name):
+            wrong = ~np.isnan(values) & (np.abs(values) != 1.0)
+            _report(
+                table,
+                name,
+                wrong,
+                faults,
+                "not a direction",
+                "1 or -1, or an empty cell where it is not known",
+                "write the direction in which the link last moved",
+            )
+    _check_limits(table, faults)
+
+
+def check_rows(table: CsvTable, excluded: BoolArray, needed: Iterable[str], faults: ProblemList) -> None:
+    """At least two rows must have everything; otherwise say where they went.
+
+    A cell that was reported as wrong counts as filled: one mistake is told once.
+    """
+    rows = len(table.row)
+    if rows < 2:
+        faults.add(
+            "",
+            "no rows" if rows == 0 else "only one row",
+            allowed="two rows or more",
+            next_step="record more, or give the right file",
+        )
+        return
+    left = ~excluded
+    reasons = [f"{int(excluded.sum())} excluded in the sidecar"] if excluded.any() else []
+    for name in needed:
+        if name in table.wrong:
+            continue
+        empty = left & np.isnan(table.columns[name])
+        if empty.any():
+            reasons.append(f"{int(empty.sum())} without {name}")
+            left &= ~empty
+    if left.sum() < 2:
+        faults.add(
+            "",
+            f"{'no' if not left.any() else 'only one'} row of {rows} can be used: {', '.join(reasons)}",
+            allowed="two rows or more",
+            next_step="fill these columns, or delete those that were not measured",
+        )
+
+
+def _check_time(table: CsvTable, faults: ProblemList) -> None:
+    """time_s rises: a row that is not later than the one above is reported, backwards and repeated apart."""
+    there = np.flatnonzero(~np.isnan(table.columns["time_s"]))
+    time_s = table.columns["time_s"][there]
+    step = np.diff(time_s)
+    for wrong, what, mend in (
+        (step < 0, "time runs backwards", "sort the rows, or let the clock run on where sessions were put together"),
+        (step == 0, "the same time as the row above", "write more decimals, or delete the repeated row"),
+    ):
+        rows = np.zeros(len(table.row), dtype=bool)
+        rows[there[1:][wrong]] = True
+        _report(table, "time_s", rows, faults, what, "later than the row above", mend)
+
+
+def _check_limits(table: CsvTable, faults: ProblemList) -> None:
+    for name, values in table.columns.items():
+        for pattern, low, high, why in _LIMITS:
+            if pattern.fullmatch(name):
+                least, most = _ROOM_DEGC if name == "temperature_room_degC" else (low, high)
+                with np.errstate(invalid="ignore"):
+                    strange = (values < least) | (values > most)
+                _report(
+                    table,
+                    name,
+                    strange,
+                    faults,
+                    "implausible for its unit",
+                    f"{least:g} to {most:g}: {why}",
+                    "look; it is used as it stands",
+                    warn=True,
+                )
+                break
+    joints = [values for name, values in table.columns.items() if re.fullmatch(r"joint_\d+_um", name)]
+    largest = max((float(np.nanmax(np.abs(v))) for v in joints if not np.isnan(v).all()), default=0.0)
+    if 0 < largest < _SMALLEST_JOINT_UM:
+        faults.warn(
+            "columns joint_<k>_um",
+            "no joint comparator ever moves by what it can resolve",
+            f"{largest:g} um",
+            next_step="are these mm?",
+        )
+
+
+def _report(
+    table: CsvTable,
+    name: str,
+    wrong: BoolArray,
+    faults: ProblemList,
+    what: str,
+    allowed: str,
+    next_step: str,
+    warn: bool = False,
+) -> None:
+    """One problem (or warning) for all wrong cells of a column."""
+    if not wrong.any():
+        return
+    rows: IntArray = table.row[wrong]
+    values: FloatArray = table.columns[name][wrong]
+    place = f"{table.place(name)}, {rows_text(rows.tolist())}"
+    say = faults.warn if warn else faults.add
+    say(place, what, _shown(values.tolist()), allowed, next_step)
+
+
+def _shown(values: Sequence[float]) -> str:
+    return values_text(f"{value:.10g}" for value in values)

@@ -1,0 +1,154 @@
+"""The columns of a recording: what a name says, and how a wrong name is mended."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from compd.recording.csv_table import CsvTable
+from compd.recording.problem_list import ProblemList
+from compd.units import KNOWN, conversion, unit_of
+
+FRAME_DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
+AXES = ("x", "y", "z")
+ATTITUDES = ("rx", "ry", "rz")
+FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
+ID_COLUMNS = ("session", "visit", "point", "ball")
+
+# A stem (the name without its unit) and the one unit that the format gives it; "" = no unit.
+_STEMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
+    (re.compile(pattern), unit)
+    for pattern, unit in (
+        (r"time", "s"),
+        (r"session|visit|point|ball", ""),
+        (r"scale_[1-9]\d*", "mm"),
+        (r"joint_[1-9]\d*", "um"),
+        (r"frame_(?:t[1-3]|u[1-6])", "um"),
+        (r"approach_[1-9]\d*", ""),
+        (r"(?:reference|model)_[xyz]", "mm"),
+        (r"(?:reference|model)_r[xyz]", "rad"),
+        (r"(?:reference|model)_link_[1-9]\d*", "mm"),
+        (r"temperature_[a-z][a-z0-9_]*", "degC"),
+        (r"force_[xyz]", "N"),
+        (r"pressure", "hPa"),
+        (r"humidity", "pct"),
+    )
+)
+# A name that begins like a column of the format but is none would else slip in as a covariate.
+_RESERVED = re.compile(
+    r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
+    r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
+)
+_COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")
+_COMMON = ("time_s", *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
+
+
+class Name(NamedTuple):
+    """What the format knows of a name: its stem ("scale_1") and unit ("mm"); the stem is "" for a covariate."""
+
+    stem: str
+    unit: str
+
+
+def known(name: str) -> Name | None:
+    """The column of the format that `name` is, exactly; None for every other name."""
+    for pattern, unit in _STEMS:
+        stem = name.removesuffix(f"_{unit}") if unit else name
+        if (stem != name or not unit) and pattern.fullmatch(stem):
+            return Name(stem, unit)
+    return None
+
+
+def is_covariate(name: str) -> bool:
+    """Whether the format takes `name` as anything else that was measured: <name>_<unit>."""
+    return not _RESERVED.match(name) and bool(_COVARIATE.fullmatch(name)) and mended(name) in (None, name)
+
+
+def is_header(cells: Sequence[str]) -> bool:
+    """Whether these cells are a recording's header: time, or most of the names, even if written wrongly."""
+    filled = [cell for cell in cells if cell]
+    understood = [mended(cell) for cell in filled]
+    return "time_s" in understood or sum(name is not None for name in understood) * 2 > max(2, len(filled))
+
+
+def mended(name: str) -> str | None:
+    """The column of the format that a person most probably meant by `name`; None where there is none."""
+    if known(name):
+        return name
+    tidy = name.strip().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u").replace("%", "pct")
+    tidy = re.sub(r"[^A-Za-z0-9]+", "_", tidy).strip("_")
+    tidy = re.sub(r"_0+(?=[1-9])", "_", tidy)
+    for unit in sorted(["", *KNOWN], key=len, reverse=True):
+        if unit and not tidy.lower().endswith(f"_{unit.lower()}"):
+            continue
+        stem = tidy[: -len(unit) - 1] if unit else tidy
+        stem = re.sub(r"(?<=[a-z])(?=\d)", "_", stem.lower())
+        stem = re.sub(r"^temp_", "temperature_", stem)
+        stem = re.sub(r"frame_(?:([tu])_|_)?(?=[tu1-9])", lambda m: f"frame_{m[1] or ''}", stem)
+        for pattern, right in _STEMS:
+            if pattern.fullmatch(stem) and (not right or right == unit or not unit or _convertible(unit, right)):
+                return f"{stem}_{right}" if right else stem
+    close = difflib.get_close_matches(tidy.lower(), _COMMON, n=1, cutoff=0.85)
+    return close[0] if close and not _RESERVED.match(name) else None
+
+
+def _convertible(unit: str, right: str) -> bool:
+    return right == "degC" or bool(conversion(unit, right)) or unit == "1"
+
+
+def rename(table: CsvTable, faults: ProblemList) -> CsvTable:
+    """The table with the names that were meant; every name that is not the format's own is reported.
+
+    A mended name is a problem all the same: its values may be in another unit. It only keeps the same mistake
+    from being reported again as a missing column.
+    """
+    names: dict[str, str] = {}
+    for name in table.letters:
+        meant = mended(name)
+        if meant == name or (meant is None and is_covariate(name)):
+            names[name] = name
+            if meant is None and not unit_of(name):
+                faults.warn(
+                    table.place(name),
+                    "ends in no unit that is known",
+                    name.rsplit("_", 1)[-1],
+                    "mm, um, degC, N, hPa, pct, 1, ...",
+                    "kept as it is; check the name",
+                )
+        elif meant is not None:
+            faults.add(table.place(name), *_wrong_name(name, meant))
+            if meant not in table.letters:
+                names[name] = meant
+        else:
+            faults.add(
+                table.place(name),
+                "no column of the format",
+                name,
+                "a column of the format, or <name>_<unit> in lower case for anything else measured",
+                "rename it, e.g. humidity_pct; a number without unit ends in _1; or delete it",
+            )
+    return CsvTable(
+        table.path,
+        table.content,
+        {names[name]: letters for name, letters in table.letters.items() if name in names},
+        {names[name]: values for name, values in table.columns.items() if name in names},
+        table.row,
+        {names[name]: labels for name, labels in table.labels.items() if name in names},
+        table.blank_rows,
+        frozenset(names[name] for name in table.wrong if name in names),
+    )
+
+
+def _wrong_name(name: str, meant: str) -> tuple[str, str, str, str]:
+    """(what, value, allowed, next step) of a name that is nearly a column of the format."""
+    right = known(meant)
+    wanted = right.unit if right else ""
+    unit = unit_of(name)
+    if wanted and not unit and name == meant.removesuffix(f"_{wanted}"):
+        return "has no unit in its name", name, meant, f"name it {meant} if the values are in {wanted}"
+    if unit and wanted and unit != wanted:
+        how = conversion(unit, wanted) or f"give the values in {wanted}"
+        return f"is in {unit} by its name", name, meant, f"{how}, and name it {meant}"
+    return "is not spelt as the format spells it", name, meant, f"name it {meant}"

@@ -1,0 +1,225 @@
+"""Which columns a recording has and which it must have, from their names alone."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from compd.configuration import Configuration
+from compd.errors import Problem
+from compd.recording.columns import ATTITUDES, AXES, FRAME_COLUMNS, ID_COLUMNS, known
+from compd.recording.problem_list import ProblemList
+from compd.recording.sidecar import EXTERNAL, Sidecar
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is there: counts of gauges (0 = none), what the reference's columns are, and the names of the rest."""
+
+    scales: int
+    joints: int
+    frame: bool
+    approach: bool
+    axes: tuple[str, ...]
+    attitude: bool
+    links: tuple[int, ...]
+    covariates: tuple[str, ...]
+
+    @property
+    def reference(self) -> tuple[str, ...]:
+        """What follows "reference_", and "model_", in the columns' names: x_mm, rx_rad, link_1_mm."""
+        return (
+            *(f"{axis}_mm" for axis in self.axes),
+            *(f"{axis}_rad" for axis in ATTITUDES if self.attitude),
+            *(f"link_{i}_mm" for i in self.links),
+        )
+
+
+def lay_out(names: Sequence[str], sidecar: Sidecar | None, reference_sound: bool, faults: ProblemList) -> Layout:
+    """Sort the names into what they are; everything that is missing or too much goes to `faults`.
+
+    reference_sound : whether the sidecar's reference could be read; if not, reference columns are not judged.
+    """
+    external = sidecar is not None and sidecar.external
+    if "time_s" not in names:
+        _missing(["time_s"], names, faults)
+    scales = _count(names, "scale", "mm", external, faults)
+    joints = _count(names, "joint", "um", external, faults)
+    approaches = _count(names, "approach", "", external, faults)
+    frame = [name for name in FRAME_COLUMNS if name in names]
+    quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
+    if not external:
+        if not scales and not any(name.startswith("scale_") for name in names):
+            _missing(["scale_1_mm, scale_2_mm, ..."], names, faults)
+        if approaches and scales and approaches != scales:
+            faults.add(
+                "",
+                f"{approaches} approach columns for {scales} scales",
+                allowed="approach_<i> for every scale, or none",
+                next_step="add or delete columns",
+            )
+        # A link's change by interferometer needs no frame: the paper's figures 17 and 18.
+        if len(frame) < 9 and (frame or quantity != "link_length"):
+            _missing([name for name in FRAME_COLUMNS if name not in frame], names, faults)
+    links = tuple(_numbers(names, "reference_link", "mm"))
+    axes = tuple(axis for axis in AXES if f"reference_{axis}_mm" in names)
+    attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
+    if quantity == "ball_plate":
+        axes = AXES
+    layout = Layout(scales, joints, len(frame) == 9, 0 < approaches == scales, axes, len(attitude) == 3, links, ())
+    if sidecar is not None and reference_sound:
+        _check_reference(names, sidecar, layout, attitude, faults)
+        _check_model(names, external, layout, faults)
+    return replace(layout, covariates=tuple(_covariates(names, layout)))
+
+
+def fits(machine: str, layout_counts: tuple[int, int, bool], configuration: Configuration, where: str) -> list[Problem]:
+    """What contradicts `configuration`: the machine's name, the number of scales, of joint comparators, the frame's.
+
+    layout_counts : (scales, joint comparators, whether the nine frame comparators are there).
+    """
+    problems: list[Problem] = []
+    if machine != configuration.machine:
+        problems.append(
+            Problem(
+                where=where,
+                what="the sidecar is for another machine",
+                value=machine,
+                allowed=configuration.machine,
+                next_step="give this machine's configuration, or mend `machine:` in the sidecar",
+            )
+        )
+    if machine == EXTERNAL:
+        return problems
+    scales, joints, _ = layout_counts
+    counted = (
+        ("scale", scales, len(configuration.wiring.scale), "scale_<i>_mm"),
+        ("joint comparator", joints, len(configuration.wiring.joint), "joint_<k>_um"),
+    )
+    for what, found, wanted, column in counted:
+        if found != wanted:
+            problems.append(
+                Problem(
+                    where=where,
+                    what=f"{found} {what} columns, {configuration.machine} has {wanted}",
+                    allowed=f"{wanted} {column}",
+                    next_step="add the missing columns, or name the right machine",
+                )
+            )
+    return problems
+
+
+def _numbers(names: Iterable[str], stem: str, unit: str) -> list[int]:
+    """The numbers i of the columns <stem>_<i>_<unit>, sorted."""
+    pattern = re.compile(rf"{stem}_(\d+){f'_{unit}' if unit else ''}")
+    return sorted(int(match[1]) for name in names if (match := pattern.fullmatch(name)))
+
+
+def _count(names: Sequence[str], stem: str, unit: str, external: bool, faults: ProblemList) -> int:
+    """How many columns <stem>_1 ... <stem>_n there are; gaps are missing columns, but for an external model
+    the whole group is then a matter of covariates (0)."""
+    numbers = _numbers(names, stem, unit)
+    if not numbers or len(numbers) == numbers[-1]:
+        return len(numbers)
+    if not external:
+        tail = f"_{unit}" if unit else ""
+        _missing([f"{stem}_{i}{tail}" for i in range(1, numbers[-1]) if i not in numbers], names, faults)
+    return 0 if external else numbers[-1]
+
+
+def _check_reference(
+    names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], faults: ProblemList
+) -> None:
+    """The reference's columns against what the sidecar says that it is."""
+    there = [name for name in names if name.startswith("reference_") or name == "ball"]
+    if sidecar.reference is None:
+        if there:
+            faults.add(
+                "",
+                f"{', '.join(there)}: the sidecar names no reference",
+                allowed="`reference:` in the sidecar",
+                next_step="say in the sidecar what the reference is, or delete the columns",
+            )
+        return
+    quantity = sidecar.reference.quantity
+    position = [f"reference_{axis}_mm" for axis in AXES]
+    wanted: dict[str, list[str]] = {
+        "tool_position": position,
+        "tool_pose": [*position, *(f"reference_{axis}_rad" for axis in ATTITUDES)],
+        "link_length": [name for name in there if name.startswith("reference_link_")],
+        "ball_plate": ["ball"],
+    }
+    extra = [name for name in there if name not in wanted[quantity]]
+    if extra:
+        faults.add(
+            "",
+            f"{', '.join(extra)}: not a column of the quantity that the sidecar names",
+            quantity,
+            ", ".join(wanted[quantity]) or "reference_link_1_mm, ...",
+            "mend `quantity:` in the sidecar, or delete the columns",
+        )
+    if quantity in ("tool_position", "tool_pose") and not layout.axes:
+        _missing(["reference_x_mm, reference_y_mm or reference_z_mm"], names, faults)
+    if quantity == "tool_pose" and len(attitude) < 3:
+        _missing([f"reference_{axis}_rad" for axis in ATTITUDES if axis not in attitude], names, faults)
+    if quantity == "link_length":
+        if not layout.links:
+            _missing(["reference_link_1_mm, ..."], names, faults)
+        beyond = [i for i in layout.links if layout.scales and i > layout.scales]
+        if beyond:
+            faults.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
+    if quantity == "ball_plate" and "ball" not in names:
+        _missing(["ball"], names, faults)
+    count = len(layout.links) if quantity == "link_length" else len(layout.axes)
+    if count and len(sidecar.reference.sigma_um) not in (1, count):
+        faults.add(
+            "",
+            f"sigma_um has {len(sidecar.reference.sigma_um)} values for {count} reference columns",
+            allowed=f"1 or {count} values",
+            next_step="mend `sigma_um:` in the sidecar",
+        )
+
+
+def _check_model(names: Sequence[str], external: bool, layout: Layout, faults: ProblemList) -> None:
+    """An external model predicts every reference column; a machine configuration leaves no room for one."""
+    there = [name for name in names if name.startswith("model_")]
+    if not external:
+        if there:
+            faults.add(
+                "",
+                f"{', '.join(there)}: a model's prediction, but the sidecar names a machine",
+                allowed="`machine: external` with model_ columns",
+                next_step="mend `machine:` or delete them",
+            )
+        return
+    wanted = [f"model_{name}" for name in layout.reference]
+    _missing([name for name in wanted if name not in there], names, faults)
+    extra = [name for name in there if name not in wanted]
+    if extra:
+        faults.add(
+            "",
+            f"{', '.join(extra)}: a prediction with no reference to compare it with",
+            next_step="add the reference's column, or delete the model's",
+        )
+
+
+def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
+    """Everything that has no place of its own in a Recording."""
+    placed = {"time_s", *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
+    placed |= {f"scale_{i}_mm" for i in range(1, layout.scales + 1)}
+    placed |= {f"joint_{k}_um" for k in range(1, layout.joints + 1)}
+    placed |= {f"approach_{i}" for i in range(1, layout.scales + 1)} if layout.approach else set()
+    return (name for name in names if name not in placed and not name.startswith(("reference_", "model_")))
+
+
+def _missing(wanted: Sequence[str], names: Sequence[str], faults: ProblemList) -> None:
+    """One problem for missing columns of one group."""
+    if not wanted:
+        return
+    strange = [name for name in names if known(name) is None]
+    close = difflib.get_close_matches(wanted[0], strange, n=1, cutoff=0.75)
+    plural = "s are" if len(wanted) > 1 else " is"
+    next_step = f"is `{close[0]}` meant?" if close else "add it; leave cells empty where nothing was measured"
+    faults.add("", f"the column{plural} missing: {', '.join(wanted)}", next_step=next_step)

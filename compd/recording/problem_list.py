@@ -1,0 +1,60 @@
+"""Everything that is wrong with a file, collected; equal problems of one column become one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from compd.errors import Problem
+
+SHOWN_ROWS = 3
+
+
+class ProblemList:
+    """The problems (the file cannot be used) and warnings (it can, but look) found in one table."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.problems: list[Problem] = []
+        self.warnings: list[Problem] = []
+
+    def add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+        """A problem at `place` in this file: "row 5", "column scale_1_mm (E)", or "" for the whole file."""
+        self.problems.append(
+            Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
+        )
+
+    def warn(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+        """As `add`, but the file can be used."""
+        self.warnings.append(
+            Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
+        )
+
+    def _where(self, place: str) -> str:
+        return f"{self.path}: {place}" if place else str(self.path)
+
+
+def rows_text(rows: Sequence[int]) -> str:
+    """Spreadsheet row numbers for a person: "row 5", "rows 5, 9 and 12", "rows 5, 9, 12 and 412 more rows"."""
+    shown = [str(row) for row in rows[:SHOWN_ROWS]]
+    more = len(rows) - len(shown)
+    if more:
+        return f"rows {', '.join(shown)} and {more} more row{'s' * (more != 1)}"
+    return f"row {shown[0]}" if len(shown) == 1 else f"rows {', '.join(shown[:-1])} and {shown[-1]}"
+
+
+def values_text(values: Iterable[str]) -> str:
+    """The first few offending values as written, each once."""
+    different = list(dict.fromkeys(values))
+    shown = ", ".join(repr(value if len(value) <= 40 else value[:37] + "...") for value in different[:SHOWN_ROWS])
+    return shown + (", ..." if len(different) > SHOWN_ROWS else "")
+
+
+def column_letters(index: int) -> str:
+    """The letters over column `index` (0-based) in a spreadsheet: 0 -> A, 26 -> AA."""
+    letters = ""
+    index += 1
+    while index:
+        index, rest = divmod(index - 1, 26)
+        letters = chr(ord("A") + rest) + letters
+    return letters

@@ -1,0 +1,193 @@
+"""A recording: raw readings of the machine beside an external reference, row by row, in the program's units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.errors import Problem
+from compd.recording.ball_plate import BallPlate
+from compd.recording.columns import FRAME_COLUMNS
+from compd.recording.sidecar import Reference, Sidecar
+
+# Without a `session` column, cross-validation leaves out blocks of time (the recording format).
+BLOCKS = 8
+# A scale that stands still shows less than this (display noise and thermal creep between two rows);
+# a move that is meant is longer.
+STILL_MM = 0.001
+
+
+class UsableRows(NamedTuple):
+    """Rows that have what is needed.
+
+    mask : (N,) bool.
+    left_out : reason -> rows; each row counts once, under the first reason that applies.
+    """
+
+    mask: BoolArray
+    left_out: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """N rows of one recording. Lengths are mm (the file's um are converted), nan where a cell was empty.
+
+    Attributes
+    ----------
+    path, sha256 : the CSV file; hash of it, its sidecar and its ball plate, for provenance.
+    sidecar : what the sidecar says; `machine` and `reference` are short for its own.
+    row : (N,) row as a spreadsheet shows it, the header being row 1.
+    time_s : (N,) seconds from the start, strictly rising, never nan.
+    session, visit, point : (N,) int or None where the column is absent; -1 where the cell is empty.
+        Text ids of points are numbered in sorted order.
+    scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
+        None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
+    approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
+        the scales (`last_direction`); nan where it is not known.
+    approach_measured : whether it is from the columns.
+    quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
+    reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
+        ball plate the calibrated place of the row's ball, all three axes.
+    reference_rotation_rad : (N, 3) or None: rotation vector of {P} in {M}.
+    reference_link_mm : (N, m) or None: change of the links `reference_links` (1-based numbers).
+    ball : (N,) int or None, -1 where empty. plate : the ball plate.
+    model_mm, model_rotation_rad, model_link_mm : with `machine: external` the user's own model's prediction, column
+        for column as the reference's.
+    excluded : (N,) bool, by the person; the reasons are in `sidecar.excluded`.
+    left_out : reason -> rows of the file that are no row here (no time; empty row between others).
+    columns : name -> (N,) every column as in the file, in the file's unit.
+    warnings : what can be used but should be looked at.
+    """
+
+    path: Path
+    sha256: str
+    sidecar: Sidecar
+    row: IntArray
+    time_s: FloatArray
+    session: IntArray | None
+    visit: IntArray | None
+    point: IntArray | None
+    scale_mm: FloatArray | None
+    joint_mm: FloatArray | None
+    frame_mm: FloatArray | None
+    approach: FloatArray | None
+    approach_measured: bool
+    quantities: Mapping[str, FloatArray]
+    reference_axes: tuple[str, ...]
+    reference_mm: FloatArray | None
+    reference_rotation_rad: FloatArray | None
+    reference_links: tuple[int, ...]
+    reference_link_mm: FloatArray | None
+    ball: IntArray | None
+    plate: BallPlate | None
+    model_mm: FloatArray | None
+    model_rotation_rad: FloatArray | None
+    model_link_mm: FloatArray | None
+    excluded: BoolArray
+    left_out: Mapping[str, int]
+    columns: Mapping[str, FloatArray]
+    warnings: tuple[Problem, ...] = ()
+
+    @property
+    def machine(self) -> str:
+        """Name of the machine configuration, or "external"."""
+        return self.sidecar.machine
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the reference is; None for gauges alone."""
+        return self.sidecar.reference
+
+    @property
+    def rows(self) -> int:
+        """N."""
+        return len(self.time_s)
+
+    @property
+    def gauge_columns(self) -> tuple[str, ...]:
+        """Names of the columns behind scale_mm, joint_mm and frame_mm."""
+        scales = 0 if self.scale_mm is None else self.scale_mm.shape[1]
+        joints = 0 if self.joint_mm is None else self.joint_mm.shape[1]
+        return (
+            *(f"scale_{i}_mm" for i in range(1, scales + 1)),
+            *(f"joint_{k}_um" for k in range(1, joints + 1)),
+            *(FRAME_COLUMNS if self.frame_mm is not None else ()),
+        )
+
+    @property
+    def reference_columns(self) -> tuple[str, ...]:
+        """Names of the columns that hold the reference (`ball` for a ball plate)."""
+        return tuple(name for name in self.columns if name.startswith("reference_") or name == "ball")
+
+    @property
+    def model_columns(self) -> tuple[str, ...]:
+        """Names of the columns that hold the user's own model's prediction."""
+        return tuple(name for name in self.columns if name.startswith("model_"))
+
+    @property
+    def reference_sigma_mm(self) -> FloatArray:
+        """(axes or links,) standard uncertainty of the reference; nan where it is not known."""
+        count = len(self.reference_axes) or len(self.reference_links)
+        sigma_um = self.reference.sigma_um if self.reference else (np.nan,)
+        return np.broadcast_to(np.array(sigma_um) / 1000.0, (count,)).astype(np.float64)
+
+    def usable(self, needed: Iterable[str]) -> UsableRows:
+        """Rows that nobody excluded and that have a value in every column of `needed` (full names).
+
+        Raises KeyError for a column that the recording does not have.
+        """
+        left: dict[str, int] = {}
+        mask = ~self.excluded
+        if self.excluded.any():
+            left["excluded by a person"] = int(self.excluded.sum())
+        for name in needed:
+            empty = mask & np.isnan(self.columns[name])
+            if empty.any():
+                left[f"{name} is empty"] = int(empty.sum())
+                mask &= ~empty
+        return UsableRows(mask, left)
+
+    @cached_property
+    def fold(self) -> IntArray:
+        """(N,) what cross-validation leaves out as a whole: the session, else eight blocks of time.
+
+        Blocks hold equally many rows as nearly as whole visits allow. Rows with an empty session are -1.
+        """
+        if self.session is not None:
+            return self.session
+        block = np.arange(self.rows, dtype=np.int64) * BLOCKS // max(self.rows, 1)
+        if self.visit is None:
+            return block
+        _, first, inverse = np.unique(self.visit, return_index=True, return_inverse=True)
+        together = block[first][inverse]
+        return np.where(self.visit >= 0, together, block).astype(np.int64)
+
+
+def last_direction(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
+    """(N, n) sign of each scale's last movement of STILL_MM or more; nan before its first in a session.
+
+    Slow creep counts once it has added up. What happened between two rows is not known: an axis that went
+    out and came back looks as if it stood still. Where that matters, record the `approach` columns.
+    """
+    direction = np.full(scale_mm.shape, np.nan)
+    fresh = {0} if session is None else {0, *(np.flatnonzero(np.diff(session)) + 1).tolist()}
+    for link in range(scale_mm.shape[1]):
+        column = scale_mm[:, link].tolist()
+        last, anchor = np.nan, np.nan
+        signs = []
+        for i, value in enumerate(column):
+            if i in fresh:
+                last, anchor = np.nan, np.nan
+            if not np.isfinite(anchor):
+                anchor = value
+            elif abs(value - anchor) >= STILL_MM:
+                last, anchor = (1.0 if value > anchor else -1.0), value
+            signs.append(last)
+        direction[:, link] = signs
+    return direction

@@ -1,0 +1,137 @@
+"""A measuring campaign on the simulated machine, without wires and without waiting: rows of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.configuration.geometry import Geometry
+from compd.configuration.operation import Wiring
+from compd.simulation.campaign.campaign_plan import (
+    PASS_MM,
+    PASS_ROW_EVERY_S,
+    PASS_ROWS,
+    REPEAT_AFTER_S,
+    VISIT_S,
+    CampaignItem,
+    CampaignPlan,
+    switched_off,
+)
+from compd.simulation.campaign.row_log import LoggedRows, RowLog
+from compd.simulation.truth.cause import Cause
+from compd.simulation.truth.closure import Posture
+from compd.simulation.truth.instruments import Kind, noisy
+from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
+from compd.simulation.truth.strengths import Strengths
+from compd.simulation.truth.touch import TOUCH_STEP_S, approach, posture_at_scales
+from compd.simulation.truth.world import World
+
+# Between sessions time passes in steps, for causes that remember.
+LONGEST_WAIT_S = 300.0
+
+
+class Campaign:
+    """One run of a plan on one machine."""
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        wiring: Wiring,
+        plan: CampaignPlan,
+        seed: int,
+        strengths: Strengths,
+        causes: Sequence[Cause] = (),
+        *,
+        reference: Kind = "tracker",
+        sigma_um: float = 0.0,
+        outlier_share: float = 0.0,
+        balls_M: FloatArray | None = None,
+    ) -> None:
+        """`seed`: joints and noise follow from it. `sigma_um`: of the reference, 0 for the truth itself.
+
+        `balls_M`: (points, 3) mm, for a ball plate the balls that are touched at the plan's points.
+        """
+        weather = plan.weather
+        self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
+        self._world.heat(plan.items[0].heat)
+        self._mechanism = self._world.mechanism
+        self._plan = plan
+        self._rng = np.random.default_rng([seed, 2, plan.number])
+        self._notes = RowLog(self._world, wiring, self._rng, reference, sigma_um, outlier_share)
+        self._sigma_um, self._outlier_share = sigma_um, outlier_share
+        self._balls_M = balls_M
+        self._direction = np.ones(self._mechanism.links)
+        self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
+        self._visit = 0
+
+    def run(self) -> LoggedRows:
+        """Raises KinematicsError where a point cannot be reached."""
+        session = self._plan.items[0].session
+        for item in self._plan.items:
+            if item.session != session:
+                session = item.session
+                self._world.heat(switched_off(self._mechanism.links))
+                self._world.force_M_N = np.zeros(3)
+            self._wait_until(item.start_s)
+            self._world.heat(item.heat)
+            self._world.force_M_N = item.force_M_N
+            if item.kind == "visit":
+                self._go_to(item)
+                self._note(item, item.point)
+                if item.repeated:
+                    self._stay(REPEAT_AFTER_S)
+                    self._note(item, item.point)
+            else:
+                self._pass(item)
+        return self._notes.rows
+
+    # --- moving ---------------------------------------------------------------------------------------
+
+    def _wait_until(self, time_s: float) -> None:
+        while time_s - self._world.time_s > 1e-9:
+            self._stay(min(time_s - self._world.time_s, LONGEST_WAIT_S))
+
+    def _stay(self, time_s: float) -> None:
+        self._world.carry(self._world.scale_mm, self._world.posture, time_s, 0.0)
+
+    def _go_to(self, item: CampaignItem) -> None:
+        """Arrive and settle; a visit's row is written before the next one sets out."""
+        self._visit += 1
+        guess = self._postures[item.point - 1]
+        self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
+        if self._balls_M is not None:
+            ball_M = noisy(self._balls_M[item.point - 1], self._sigma_um, self._rng, self._outlier_share)
+            for scale_mm in approach(self._world, ball_M, guess):
+                self._move(scale_mm, guess, TOUCH_STEP_S)
+
+    def _move(self, scale_mm: FloatArray, guess: Posture, time_s: float) -> None:
+        moved = scale_mm - self._world.scale_mm
+        self._direction = np.where(moved != 0, np.sign(moved), self._direction)
+        travel_s = Move(self._world.scale_mm, scale_mm).duration_s
+        self._world.carry(scale_mm, guess, max(time_s, travel_s), travel_s)
+
+    def _pass(self, item: CampaignItem) -> None:
+        """Out towards another point and half the way back, with rows at rest and at constant speed."""
+        start = self._world.scale_mm
+        way = self._plan.points_mm[item.towards - 1] - start
+        out = way * min(1.0, PASS_MM / np.abs(way).max())
+        self._visit += 1
+        self._note(item, None)
+        for end in (start + out, start + out / 2):
+            move = Move(self._world.scale_mm, end, item.speed_mm_per_s)
+            self._direction = np.sign(end - self._world.scale_mm)
+            steady_s = move.duration_s - 2 * item.speed_mm_per_s / ACCELERATION_MM_PER_S2
+            every_s = min(PASS_ROW_EVERY_S, steady_s / PASS_ROWS)
+            times = move.duration_s / 2 + every_s * (np.arange(PASS_ROWS) - (PASS_ROWS - 1) / 2)
+            before_s = 0.0
+            for time_s in [*times.tolist(), move.duration_s + 0.1]:
+                step_s = time_s - before_s
+                self._world.carry(move.position_mm(time_s), self._world.posture, step_s, step_s)
+                before_s = time_s
+                self._visit += 1
+                self._note(item, None)
+
+    def _note(self, item: CampaignItem, point: int | None) -> None:
+        self._notes.add(item.session, self._visit, point, self._direction)

@@ -1,0 +1,148 @@
+"""What a measuring campaign does when: sessions, visits, passes, loads, heat. Drawn once, run on any machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.tour import tour_points_mm
+from compd.simulation.truth.warm_up import COLUMNS, Heat
+from compd.simulation.truth.weather import WorkshopWeather
+
+SESSIONS = 4
+POINTS = 48
+VISITS_PER_SESSION = 96
+# Three times a session a pass out and one half the way back, with rows on the move: reversals, and speed.
+PASSES_PER_SESSION = 3
+PASS_MM = 24.0
+PASS_SPEEDS_MM_PER_S = (2.0, 5.0, 10.0, 20.0)
+PASS_ROWS = 4
+PASS_ROW_EVERY_S = 0.2
+VISIT_S = 25.0
+REPEAT_AFTER_S = 2.0
+REPEAT_SHARE = 0.25
+# Between sessions the machine is switched off, and links are as warm as the room again.
+GAP_S = 4 * 3600.0
+HEATS_PER_SESSION = 3
+LOADED_SHARE = 0.45
+# Loads on the tip, N: sideways either way, down and a little up.
+LOAD_LOW_N, LOAD_HIGH_N = np.array([-30.0, -30.0, -60.0]), np.array([30.0, 30.0, 10.0])
+# Upper ends of the heat that is drawn: drives at work, electronics, cabinet, a spindle, sun and lamps; W.
+DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0, 0.2, 60.0
+
+
+@dataclass(frozen=True)
+class CampaignItem:
+    """A visit to a point (1-based), or a pass from there towards another one.
+
+    start_s : when the machine sets out. repeated : a second row at once. heat : what is switched on now.
+    """
+
+    kind: Literal["visit", "pass"]
+    session: int
+    start_s: float
+    point: int
+    towards: int
+    force_M_N: FloatArray
+    repeated: bool
+    speed_mm_per_s: float
+    heat: Heat
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """items in time's order; points_mm: (points, n) scale values; weather: of all its sessions; number: which days."""
+
+    number: int
+    items: tuple[CampaignItem, ...]
+    points_mm: FloatArray
+    weather: WorkshopWeather
+
+    def thinned(self, keep_one_in: int) -> CampaignPlan:
+        """The same days with fewer items, as many of each kind."""
+        kinds = {"visit": 0, "pass": 0}
+        kept = []
+        for item in self.items:
+            kinds[item.kind] += 1
+            if kinds[item.kind] % keep_one_in == 1:
+                kept.append(item)
+        return CampaignPlan(self.number, tuple(kept), self.points_mm, self.weather)
+
+
+def plan(
+    mechanism: Mechanism,
+    seed: int,
+    number: int = 0,
+    *,
+    points_mm: FloatArray | None = None,
+    passes: int = PASSES_PER_SESSION,
+) -> CampaignPlan:
+    """`number`: other days on the same machine. `points_mm`: other points than drawn ones, as scale values."""
+    rng = np.random.default_rng([seed, 1, number])
+    if points_mm is None:
+        points_mm = tour_points_mm(mechanism, rng, POINTS)
+    session_s = (VISITS_PER_SESSION + passes) * VISIT_S
+    starts_s = [session * (session_s + GAP_S) for session in range(SESSIONS)]
+    weather = WorkshopWeather(starts_s, session_s, rng)
+    items = [
+        item
+        for session, start in enumerate(starts_s, 1)
+        for item in _session(session, start, mechanism.links, len(points_mm), passes, rng)
+    ]
+    return CampaignPlan(number, tuple(items), points_mm, weather)
+
+
+def switched_off(links: int) -> Heat:
+    """What a machine gives off between sessions."""
+    return Heat(np.zeros(links), 0.0, np.zeros(COLUMNS), 0.0, 0.0, 0.0)
+
+
+def _session(
+    number: int, start_s: float, links: int, points: int, passes: int, rng: np.random.Generator
+) -> Iterator[CampaignItem]:
+    count = VISITS_PER_SESSION + passes
+    every = count // passes if passes else count + 1
+    order = _order(points, count, rng)
+    heat = _heat(links, rng)
+    for k in range(count):
+        if k > 0 and k % (count // HEATS_PER_SESSION) == 0:
+            heat = _heat(links, rng)
+        loaded = rng.uniform() < LOADED_SHARE
+        force_M_N = np.round(rng.uniform(LOAD_LOW_N, LOAD_HIGH_N), 2) if loaded else np.zeros(3)
+        is_pass = k % every == every - 1
+        yield CampaignItem(
+            "pass" if is_pass else "visit",
+            number,
+            start_s + k * VISIT_S,
+            order[k],
+            order[k + 1],
+            force_M_N,
+            not is_pass and rng.uniform() < REPEAT_SHARE,
+            float(rng.choice(PASS_SPEEDS_MM_PER_S)),
+            heat,
+        )
+
+
+def _order(points: int, count: int, rng: np.random.Generator) -> list[int]:
+    """count + 1 points, 1-based: all of them in a new order again and again, none twice in a row."""
+    order: list[int] = []
+    while len(order) <= count:
+        turn = (rng.permutation(points) + 1).tolist()
+        order += turn[1:] + turn[:1] if order and turn[0] == order[-1] else turn
+    return order[: count + 1]
+
+
+def _heat(links: int, rng: np.random.Generator) -> Heat:
+    return Heat(
+        rng.uniform(0, DRIVES_W, links),
+        rng.uniform(0, RING_W),
+        rng.uniform(0, CABINET_W, COLUMNS),
+        rng.uniform(0, PLATFORM_W),
+        rng.uniform(0, TOOL_W),
+        rng.uniform(0, LAMPS_W),
+    )

@@ -1,0 +1,1 @@
+"""Physical causes that can be hidden in the simulated machine."""

@@ -1,0 +1,1 @@
+"""The simulated machine: its mechanism, heat, joints, frame and sensors."""

@@ -1,0 +1,160 @@
+"""Where everything is: parts displaced by heat, forces and causes, and the closure that they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.errors import KinematicsError, Problem
+from compd.simulation.truth.cause import Cause, CauseInputs
+from compd.simulation.truth.closure import Closure, Posture, homogeneous
+from compd.simulation.truth.frame import PPM, Frame
+from compd.simulation.truth.joints import Balls, Joints, link_directions
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.strengths import Strengths
+from compd.simulation.truth.warm_up import WarmUp
+from compd.simulation.truth.weather import Weather
+
+# A platform that leans more than 60 degrees from its attitude at machine zero has hit something.
+LEAST_UPRIGHT = 0.5
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The machine in equilibrium at one instant; mm, N.
+
+    link_mm : (n,) true distances of each link's joint centres, as equation (1) means them.
+    axial_N : (n,) link forces beyond those at machine zero, tension positive.
+    shown : (3,) where a reference instrument without noise shows the tip; in {P} with the tool on the plate.
+    """
+
+    scale_mm: FloatArray
+    posture: Posture
+    supports_M: FloatArray
+    plate_M: FloatArray
+    balls: Balls
+    link_mm: FloatArray
+    axial_N: FloatArray
+    tip_M: FloatArray
+    tip_P: FloatArray
+    shown: FloatArray
+
+
+class Equilibrium:
+    """Solves for `Settled`; knows the parts, and asks warm-up and weather how they are."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        strengths: Strengths,
+        frame: Frame,
+        joints: Joints,
+        causes: Sequence[Cause],
+        warm: WarmUp,
+        weather: Weather,
+    ) -> None:
+        self._mechanism, self._strengths, self._frame, self._joints = mechanism, strengths, frame, joints
+        self._causes, self._warm, self._weather = causes, warm, weather
+        axes_P = mechanism.axes_P
+        for cause in causes:
+            axes_P = cause.axes_P(axes_P)
+        self._closure = Closure(axes_P)
+        self._axial0_N, self._lateral0_M = self._forces(
+            mechanism.posture0, mechanism.joints0_M, mechanism.joints_P, np.zeros(3)
+        )
+
+    def settle(self, scale_mm: FloatArray, guess: Posture, force_M_N: FloatArray) -> Settled:
+        """Twice round: forces and joint angles hardly depend on the micrometres that they cause.
+
+        Raises KinematicsError where the links cannot meet.
+        """
+        s, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
+        stretch = s.support_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
+        joints_P = machine.joints_P * (1 + s.platform_expansion_ppm_per_K * PPM * warm.over_reference_K("platform"))
+        # the rods between the balls and the scale (paper, figure 5) lie within the links
+        rods_mm = s.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
+        lengths_mm = machine.lengths0_mm + scale_mm + rods_mm
+
+        supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
+        base_M = machine.base_joints_M(supports_M, stretch)
+        posture = self._closure.by_lengths(base_M, joints_P, lengths_mm, guess)
+        platform_M = homogeneous(joints_P) @ posture
+        weighed_N, weighed_lateral_M = self._forces(posture, base_M, joints_P, force_M_N)
+        axial_N, lateral_M = weighed_N - self._axial0_N, weighed_lateral_M - self._lateral0_M
+
+        pull_M = np.zeros((3, 3))
+        directions_M = link_directions(base_M, platform_M)
+        np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
+        supports_M = self._frame.supports_M(warm, pull_M)
+        balls = self._joints.balls(posture, base_M, platform_M, axial_N, lateral_M)
+        now = CauseInputs(
+            scale_mm,
+            lengths_mm,
+            directions_M,
+            weighed_N,
+            self._axial0_N,
+            force_M_N,
+            self._tip(posture)[0],
+            posture,
+            warm,
+            warm.time_s,
+            self._weather.pressure_hPa(warm.time_s),
+            self._weather.humidity_pct(warm.time_s),
+        )
+        link_mm = (
+            lengths_mm
+            + balls.base_along_mm
+            - balls.platform_along_mm
+            + _sum((cause.link_mm(now) for cause in causes), machine.links)
+        )
+        posture = self._closure.by_lengths(
+            machine.base_joints_M(supports_M, stretch)
+            + balls.base_across_M
+            + _sum((cause.base_M(now) for cause in causes), machine.links, 3),
+            joints_P + balls.platform_across_P + _sum((cause.platform_P(now) for cause in causes), machine.links, 3),
+            link_mm,
+            posture,
+        )
+        if np.sum(posture[3] * machine.posture0[3]) < LEAST_UPRIGHT:
+            raise KinematicsError(
+                Problem(
+                    where="simulated machine",
+                    what="the platform would tip over at these scale values",
+                    value=np.array2string(scale_mm, precision=3),
+                    next_step="ask for a place nearer to machine zero",
+                )
+            )
+        tip_M, tip_P = self._tip(posture, _sum((cause.tool(now) for cause in causes), 3))
+        shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum((cause.reference(now) for cause in causes), 3)
+        plate_M = self._frame.plate_M(warm)
+        return Settled(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
+
+    def _tip(self, posture: Posture, displaced: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """The tip in {M} and in {P}."""
+        machine = self._mechanism
+        tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.over_reference_K("tool")
+        if machine.tip_frame == "M":
+            tip_P = machine.tip0_P * tool + displaced
+            return homogeneous(tip_P) @ posture, tip_P
+        tip_M = machine.tip0_M * tool + displaced
+        return tip_M, posture[1:] @ (tip_M - posture[0])
+
+    def _forces(
+        self, posture: Posture, base_M: FloatArray, joints_P: FloatArray, force_M_N: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        machine = self._mechanism
+        tip_P = machine.tip0_P
+        if machine.tip_frame == "P":
+            tip_P = posture[1:] @ (machine.tip0_M - posture[0])
+        loads = [(machine.weight_M, machine.weight_at_P), (force_M_N, tip_P)]
+        return self._closure.forces(posture, base_M, joints_P, loads)
+
+
+def _sum(displacements: Iterable[FloatArray | float], *shape: int) -> FloatArray:
+    total = np.zeros(shape)
+    for displacement in displacements:
+        total = total + displacement
+    return total

@@ -1,0 +1,81 @@
+"""The machine frame: columns grow, bend and give, the ring between them grows, the plate grows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.strengths import Strengths
+from compd.simulation.truth.warm_up import COLUMN_STOREYS, WarmUp
+
+# From a drawing of a machine of this size: columns 150 mm deep, standing as far below the plate's
+# surface as the plate is thick.
+COLUMN_DEPTH_MM = 150.0
+FOOT_BELOW_PLATE_MM = 200.0
+# The ring is stiff against columns that lean differently: it lets them keep this share of the difference.
+LEAN_KEPT_SHARE = 0.2
+# The nine distances (paper, equation (3)): ends among b1 b2 b3 m1 m2 m3, in order t1 t2 t3 u1 .. u6.
+DISTANCE_ENDS = ((0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5))
+_FROM, _TO = np.array(DISTANCE_ENDS).T
+DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
+PPM = 1e-6
+UM = 1e-3
+
+
+def distances_mm(supports_M: FloatArray, plate_M: FloatArray) -> FloatArray:
+    """(9,) t1 t2 t3 u1 .. u6 between supports and plate points, (3, 3) each."""
+    ends = np.concatenate([supports_M, plate_M])
+    return np.asarray(np.linalg.norm(ends[_FROM] - ends[_TO], axis=1))
+
+
+class Frame:
+    """Where supports and plate points are, and what the nine comparators' rods make of it."""
+
+    def __init__(self, mechanism: Mechanism, strengths: Strengths) -> None:
+        self._mechanism = mechanism
+        self._strengths = strengths
+        supports = mechanism.supports0_M
+        thickness = mechanism.geometry.plate_thickness_mm or FOOT_BELOW_PLATE_MM
+        # A support below the plate hangs from the same feet: its column then counts downwards.
+        self._heights_mm = supports[:, 2] + thickness
+        self._arms_M = supports - supports.mean(axis=0)
+        outward = self._arms_M * [1.0, 1.0, 0.0]
+        length = np.linalg.norm(outward, axis=1, keepdims=True)
+        self._outward_M = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+        self._distances0_mm = distances_mm(supports, mechanism.plate0_M)
+
+    def supports_M(self, warm: WarmUp, pull_M: FloatArray) -> FloatArray:
+        """(3, 3) mm. `pull_M`: (3, 3) N, force on each support beyond that at machine zero."""
+        return self._mechanism.supports0_M + self._growth(warm) + self._lean(warm) + self._give(pull_M)
+
+    def plate_M(self, warm: WarmUp) -> FloatArray:
+        """(3, 3) mm: the plate grows about its middle, where {M} sits; its surface is the top layer."""
+        growth = self._strengths.plate_expansion_ppm_per_K * PPM * warm.plate_K.mean()
+        return np.asarray(self._mechanism.plate0_M * [1 + growth, 1 + growth, 1.0])
+
+    def comparators_mm(self, supports_M: FloatArray, plate_M: FloatArray, warm: WarmUp) -> FloatArray:
+        """(9,) change of each distance since machine zero, less what the rod has grown by."""
+        rods = self._strengths.frame_rod_expansion_ppm_per_K * PPM * warm.over_reference_K("rods")
+        return np.asarray(distances_mm(supports_M, plate_M) - self._distances0_mm * (1 + rods))
+
+    def _growth(self, warm: WarmUp) -> FloatArray:
+        ring = self._strengths.ring_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
+        column = self._strengths.column_expansion_ppm_per_K * PPM * warm.columns_K.mean(axis=(1, 2))
+        growth_M: FloatArray = ring * self._arms_M
+        growth_M[:, 2] += column * self._heights_mm
+        return growth_M
+
+    def _lean(self, warm: WarmUp) -> FloatArray:
+        """A warmer outer face curves its column inwards; each storey turns all that stands on it."""
+        inner_K, outer_K = warm.columns_K[:, 0, :], warm.columns_K[:, 1, :]
+        curvature = self._strengths.column_expansion_ppm_per_K * PPM / COLUMN_DEPTH_MM * (outer_K - inner_K)
+        storey = (np.arange(COLUMN_STOREYS) + 0.5) / COLUMN_STOREYS
+        inwards = (curvature * (1 - storey)).sum(axis=1) * self._heights_mm**2 / COLUMN_STOREYS
+        lean_M = -inwards[:, None] * self._outward_M
+        mean_M = lean_M.mean(axis=0)
+        return np.asarray(mean_M + LEAN_KEPT_SHARE * (lean_M - mean_M))
+
+    def _give(self, pull_M: FloatArray) -> FloatArray:
+        across, along = self._strengths.column_give_across_um_per_N, self._strengths.column_give_along_um_per_N
+        return np.asarray(pull_M * (np.array([across, across, along]) * UM))

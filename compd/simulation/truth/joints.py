@@ -1,0 +1,114 @@
+"""Ball joints: the balls' centres wander as the joints turn, and give under the links' forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.simulation.truth.closure import Posture, homogeneous
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.strengths import Strengths
+
+# Low harmonics of each joint angle: roundness spectra of ground balls and bores fall off fast.
+_HARMONIC_SHARES = np.array([1.0, 0.2, 0.05])
+UM = 1e-3
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Where the balls' centres are, against where the drawing has them at machine zero; mm.
+
+    base_along, platform_along : (n,) along the link, towards the platform.
+    base_across_M, platform_across_P : (n, 3) across it, where no comparator looks.
+    shank_mm : (n,) the two reference balls of a revolute joint against each other; no motion of the joint.
+    """
+
+    base_along_mm: FloatArray
+    base_across_M: FloatArray
+    platform_along_mm: FloatArray
+    platform_across_P: FloatArray
+    shank_mm: FloatArray
+
+
+class Runout:
+    """One ball per row. Displacement (n, 3) by the joint's two angles, zero at machine zero."""
+
+    def __init__(self, joints: int, amplitude_um: FloatArray, rng: np.random.Generator) -> None:
+        """`amplitude_um`: (3,) of the first harmonic, along the link and in both directions across."""
+        shape = (joints, 3, len(_HARMONIC_SHARES), 2)
+        self._phase_rad = rng.uniform(0, 2 * np.pi, shape)
+        scatter = rng.uniform(0.5, 1.0, shape)  # no two balls are alike
+        self._amplitude_mm = scatter * amplitude_um[:, None, None] * UM * _HARMONIC_SHARES[:, None]
+        self._order = 1.0 + np.arange(len(_HARMONIC_SHARES))[:, None]
+        self._at_zero = self._wave(np.zeros((joints, 2)))
+
+    def displacement_mm(self, angles_rad: FloatArray) -> FloatArray:
+        """(n, 3) for (n, 2) angles."""
+        return self._wave(angles_rad) - self._at_zero
+
+    def _wave(self, angles_rad: FloatArray) -> FloatArray:
+        turned = self._order * angles_rad[:, None, None, :] + self._phase_rad
+        return np.asarray((self._amplitude_mm * np.cos(turned)).sum(axis=(2, 3)))
+
+
+class Joints:
+    """All base and platform joints of a machine."""
+
+    def __init__(self, mechanism: Mechanism, strengths: Strengths, rng: np.random.Generator) -> None:
+        self._strengths = strengths
+        self._n = mechanism.links
+        directions_M = link_directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
+        axes_M = mechanism.axes_P @ mechanism.posture0[1:] if len(mechanism.axes_P) else None
+        self._base_triads = triads(directions_M, axes_M)
+        self._platform_triads = self._base_triads @ mechanism.posture0[1:].T
+        across = strengths.ball_runout_across_share
+        amplitude_um = strengths.ball_runout_um * np.array([1.0, across, across])
+        self._base = Runout(self._n, amplitude_um, rng)
+        self._platform = Runout(self._n, amplitude_um, rng)
+        self._shank = Runout(self._n, strengths.shank_eccentricity_um * np.array([1.0, 0.0, 0.0]), rng)
+
+    def balls(
+        self, posture: Posture, base_M: FloatArray, platform_M: FloatArray, axial_N: FloatArray, lateral_M: FloatArray
+    ) -> Balls:
+        """`axial_N` (n,) and `lateral_M` (n, 3): link forces beyond those at machine zero."""
+        directions_M = link_directions(base_M, platform_M)
+        base = self._base.displacement_mm(angles(self._base_triads, directions_M))
+        platform_angles_rad = angles(self._platform_triads, directions_M @ posture[1:].T)
+        platform = self._platform.displacement_mm(platform_angles_rad)
+        along = self._strengths.ball_give_along_um_per_N * UM
+        across = self._strengths.ball_give_across_um_per_N * UM
+        # A link in tension pulls its base ball towards the platform, its platform ball towards the base.
+        return Balls(
+            base[:, 0] + along * axial_N,
+            _across(self._base_triads, base) + across * lateral_M,
+            platform[:, 0] - along * axial_N,
+            _across(self._platform_triads, platform) - across * lateral_M @ posture[1:].T,
+            self._shank.displacement_mm(platform_angles_rad)[:, 0],
+        )
+
+
+def link_directions(base_M: FloatArray, platform_M: FloatArray) -> FloatArray:
+    """(n, 3) unit vectors from base to platform joints."""
+    links_M = platform_M - base_M
+    return np.asarray(links_M / np.linalg.norm(links_M, axis=1, keepdims=True))
+
+
+def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
+    """(n, 3, 3): rows along the link at machine zero, along the revolute axis (or any other), across both."""
+    if axes is None:
+        aside = np.where(np.abs(directions[:, [2]]) > 0.9, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]])
+        axes = np.cross(directions, aside)
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return np.stack([directions, axes, np.cross(directions, axes)], axis=1)
+
+
+def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
+    """(n, 2) by which links have turned since machine zero; `axes` as from `triads`."""
+    along, first, second = np.einsum("nij,nj->in", axes, directions)
+    return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=1)
+
+
+def _across(triads: FloatArray, displacement: FloatArray) -> FloatArray:
+    return np.asarray(displacement[:, [1]] * triads[:, 1] + displacement[:, [2]] * triads[:, 2])

@@ -1,0 +1,133 @@
+"""How the links move: a measuring tour from point to point, or a controller's scale setpoints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from compd.arrays import FloatArray
+
+Phase = Literal["moving", "dwelling"]
+
+# A measuring machine's drives: brisk, not fast.
+SPEED_MM_PER_S = 50.0
+ACCELERATION_MM_PER_S2 = 250.0
+# Setpoints of a controller are followed in steps no longer than this.
+FOLLOWING_STEP_S = 0.004
+
+
+@dataclass(frozen=True)
+class Move:
+    """All links from `start_mm` to `end_mm` together, speed a trapezoid, the longest way setting the pace."""
+
+    start_mm: FloatArray
+    end_mm: FloatArray
+    speed_mm_per_s: float = SPEED_MM_PER_S
+
+    @property
+    def _way_mm(self) -> float:
+        return float(np.abs(self.end_mm - self.start_mm).max())
+
+    @property
+    def _ramp_s(self) -> float:
+        return min(self.speed_mm_per_s / ACCELERATION_MM_PER_S2, math.sqrt(self._way_mm / ACCELERATION_MM_PER_S2))
+
+    @property
+    def duration_s(self) -> float:
+        ramp_s = self._ramp_s
+        return ramp_s + self._way_mm / (ACCELERATION_MM_PER_S2 * ramp_s) if ramp_s > 0 else 0.0
+
+    def position_mm(self, time_s: float) -> FloatArray:
+        """(n,) at `time_s` from the start."""
+        duration_s, ramp_s = self.duration_s, self._ramp_s
+        if time_s >= duration_s:
+            return self.end_mm
+        if time_s < ramp_s:
+            way = 0.5 * ACCELERATION_MM_PER_S2 * time_s**2
+        elif time_s > duration_s - ramp_s:
+            way = self._way_mm - 0.5 * ACCELERATION_MM_PER_S2 * (duration_s - time_s) ** 2
+        else:
+            way = ACCELERATION_MM_PER_S2 * ramp_s * (time_s - ramp_s / 2)
+        return self.start_mm + (way / self._way_mm) * (self.end_mm - self.start_mm)
+
+
+class Tour:
+    """Visits points in random order, dwelling at each."""
+
+    def __init__(self, start_mm: FloatArray, points_mm: FloatArray, dwell_s: float, rng: np.random.Generator) -> None:
+        """`points_mm`: (points, n) scale values."""
+        self._points_mm = points_mm
+        self._dwell_s = dwell_s
+        self._rng = rng
+        self.point = 0
+        self._since_s = 0.0
+        self._move = Move(start_mm, start_mm)
+        self._depart(start_mm)
+
+    @property
+    def phase(self) -> Phase:
+        return "moving" if self._since_s < self._move.duration_s else "dwelling"
+
+    @property
+    def position_mm(self) -> FloatArray:
+        return self._move.position_mm(self._since_s)
+
+    def advance(self, time_s: float) -> float:
+        """Go on for `time_s`; for how much of it the links moved, s."""
+        moved_s = 0.0
+        while True:
+            left_s = self._move.duration_s + self._dwell_s - self._since_s
+            step_s = min(time_s, left_s)
+            moved_s += min(step_s, max(0.0, self._move.duration_s - self._since_s))
+            self._since_s += step_s
+            if time_s < left_s:
+                return moved_s
+            time_s -= step_s
+            self._depart(self._move.end_mm)
+
+    def _depart(self, start_mm: FloatArray) -> None:
+        others = [i for i in range(1, len(self._points_mm) + 1) if i != self.point]
+        self.point = int(self._rng.choice(others))
+        self._move = Move(start_mm, self._points_mm[self.point - 1])
+        self._since_s = 0.0
+
+
+class Follower:
+    """Each link after its own setpoint, within speed and acceleration, braking in time."""
+
+    point = None
+
+    def __init__(self, start_mm: FloatArray) -> None:
+        self.position_mm = start_mm
+        self.setpoint_mm = start_mm
+        self._speed_mm_per_s = np.zeros_like(start_mm)
+
+    @property
+    def phase(self) -> Phase:
+        return "dwelling" if np.array_equal(self.position_mm, self.setpoint_mm) else "moving"
+
+    def advance(self, time_s: float) -> float:
+        """Go on for `time_s`; for how much of it the links moved, s."""
+        moved_s = 0.0
+        while time_s - moved_s > 1e-12 and self.phase == "moving":
+            step_s = min(FOLLOWING_STEP_S, time_s - moved_s)
+            self._step(step_s)
+            moved_s += step_s
+        return moved_s
+
+    def _step(self, step_s: float) -> None:
+        left_mm = self.setpoint_mm - self.position_mm
+        gain = ACCELERATION_MM_PER_S2 * step_s
+        # the speed from which `left_mm` is enough to brake, a step of travel being taken off first
+        braking = np.sqrt(gain**2 / 4 + 2 * ACCELERATION_MM_PER_S2 * np.abs(left_mm)) - gain / 2
+        wanted = np.sign(left_mm) * np.minimum(braking, SPEED_MM_PER_S)
+        self._speed_mm_per_s = self._speed_mm_per_s + np.clip(wanted - self._speed_mm_per_s, -gain, gain)
+        travel_mm = self._speed_mm_per_s * step_s
+        # a short step leaves the next one more to brake than it can: nobody goes past for that
+        slow = np.abs(self._speed_mm_per_s) <= 2 * ACCELERATION_MM_PER_S2 * FOLLOWING_STEP_S
+        arrived = (np.abs(left_mm) <= np.abs(travel_mm) + 1e-9) & slow
+        self.position_mm = np.where(arrived, self.setpoint_mm, self.position_mm + travel_mm)
+        self._speed_mm_per_s = np.where(arrived, 0.0, self._speed_mm_per_s)

@@ -1,0 +1,62 @@
+"""What the gauges show of the machine: with noise, and in steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.configuration.geometry import Geometry
+from compd.configuration.operation import Wiring
+from compd.simulation.truth.frame import DISTANCES
+from compd.simulation.truth.joints import Balls
+from compd.simulation.truth.strengths import Strengths
+
+UM = 1e-3
+# A good interpolator divides the signal period by 4096; without a period, the displays' step of 0.1 um.
+INTERPOLATION = 4096
+DISPLAY_STEP_MM = 1e-4
+
+
+class Sensors:
+    """Scales `scale_1`.., joint comparators `joint_1`.. in the wiring's order, frame `frame_t1`.. `frame_u6`."""
+
+    def __init__(self, geometry: Geometry, wiring: Wiring, strengths: Strengths, rng: np.random.Generator) -> None:
+        period_mm = geometry.scale_signal_period_mm
+        ideal = strengths.comparator_step_um == 0
+        self._scale_step_mm = 0.0 if ideal else period_mm / INTERPOLATION if period_mm else DISPLAY_STEP_MM
+        self._joints = [(wire.role, wire.link - 1) for wire in wiring.joint]
+        self._strengths = strengths
+        self._rng = rng
+
+    def show(
+        self, scale_mm: FloatArray, joint_mm: FloatArray, frame_mm: FloatArray, thermometers_degC: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Every reading by name: mm and degC."""
+        step_mm = self._strengths.comparator_step_um * UM
+        noise_mm = self._strengths.comparator_noise_um * UM
+        scale = self._seen(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
+        joint = self._seen(joint_mm, noise_mm, step_mm)
+        frame = self._seen(frame_mm, noise_mm, step_mm)
+        thermometer = self._seen(np.array(list(thermometers_degC.values())), self._strengths.thermometer_noise_K, 0.0)
+        return {
+            **{f"scale_{i + 1}": value for i, value in enumerate(scale.tolist())},
+            **{f"joint_{k + 1}": value for k, value in enumerate(joint.tolist())},
+            **{f"frame_{name}": value for name, value in zip(DISTANCES, frame.tolist(), strict=True)},
+            **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
+        }
+
+    def joints_mm(self, balls: Balls) -> FloatArray:
+        """(k,) mm: a comparator counts what shortens the link (paper, equation (1)), its ball coming the link's way."""
+        seen = {
+            "S": -balls.base_along_mm,
+            "Ra": balls.platform_along_mm + balls.shank_mm,
+            "Rb": balls.platform_along_mm - balls.shank_mm,
+            "B": balls.platform_along_mm,
+        }
+        return np.array([seen[role][link] for role, link in self._joints])
+
+    def _seen(self, value: FloatArray, noise: float, step: float) -> FloatArray:
+        noisy = value + noise * self._rng.standard_normal(len(value))
+        return np.asarray(np.round(noisy / step) * step) if step > 0 else noisy

@@ -1,0 +1,193 @@
+"""The machine as bodies that warm up: links, base, columns, platform, tool, surface plate, rods.
+
+Sizes are those of a machine of half a metre; `C` J/K, `G` W/K. Steel and iron: 460 J/(kg K),
+50 W/(m K); granite: 800 J/(kg K), 2.8 W/(m K), 2900 kg/m3; still air over painted metal, convection and
+radiation together: 8 W/(m2 K).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compd.simulation.truth.heat import HeatNetwork
+from compd.simulation.truth.weather import REFERENCE_degC, Weather
+
+Floats = NDArray[np.float64]
+
+# Beside the links, what a thermometer is on: a place that can be held warm or cold.
+PARTS = ("base", "platform", "tool", "frame", "plate_top", "plate_bottom")
+LINK_PIECES = 5
+COLUMN_STOREYS = 4
+COLUMNS = 3
+PLATE_LAYERS = 5
+_FACES = ("inner", "outer")
+
+# Heat: a drive holding its link and moving it; electronics on the base ring; the
+# cabinet's radiation on a column's outer face (it stands beside column 1); lamps over the plate.
+_DRIVE_HOLDING_W = 0.3
+_DRIVE_MOVING_W = 1.2
+# The motor near the base end gives off a third of it; nut, screw and guides the rest, over the whole travel.
+_DRIVE_SHARES = np.array([2, 7, 2, 2, 2]) / 15
+_RING_W = 12.0
+_CABINET_W = (8.0, 3.0, 4.0)
+_PLATFORM_W = 0.4
+_LAMPS_W = 3.0
+
+
+@dataclass(frozen=True)
+class Heat:
+    """Heat at work; W. `drives`: (n,) in each link, beyond what it takes to move it; `cabinet`: (3,) per column."""
+
+    drives_W: Floats
+    ring_W: float
+    cabinet_W: Floats
+    platform_W: float
+    tool_W: float
+    lamps_W: float
+
+
+def usual_heat(links: int, share: float) -> Heat:
+    """What this machine's drives and electronics give off, times `share`."""
+    return Heat(
+        np.full(links, share * _DRIVE_HOLDING_W),
+        share * _RING_W,
+        share * np.array(_CABINET_W),
+        share * _PLATFORM_W,
+        0.0,
+        share * _LAMPS_W,
+    )
+
+
+# Weather moves in minutes: within this step the room's change is taken at its middle.
+LONGEST_STEP_S = 20.0
+
+
+class WarmUp:
+    """Temperatures of every body after switch-on; 20 degC everywhere at time 0."""
+
+    def __init__(self, links: int, weather: Weather, heat_share: float) -> None:
+        self._weather = weather
+        self.time_s = 0.0
+        self._links = [[f"link_{i + 1}_{k}" for k in range(LINK_PIECES)] for i in range(links)]
+        self._columns = [
+            {face: [f"column_{i + 1}_{face}_{k}" for k in range(COLUMN_STOREYS)] for face in _FACES}
+            for i in range(COLUMNS)
+        ]
+        self._plate = [f"plate_{k}" for k in range(PLATE_LAYERS)]
+        self._network = self._build()
+        index = self._network.index
+        self._at_link = np.array([[index[name] for name in pieces] for pieces in self._links])
+        self._at_column = np.array([[[index[n] for n in column[face]] for face in _FACES] for column in self._columns])
+        self._at_plate = np.array([index[name] for name in self._plate])
+        columns = [name for column in self._columns for face in _FACES for name in column[face]]
+        self._places: dict[str, Sequence[str]] = {
+            **{f"link_{i + 1}": pieces for i, pieces in enumerate(self._links)},
+            **dict(
+                zip(PARTS, (["base"], ["platform"], ["tool"], columns, self._plate[:1], self._plate[-1:]), strict=True)
+            ),
+        }
+        self.heat = usual_heat(links, heat_share)
+        self._moving_W: Floats = np.zeros(len(index))
+        self._moving_W[self._at_link] = heat_share * _DRIVE_MOVING_W * _DRIVE_SHARES
+
+    def advance(self, time_s: float, moving_share: float) -> None:
+        """Let `time_s` pass; the drives moved during `moving_share` of it."""
+        heat_W = self._standing_W() + moving_share * self._moving_W
+        steps = max(1, int(np.ceil(time_s / LONGEST_STEP_S)))
+        for _ in range(steps):
+            step_s = time_s / steps
+            self._network.advance(step_s, self._weather.room_degC(self.time_s + step_s / 2), heat_W)
+            self.time_s += step_s
+
+    def hold(self, places_degC: Mapping[str, float]) -> None:
+        """From now on these places, and no others, are held at their temperatures; named as by a thermometer there."""
+        self._network.hold({body: degC for place, degC in places_degC.items() for body in self._places[place]})
+
+    @property
+    def room_degC(self) -> float:
+        return self._weather.room_degC(self.time_s)
+
+    def over_reference_K(self, body: str) -> float:
+        """Mean temperature of base, platform, tool or rods over 20 degC."""
+        return float(self._network.temperature_degC[self._network.index[body]]) - REFERENCE_degC
+
+    @property
+    def links_K(self) -> Floats:
+        """(n,) mean of each link over 20 degC."""
+        return np.asarray(self._network.temperature_degC[self._at_link].mean(axis=1) - REFERENCE_degC)
+
+    @property
+    def link_pieces_K(self) -> Floats:
+        """(n, pieces) over 20 degC, from the base end on."""
+        return np.asarray(self._network.temperature_degC[self._at_link] - REFERENCE_degC)
+
+    @property
+    def columns_K(self) -> Floats:
+        """(3, 2, storeys) over 20 degC: column, inner and outer face, from the foot up."""
+        return np.asarray(self._network.temperature_degC[self._at_column] - REFERENCE_degC)
+
+    @property
+    def plate_K(self) -> Floats:
+        """(layers,) over 20 degC, from the top down."""
+        return np.asarray(self._network.temperature_degC[self._at_plate] - REFERENCE_degC)
+
+    def thermometers_degC(self) -> dict[str, float]:
+        """What a thermometer at each place would show: `temperature_<place>_degC`.
+
+        A link's sits in its middle, the frame's shows the mean of the columns.
+        """
+        places = {
+            "room": self.room_degC,
+            **{f"link_{i + 1}": self._at(pieces[LINK_PIECES // 2]) for i, pieces in enumerate(self._links)},
+            **{body: self._at(body) for body in ("base", "platform", "tool")},
+            "frame": REFERENCE_degC + float(self.columns_K.mean()),
+            "plate_top": self._at(self._plate[0]),
+            "plate_bottom": self._at(self._plate[-1]),
+        }
+        return {f"temperature_{place}_degC": value for place, value in places.items()}
+
+    def _at(self, body: str) -> float:
+        return float(self._network.temperature_degC[self._network.index[body]])
+
+    def _standing_W(self) -> Floats:
+        index, heat = self._network.index, self.heat
+        heat_W = np.zeros(len(index))
+        heat_W[self._at_link] = heat.drives_W[:, None] * _DRIVE_SHARES
+        heat_W[self._at_column[:, 1, :]] = heat.cabinet_W[:, None] / COLUMN_STOREYS
+        for body, watts in (
+            ("base", heat.ring_W),
+            ("platform", heat.platform_W),
+            ("tool", heat.tool_W),
+            (self._plate[0], heat.lamps_W),
+        ):
+            heat_W[index[body]] = watts
+        return heat_W
+
+    def _build(self) -> HeatNetwork:
+        # base ring 25 kg, platform 8 kg, tool 0.15 kg, nine rods of 0.05 kg
+        capacity = {"base": 11500.0, "platform": 3700.0, "tool": 70.0, "rods": 210.0}
+        to_room = {"base": 3.2, "platform": 0.6, "tool": 0.05, "rods": 0.6}
+        between = [("platform", "tool", 0.05)]
+        for pieces in self._links:  # a tube of 3 kg, 0.1 m2; joints conduct badly
+            capacity |= dict.fromkeys(pieces, 1380.0 / LINK_PIECES)
+            to_room |= dict.fromkeys(pieces, 0.75 / LINK_PIECES)
+            between += [(a, b, 0.3) for a, b in itertools.pairwise(pieces)]
+            between += [("base", pieces[0], 0.2), (pieces[-1], "platform", 0.2)]
+        for column in self._columns:  # 30 kg and 0.35 m2 each; the outer face stands towards the room
+            for face, metres2 in (("inner", 0.15), ("outer", 0.20)):
+                storeys = column[face]
+                capacity |= dict.fromkeys(storeys, 6900.0 / COLUMN_STOREYS)
+                to_room |= dict.fromkeys(storeys, 8.0 * metres2 / COLUMN_STOREYS)
+                between += [(a, b, 0.8) for a, b in itertools.pairwise(storeys)]
+            between += [(a, b, 1.5) for a, b in zip(column["inner"], column["outer"], strict=True)]
+            between += [(column[face][-1], "base", 0.5) for face in _FACES]
+        # granite, 0.64 m2, 0.2 m thick; the bottom stands on three feet over a closed stand
+        capacity |= dict.fromkeys(self._plate, 297000.0 / PLATE_LAYERS)
+        to_room |= {self._plate[0]: 5.0, self._plate[-1]: 2.0}
+        between += [(a, b, 45.0) for a, b in itertools.pairwise(self._plate)]
+        return HeatNetwork(capacity, to_room, between)

@@ -1,0 +1,1 @@
+"""The simulated machine on real ports: its gauges on ptys and sockets."""

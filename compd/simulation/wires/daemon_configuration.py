@@ -1,0 +1,74 @@
+"""The configuration with which the daemon cannot tell the simulated machine from the real one."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from compd.configuration import Configuration, load
+from compd.configuration.document import read
+from compd.errors import ConfigurationError, Problem
+
+Port = str | tuple[str, int]
+LOOPBACK = "127.0.0.1"
+
+
+def daemon_path(configuration: Configuration, directory: Path) -> Path:
+    """Where the daemon's configuration goes; ConfigurationError where that is the machine's own."""
+    path = directory / configuration.path.name
+    if path.resolve() == configuration.path.resolve():
+        raise ConfigurationError(
+            Problem(
+                where="--directory",
+                what="would overwrite the machine's own configuration",
+                value=str(path),
+                next_step="choose another directory",
+            )
+        )
+    return path
+
+
+def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port], directory: Path) -> Configuration:
+    """Write `directory`/<the same file name>: everything as in the original but where things are.
+
+    `ports`: by line, a device path or (host, port). Unix socket and state move into `directory`; TCP and
+    UDP stay on this computer, so that no real controller hears of a machine that does not exist.
+    """
+    path = daemon_path(configuration, directory)
+    data = read(configuration.path).data
+    for name, port in ports.items():
+        line = data["lines"][name]
+        if isinstance(port, str):
+            line["port"] = port
+        else:
+            line["host"], line["port"] = port
+    sockets = data["sockets"]
+    sockets["unix"] = {"path": str(directory / "compd.sock")}
+    if configuration.sockets.tcp is not None:
+        sockets["tcp"] = {"host": LOOPBACK, "port": _free_port(configuration.sockets.tcp.port)}
+    if configuration.sockets.udp is not None:
+        sockets["udp"] = {"host": LOOPBACK, "port": configuration.sockets.udp.port}
+    data["state"] = {"directory": str(directory / "state")}
+    (directory / "state").mkdir(exist_ok=True)
+    _write(path, configuration.path, data)
+    return load(path)
+
+
+def _free_port(wanted: int) -> int:
+    """The configured TCP port, or 0 (any) where a daemon on this computer already has it."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOOPBACK, wanted))
+        except OSError:
+            return 0
+    return wanted
+
+
+def _write(path: Path, original: Path, data: dict[str, Any]) -> None:
+    head = f"# {original.name} with the ports of a simulated machine; written by `compd simulate`, gone with it.\n"
+    path.write_text(head + yaml.safe_dump(data, sort_keys=False, width=110), encoding="utf-8")

@@ -1,0 +1,45 @@
+"""From the configuration's wiring to what each simulated device's sensors see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from compd.configuration import Configuration
+from compd.configuration.crosscheck import resolve
+from compd.simulation.truth.world import World
+from compd.simulation.wires.device import Sense
+
+# What a channel that the wiring does not use, or that the simulated machine does not have, answers.
+_IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}
+
+
+class Sensing:
+    """`of(gauge)` is that gauge's `Sense`: its channels, in its own counting direction."""
+
+    def __init__(self, configuration: Configuration, world: World) -> None:
+        self._world = world
+        wiring = configuration.wiring
+        wires = [
+            *((f"scale_{wire.link}", wire.gauge, wire.sign) for wire in wiring.scale),
+            *((f"joint_{k + 1}", wire.gauge, wire.sign) for k, wire in enumerate(wiring.joint)),
+            *((f"frame_{wire.distance}", wire.gauge, wire.sign) for wire in wiring.frame),
+            *((wire.name, wire.gauge, 1) for wire in wiring.quantities),
+        ]
+        wired = {
+            resolve(gauge, configuration.gauges, configuration.drivers): (name, sign) for name, gauge, sign in wires
+        }
+        self._sources: dict[str, dict[str, Callable[[], float]]] = {}
+        for gauge, driver in configuration.gauge_objects().items():
+            self._sources[gauge] = {}
+            for channel in driver.channels:
+                name, sign = wired.get(f"{gauge}.{channel.name}", ("", 1))
+                if name not in world.names:
+                    name, sign = _IDLE_SOURCE.get(channel.unit, ""), 1
+                self._sources[gauge][channel.name] = self._source(name, sign)
+
+    def of(self, gauge: str) -> Sense:
+        sources = self._sources[gauge]
+        return lambda channel: sources[channel]()
+
+    def _source(self, name: str, sign: int) -> Callable[[], float]:
+        return (lambda: sign * self._world.sense(name)) if name else (lambda: 0.0)

@@ -1,0 +1,205 @@
+"""The simulated machine at work: its world, its gauges on their lines, its control socket."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compd.clock import Clock
+from compd.configuration import Configuration
+from compd.plugins import SIMULATED_GAUGES, load
+from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
+from compd.simulation.truth.warm_up import COLUMNS, Heat
+from compd.simulation.truth.world import World
+from compd.simulation.wires.control import Answer, ControlSocket, Handler
+from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
+from compd.simulation.wires.sensing import Sensing
+from compd.simulation.wires.simulated_line import SimulatedLine
+
+# The world moves on this often: far below the 25 ms in which the fastest scale display answers.
+STEP_S = 0.02
+CONTROL_SOCKET = "control.sock"
+# The tracker's noise is its own, whatever the machine does.
+TRACKER_SEED = 17
+
+
+class Simulation:
+    """A configured machine that does not exist, on real ports. The world belongs to whoever holds the lock."""
+
+    def __init__(self, configuration: Configuration, world: World, directory: Path, clock: Clock) -> None:
+        """`directory`: an existing directory for ports, sockets, state and the daemon's configuration.
+
+        Raises PluginError for a driver that nobody offers a simulated device for, ConfigurationError where
+        `directory` holds the machine's own configuration.
+        """
+        daemon_path(configuration, directory)
+        self.configuration = configuration
+        self.world = world
+        self.directory = directory
+        self.ports: Mapping[str, Port] = {}
+        self._clock = clock
+        self._tracker_rng = np.random.default_rng(TRACKER_SEED)
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="world", daemon=True)
+        sensing = Sensing(configuration, world)
+        self._ports_directory = directory / "ports"
+        self.lines: Mapping[str, SimulatedLine] = {
+            name: SimulatedLine(
+                name,
+                settings,
+                [
+                    self._device(gauge, sensing)
+                    for gauge in configuration.gauges
+                    if configuration.gauges[gauge].line == name
+                ],
+                self._ports_directory,
+            )
+            for name, settings in configuration.lines.items()
+        }
+        self._handlers: Mapping[str, Handler] = {
+            "TRUTH": lambda _: self.truth(),
+            "MEASURE": lambda _: self.measure(),
+            "DRIVE": self._drive,
+            "TOUR": self._tour,
+            "PLAN": self._plan,
+            "TIP_FOR": self._tip_for,
+            "LOAD": self._load,
+            "HEAT": self._heat,
+            "FAULT": self._fault,
+        }
+        self._running = ExitStack()
+
+    def start(self) -> Configuration:
+        """Open every port; the configuration, written to `directory`, with which the daemon finds them."""
+        self._ports_directory.mkdir(exist_ok=True)
+        ports = {}
+        for name, line in self.lines.items():
+            ports[name] = line.start()
+            self._running.callback(line.stop)
+        self.ports = ports
+        daemon = daemon_configuration(self.configuration, ports, self.directory)
+        self._thread.start()
+        self._running.callback(self._thread.join)
+        self._running.callback(self._stop.set)
+        # last, for whoever waits for this socket to appear
+        control = ControlSocket(self.directory / CONTROL_SOCKET, self._handlers)
+        self._running.callback(control.stop)
+        return daemon
+
+    def stop(self) -> None:
+        """Close every port and socket that `start` has opened."""
+        self._running.close()
+
+    def _run(self) -> None:
+        last_s = self._clock.monotonic()
+        while not self._clock.wait(self._stop, STEP_S):
+            now_s = self._clock.monotonic()
+            with self._lock:
+                self.world.advance(now_s - last_s)
+            last_s = now_s
+
+    def _device(self, gauge: str, sensing: Sensing) -> Any:
+        driver = self.configuration.gauges[gauge].driver
+        where = f"{self.configuration.path} gauges.{gauge}.driver"
+        return load(SIMULATED_GAUGES, driver, where)(self.configuration.gauges[gauge], sensing.of(gauge))
+
+    # --- what the control socket asks for -------------------------------------------------------------
+
+    def truth(self) -> Answer:
+        """Where the tip truly is and what the machine does: the TRUTH message."""
+        with self._lock:
+            world = self.world
+            tip_mm = world.tip_M_mm() if world.tip_frame == "M" else world.tip_P_mm()
+            return {
+                "class": "TRUTH",
+                "time_s": round(world.time_s, 6),
+                "weather_time_s": round(world.weather_time_s, 6),
+                "mode": world.mode,
+                "phase": world.phase,
+                "moving": world.phase == "moving",
+                "point": world.point,
+                "zero_hold_s": round(world.zero_hold_s, 3),
+                "tip_frame": world.tip_frame,
+                "tip_mm": tip_mm.tolist(),
+                "scale_mm": world.scale_mm.tolist(),
+                **({} if world.measuring is None else {"plan": world.measuring.told()}),
+            }
+
+    def measure(self) -> Answer:
+        """What a laser tracker on the surface plate shows of the tip now: the MEASURED message.
+
+        `monotonic_s`: on the clock by which the gauges' readings are stamped too.
+        """
+        with self._lock:
+            world = self.world
+            shown_mm = noisy(world.shown_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
+            return {
+                "class": "MEASURED",
+                "instrument": "laser tracker",
+                "time_s": round(world.time_s, 6),
+                "monotonic_s": self._clock.monotonic(),
+                "moving": world.phase == "moving",
+                "tip_frame": world.tip_frame,
+                "reference_mm": [round(value, 6) for value in shown_mm.tolist()],
+                "sigma_um": TRACKER_SIGMA_UM,
+            }
+
+    def _drive(self, message: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.command(message["scale_mm"])
+        return self.truth()
+
+    def _tour(self, _: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.tour()
+        return self.truth()
+
+    def _plan(self, _: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            self.world.measure()
+        return self.truth()
+
+    def _tip_for(self, message: Mapping[str, Any]) -> Answer:
+        with self._lock:
+            tip_mm = self.world.tip_for(message["scale_mm"])
+        return {"class": "TIP", "tip_frame": self.world.tip_frame, "tip_mm": tip_mm.tolist()}
+
+    def _load(self, message: Mapping[str, Any]) -> Answer:
+        force_M_N = np.array(message["force_M_N"], dtype=float)
+        if force_M_N.shape != (3,) or not np.all(np.isfinite(force_M_N)):
+            raise ValueError("force_M_N: three finite numbers, N")
+        with self._lock:
+            self.world.force_M_N = force_M_N
+        return self.truth()
+
+    def _heat(self, message: Mapping[str, Any]) -> Answer:
+        drives_W, cabinet_W = ([_watts(value) for value in message[name]] for name in ("drives_W", "cabinet_W"))
+        links = self.world.mechanism.links
+        if (len(drives_W), len(cabinet_W)) != (links, COLUMNS):
+            raise ValueError(f"drives_W: {links} numbers, one per link; cabinet_W: {COLUMNS}, one per column")
+        ring_W, platform_W, tool_W, lamps_W = (
+            _watts(message[name]) for name in ("ring_W", "platform_W", "tool_W", "lamps_W")
+        )
+        with self._lock:
+            self.world.heat(Heat(np.array(drives_W), ring_W, np.array(cabinet_W), platform_W, tool_W, lamps_W))
+        return self.truth()
+
+    def _fault(self, message: Mapping[str, Any]) -> Answer:
+        name = message["line"]
+        if name not in self.lines:
+            raise ValueError(f"no line {name!r}; there are " + ", ".join(self.lines))
+        self.lines[name].fault = message["fault"]
+        return self.truth()
+
+
+def _watts(value: Any) -> float:
+    watts = float(value)
+    if not 0 <= watts < np.inf:
+        raise ValueError(f"{value}: what is switched on gives off 0 W or more")
+    return watts

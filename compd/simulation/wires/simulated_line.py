@@ -1,0 +1,247 @@
+"""A simulated line: its devices on a real pty or TCP port, at the line's own pace, and its faults.
+
+A serial line is a pty whose replies come out as fast as the baud rate lets them; a TCP line is a listening
+socket on this computer. The daemon opens either as it would the real one.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from pymodbus.framer.rtu import FramerRTU
+
+from compd.clock import Clock, MonotonicClock
+from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
+from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
+from compd.simulation.wires.modbus_slaves import Slaves
+from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
+
+# Characters leave in pieces of this length: finer would only cost time of this computer.
+PIECE_S = 1e-3
+DAMAGED_BIT = 0x80
+
+# What is wrong with a line -> the reply as it then arrives, and how many line timeouts late.
+Damage = Callable[[bytes], bytes]
+
+
+def _garble(reply: bytes) -> bytes:
+    """One bit in the middle turned: no text has it, and a CRC finds it."""
+    middle = len(reply) // 2
+    return reply[:middle] + bytes([reply[middle] ^ DAMAGED_BIT]) + reply[middle + 1 :]
+
+
+def _garble_header(reply: bytes) -> bytes:
+    """Modbus TCP: the frame's protocol number; TCP's own checksum keeps noise out of the rest."""
+    return reply[:2] + bytes([reply[2] ^ DAMAGED_BIT]) + reply[3:]
+
+
+def _other_unit_rtu(reply: bytes) -> bytes:
+    frame = bytes([reply[0] % 247 + 1]) + reply[1:-2]
+    return frame + FramerRTU.compute_CRC(frame).to_bytes(2, "big")
+
+
+def _other_unit_tcp(reply: bytes) -> bytes:
+    return reply[:6] + bytes([reply[6] % 247 + 1]) + reply[7:]
+
+
+LATE_TIMEOUTS = 1.5
+_COMMON: Mapping[str, Damage] = {
+    "silent": lambda reply: b"",
+    "garble": _garble,
+    "late": lambda reply: reply,
+    "cut": lambda reply: reply[: len(reply) // 2],
+    "doubled": lambda reply: reply + reply,
+    "noise before": lambda reply: b"\xff" + reply,
+}
+DAMAGES: Mapping[str, Mapping[str, Damage]] = {
+    "serial": _COMMON,
+    "tcp": _COMMON,
+    "modbus_rtu": {**_COMMON, "wrong unit": _other_unit_rtu},
+    "modbus_tcp": {**_COMMON, "garble": _garble_header, "wrong unit": _other_unit_tcp},
+}
+UNPLUGGED = "unplugged"
+
+
+class Listener(Protocol):
+    """What hears the line's bytes and answers."""
+
+    def hear(self, data: bytes) -> bytes: ...
+
+
+class ByteDevices:
+    """Devices on a line of bytes: each hears everything."""
+
+    def __init__(self, devices: Sequence[SimulatedByteDevice]) -> None:
+        self._devices = devices
+
+    def hear(self, data: bytes) -> bytes:
+        return b"".join(device.hear(data) for device in self._devices)
+
+
+@dataclass
+class _Leaving:
+    """A reply on its way out: from when, to whom, and how much of it has left."""
+
+    start_s: float
+    fd: int
+    reply: bytes
+    left: int = 0
+
+
+class SimulatedLine:
+    """One configured line with its devices. Everything happens on the line's own thread."""
+
+    def __init__(
+        self,
+        name: str,
+        settings: LineSettings,
+        devices: Sequence[SimulatedByteDevice] | Sequence[SimulatedRegisterDevice],
+        directory: Path,
+        clock: Clock | None = None,
+    ) -> None:
+        """`directory`: where a serial line's port appears, as `name`."""
+        self.replies = 0  # that have gone out, or would have
+        self._settings = settings
+        self._clock = clock or MonotonicClock()
+        self._link = directory / name
+        self._damages = DAMAGES[settings.kind]
+        self._listener: Listener
+        if settings.kind.startswith("modbus"):
+            registers = [device for device in devices if isinstance(device, SimulatedRegisterDevice)]
+            self._listener = Slaves(registers, over_tcp=settings.kind == "modbus_tcp")
+        else:
+            self._listener = ByteDevices([device for device in devices if isinstance(device, SimulatedByteDevice)])
+        self._character_s = 0.0
+        self._on_pty = isinstance(settings, SerialLine | ModbusRtuLine) and "://" not in settings.port
+        if isinstance(settings, SerialLine | ModbusRtuLine) and self._on_pty:
+            bits = 1 + int(settings.format[0]) + (settings.format[1] != "N") + int(settings.format[2])
+            self._character_s = bits / settings.baud
+        self._tcp_port = 0
+        self._end: End | None = None
+        self._leaving: list[_Leaving] = []
+        self._fault: str | None = None
+        self._wanted: str | None = None  # the line's thread follows it between two replies
+        self._wake_read, self._wake_write = os.pipe()
+        self._stopping = False
+        self._applied = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"simulated {name}", daemon=True)
+
+    def start(self) -> str | tuple[str, int]:
+        """Open the port and serve it. The port for the daemon: a device path or pyserial URL, or (host, port)."""
+        self._plug_in()
+        self._thread.start()
+        if self._on_pty:
+            return str(self._link)
+        if isinstance(self._settings, SerialLine | ModbusRtuLine):
+            return f"socket://{LOOPBACK}:{self._tcp_port}"
+        return LOOPBACK, self._tcp_port
+
+    def stop(self) -> None:
+        """Close the port and end the thread."""
+        self._stopping = True
+        self._wake()
+        self._thread.join()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What can be wrong with this line."""
+        return (*self._damages, UNPLUGGED)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the line now; None: nothing. Setting it returns when the line is so."""
+        return self._fault
+
+    @fault.setter
+    def fault(self, fault: str | None) -> None:
+        if fault is not None and fault not in self.faults:
+            raise ValueError(f"no fault {fault!r} on a line of kind {self._settings.kind}: {', '.join(self.faults)}")
+        if not self._thread.is_alive():
+            raise RuntimeError("only a line that is served can have a fault: start it first")
+        self._wanted = fault
+        self._applied.clear()
+        self._wake()
+        self._applied.wait()
+
+    def _wake(self) -> None:
+        os.write(self._wake_write, b"!")
+
+    def _plug_in(self) -> None:
+        if self._on_pty:
+            self._end = PtyEnd(self._link)
+        else:
+            end = TcpEnd(self._tcp_port)
+            self._tcp_port = end.port
+            self._end = end
+
+    def _pull_out(self) -> None:
+        if self._end is not None:
+            self._end.close()
+        self._end = None
+        self._leaving.clear()
+
+    def _run(self) -> None:
+        while not self._stopping:
+            fds = self._end.fds() if self._end is not None else []
+            ready, _, _ = select.select([self._wake_read, *fds], [], [], self._transmit())
+            for fd in ready:
+                if fd == self._wake_read:
+                    os.read(fd, 4096)
+                    self._follow_fault()
+                elif self._end is not None:
+                    self._hear(self._end, fd)
+        self._pull_out()
+
+    def _follow_fault(self) -> None:
+        self._fault = self._wanted
+        if self._fault == UNPLUGGED:
+            self._pull_out()
+        elif self._end is None:
+            self._plug_in()
+        self._applied.set()
+
+    def _hear(self, end: End, fd: int) -> None:
+        data = end.read(fd)
+        reply = self._listener.hear(data)
+        if not reply:
+            return
+        self.replies += 1
+        # the request has been on the wire, too
+        start_s = self._clock.monotonic() + len(data) * self._character_s
+        if self._fault is not None:
+            reply = self._damages[self._fault](reply)
+        if self._fault == "late":
+            start_s += LATE_TIMEOUTS * self._settings.timeout_s
+        if self._leaving:  # one after the other, also behind a late one
+            start_s = max(start_s, self._end_s(self._leaving[-1]))
+        self._leaving.append(_Leaving(start_s, fd, reply))
+
+    def _transmit(self) -> float | None:
+        """Write what is due; the time (s) until more is, None if nothing is under way."""
+        if self._end is None:
+            return None
+        now_s = self._clock.monotonic()
+        while self._leaving:
+            item = self._leaving[0]
+            if now_s >= self._end_s(item):
+                self._end.write(item.fd, item.reply[item.left :])
+                del self._leaving[0]
+                continue
+            if now_s < item.start_s:
+                return min(item.start_s + PIECE_S, self._end_s(item)) - now_s
+            due = int((now_s - item.start_s) / self._character_s)
+            self._end.write(item.fd, item.reply[item.left : due])
+            item.left = due
+            return min(PIECE_S, self._end_s(item) - now_s)
+        return None
+
+    def _end_s(self, item: _Leaving) -> float:
+        return item.start_s + len(item.reply) * self._character_s

@@ -1,0 +1,81 @@
+"""A configured machine without lines: its gauges show what the test says, its clock is a number."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from compd.configuration import Configuration, load
+from compd.gauge import Quality, bad, good
+from compd.live.loop.commands import Commands
+from compd.live.loop.cycle import Cycle
+from compd.live.loop.machine_zero import MachineZero
+from compd.live.loop.setpoint import State
+from compd.live.loop.tip_uncertainty import declared_noise
+from compd.live.loop.wiring import MachineWires
+from compd.machine_builder import build_model
+from compd.readings import Latest
+from tests.support.paths import CONFIG
+
+RATE_HZ = 200
+PERIOD_S = 1 / RATE_HZ
+SLEW_MM_PER_S = 0.5
+STEP_MM = SLEW_MM_PER_S * PERIOD_S
+HOLD_S = 5.0
+RAW_AT_ZERO_MM = 12.5  # every gauge shows this at machine zero
+
+
+class Machine:
+    """A configured machine whose gauges show what the test says."""
+
+    def __init__(self, configuration: Configuration):
+        self.configuration = configuration
+        gauges = configuration.gauge_objects()
+        self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
+        self.wires = MachineWires(configuration, self.latest)
+        self.model = build_model(configuration.geometry, configuration.wiring)
+        stroke_mm = configuration.geometry.link_length_mm
+        self.cycle = Cycle(
+            self.model,
+            self.wires,
+            configuration.loop,
+            configuration.limits,
+            0.1,
+            stroke_mm,
+            declared_noise(configuration),
+        )
+        zero = dict.fromkeys(self.wires.length_channels, RAW_AT_ZERO_MM)
+        self.orders = Commands(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
+        self.now_s = 1000.0
+        self.tick = 0
+        self.change_mm = dict.fromkeys(self.wires.length_channels, 0.0)
+        self.faults: dict[str, Quality] = {}
+        self.frozen: set[str] = set()
+
+    def step(self):
+        """One period later: every gauge is read anew, unless it is faulty or frozen."""
+        self.now_s += PERIOD_S
+        self.tick += 1
+        for channel, slot in self.latest.index.items():
+            if channel in self.faults:
+                self.latest.put(slot, bad(self.now_s - 0.001, self.faults[channel]))
+            elif channel not in self.frozen:
+                value = RAW_AT_ZERO_MM + self.change_mm[channel] if channel in self.change_mm else 20.0
+                self.latest.put(slot, good(value, self.now_s - 0.001))
+        return self.cycle.run(self.tick, self.latest.snapshot(self.now_s), self.orders)
+
+    def settle(self):
+        """Until the correction has arrived."""
+        for _ in range(200):
+            setpoint = self.step()
+            if setpoint.state is State.OK:
+                return setpoint
+        raise AssertionError(setpoint)
+
+
+def machine(name="tripod-cmm.yaml", **changes) -> Machine:
+    configuration = load(CONFIG / name)
+    loop = configuration.loop.model_copy(
+        update={"rate_hz": RATE_HZ, "hold_s": HOLD_S, "stale_after_s": 0.5, "on_stale": changes.pop("on_stale", "hold")}
+    )
+    limits = configuration.limits.model_copy(update={"slew_mm_per_s": SLEW_MM_PER_S, "correction_mm": 0.2, **changes})
+    return Machine(replace(configuration, loop=loop, limits=limits))

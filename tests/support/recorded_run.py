@@ -1,0 +1,106 @@
+"""A run to record: a machine whose gauges drift and fail, whose target and machine zero change."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from compd.clock import MonotonicClock
+from compd.gauge import Quality
+from compd.live.loop.commands import Target
+from compd.live.loop.directions import Directions
+from compd.live.loop.machine_zero import MachineZero
+from compd.live.record.recorder import Keeping, Recorder
+from compd.live.service.readings_message import ReadingsMessage
+from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
+
+ROOMY = Keeping(part_bytes=10**9, part_s=1e9, limit_bytes=10**10, drop_oldest=False)
+_FAULTS = [Quality.TIMEOUT, Quality.CRC, Quality.LINE_LOST, Quality.OVER_RANGE]
+
+
+class Run:
+    """Cycles of `machine`, with the lines that the daemon would send of them."""
+
+    def __init__(self, machine: Machine, seed: int = 1):
+        self.machine = machine
+        self.random = np.random.default_rng(seed)
+        self.directions = Directions(machine.wires.scale.wires)
+        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels, self.directions)
+        self.version = {
+            "class": "VERSION",
+            "protocol": 1,
+            "release": "1.2",
+            "machine": machine.configuration.machine,
+            "config_hash": machine.configuration.config_hash,
+            "links": machine.configuration.geometry.links,
+        }
+        self.watch = {"class": "WATCH", "what": "readings", "columns": self.transcript.columns}
+
+    def quiet(self, cycles):
+        """Nothing but noise: (line, message, setpoint) of each cycle."""
+        machine = self.machine
+        for _ in range(cycles):
+            for channel in machine.change_mm:
+                machine.change_mm[channel] += float(self.random.normal(0, 1e-4))
+            yield self.recorded(machine.step())
+
+    def eventful(self, cycles):
+        """Everything that a day may bring: lost and frozen gauges, targets, jumps, a machine zero taken anew."""
+        machine, random = self.machine, self.random
+        events = [self.fault, self.mend, self.freeze, self.target, self.release, self.jump, self.take_zero]
+        for recorded in self.quiet(cycles):
+            yield recorded
+            if random.random() < 0.1:
+                events[random.integers(len(events))]()
+            if random.random() < 0.05:
+                self.mend()
+            assert machine.tick == recorded[1]["seq"]
+
+    def recorded(self, setpoint):
+        self.directions.saw(setpoint)
+        line = self.transcript.line(setpoint)
+        return line, json.loads(line), setpoint
+
+    def any_channel(self):
+        return str(self.random.choice(list(self.machine.latest.channels)))
+
+    def fault(self):
+        self.machine.faults[self.any_channel()] = _FAULTS[self.random.integers(len(_FAULTS))]
+
+    def freeze(self):
+        self.machine.frozen.add(self.any_channel())
+
+    def mend(self):
+        self.machine.faults.clear()
+        self.machine.frozen.clear()
+        for channel in self.machine.change_mm:
+            self.machine.change_mm[channel] = float(self.random.normal(0, 0.01))
+
+    def jump(self):
+        self.machine.change_mm[str(self.random.choice(list(self.machine.change_mm)))] = 0.6
+
+    def target(self):
+        tip_mm = np.array([0.0, 0.0, -510.0 if self.machine.model.links == 3 else -580.0])
+        tip_mm = tip_mm + self.random.uniform(-20, 20, 3)
+        turned = self.machine.model.attitude_is_free and self.random.random() < 0.5
+        rotation = tuple(self.random.uniform(-0.05, 0.05, 3).tolist()) if turned else None
+        self.machine.orders.target = Target(tuple(tip_mm.tolist()), rotation)
+
+    def release(self):
+        self.machine.orders.target = None
+
+    def take_zero(self):
+        readings = {name: RAW_AT_ZERO_MM + change for name, change in self.machine.change_mm.items()}
+        self.machine.orders.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
+
+    @contextmanager
+    def recorder(self, name: Path, keeping=ROOMY, say=None, **watch):
+        """A recorder that has written everything when the block ends."""
+        said = [] if say is None else say
+        recorder = Recorder(name, self.version, self.watch | watch, keeping, said.append, MonotonicClock())
+        recorder.start()
+        yield recorder
+        recorder.close()

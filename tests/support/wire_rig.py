@@ -1,0 +1,160 @@
+"""What the tests of lines and drivers share: clocks, a scripted port, simulated lines, waiting for readings."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from compd.clock import MonotonicClock
+from compd.configuration.lines import LineSettings
+from compd.gauge import Gauge, LineFault, Quality, Reading
+from compd.lines import open_line
+from compd.plugins import GAUGES, SIMULATED_GAUGES, load
+from compd.readings import Latest
+from compd.simulation.wires.simulated_line import SimulatedLine
+
+# A bound for waiting, never a measure: a test that needs it has failed.
+PATIENCE_S = 20.0
+
+Sense = Callable[[str], float]
+SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(LineSettings)
+
+
+class InstantClock:
+    """Time passes only by waiting, and waiting takes no time. Notes how long each wait was to be."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.waits_s: list[float] = []
+        self.on_wait: Callable[[], None] = lambda: None
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def wait(self, event: threading.Event, timeout_s: float) -> bool:
+        self.waits_s.append(timeout_s)
+        self.now_s += timeout_s
+        self.on_wait()
+        return event.is_set()
+
+
+class ScriptedPort:
+    """A port on an InstantClock. `script`: what reads find, one after the other; b"" is a silence.
+
+    With `device`, what is written is answered by it; the answer is there at once.
+    """
+
+    character_s = 0.0
+
+    def __init__(
+        self, clock: InstantClock, script: Sequence[bytes] = (), device: Callable[[bytes], bytes] | None = None
+    ) -> None:
+        self._clock = clock
+        self.script = list(script)
+        self._device = device
+        self.written: list[bytes] = []
+        self.closed = False
+
+    def read(self, timeout_s: float) -> bytes:
+        data = self.script.pop(0) if self.script else b""
+        if not data:
+            self._clock.now_s += max(0.0, timeout_s)
+        return data
+
+    def write(self, data: bytes) -> None:
+        self.written.append(data)
+        if self._device is not None:
+            self.script += [piece for piece in (self._device(data),) if piece]
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class WatchedLatest(Latest):
+    """Latest that a test can wait on."""
+
+    def __init__(self, channels: Sequence[str]) -> None:
+        super().__init__(channels)
+        self.history: list[tuple[str, Reading]] = []
+        self._changed = threading.Condition()
+
+    def put(self, index: int, reading: Reading) -> None:
+        with self._changed:
+            super().put(index, reading)
+            self.history.append((self.channels[index], reading))
+            self._changed.notify_all()
+
+    def wait_for(self, channel: str, quality: Quality, after: int = 0) -> Reading:
+        """The first reading of `channel` with `quality` since history entry `after`."""
+        found: list[Reading] = []
+
+        def there() -> bool:
+            found.extend(r for name, r in self.history[after:] if name == channel and r.quality is quality)
+            return bool(found)
+
+        with self._changed:
+            seen = self._changed.wait_for(there, PATIENCE_S)
+        assert seen, f"{channel} never became {quality}: {self.snapshot(0.0).readings[self.index[channel]]}"
+        return found[0]
+
+    @property
+    def now(self) -> int:
+        """The history's length: what comes after it is new."""
+        return len(self.history)
+
+
+@dataclass
+class Rig:
+    """A simulated line, and the settings and drivers with which the daemon's side finds it."""
+
+    wire: SimulatedLine
+    settings: LineSettings
+    gauges: dict[str, Gauge[Any]]
+    values: dict[str, float]
+
+    @contextmanager
+    def open(self) -> Iterator[Any]:
+        """The daemon's side of the line."""
+        line = open_line(self.settings, MonotonicClock())
+        try:
+            yield line
+        finally:
+            line.close()
+
+
+@contextmanager
+def rig(
+    directory: Path, line: Mapping[str, Any], gauges: Mapping[str, Mapping[str, Any]], values: dict[str, float]
+) -> Iterator[Rig]:
+    """A simulated line with `gauges` (name -> the driver's options). Its sensors see `values` by channel name."""
+    settings = SETTINGS.validate_python(line)
+    drivers = {}
+    devices = []
+    for name, raw in gauges.items():
+        driver = load(GAUGES, raw["driver"], name)
+        options = driver.Options.model_validate({"line": "line", **raw})
+        drivers[name] = driver(options)
+        devices.append(load(SIMULATED_GAUGES, raw["driver"], name)(options, lambda channel: values[channel]))
+    wire = SimulatedLine("line", settings, devices, directory)
+    port = wire.start()
+    where = {"port": port} if isinstance(port, str) else {"host": port[0], "port": port[1]}
+    try:
+        yield Rig(wire, settings.model_copy(update=where), drivers, values)
+    finally:
+        wire.stop()
+
+
+def outcome(gauge: Gauge[Any], line: Any) -> list[tuple[Quality, float]]:
+    """One poll: quality and value per channel; a fault of the whole poll counts for each. Drains as the daemon does."""
+    try:
+        return [(reading.quality, reading.value) for reading in gauge.read(line)]
+    except LineFault as fault:
+        if fault.quality is not Quality.LINE_LOST:
+            line.drain()
+        return [(fault.quality, float("nan"))] * len(gauge.channels)

@@ -1,0 +1,181 @@
+"""The whole chain on real wires: simulated gauges on ptys and TCP ports, the daemon, clients; and what breaks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compd.client import Client, connect
+from compd.demo.processes import Command, running
+from compd.demo.session import MachineController, wait_for_gauges
+from tests.support.paths import ROOT
+
+RATE_HZ = 50.0
+# Long enough for a loaded machine; what is waited for comes much sooner.
+PATIENCE_S = 30.0
+
+Setpoint = dict[str, Any]
+
+
+@dataclass
+class Chain:
+    """A running machine and daemon."""
+
+    directory: Path
+    machine: MachineController
+    daemon: Client
+    setpoints: Iterator[Setpoint]
+
+    def until(self, what: str, holds: Callable[[Setpoint], bool]) -> Setpoint:
+        """The first setpoint for which `holds`; fails, with the last one seen, when none comes."""
+        end = time.monotonic() + PATIENCE_S
+        for setpoint in self.setpoints:
+            if holds(setpoint):
+                return setpoint
+            assert time.monotonic() < end, f"{what}: still {setpoint}"
+        raise AssertionError("the daemon went away")
+
+    def settle(self, target_M_mm: list[float]) -> Setpoint:
+        """Send the target, drive to the setpoints until the machine rests there with every gauge read anew."""
+        self.daemon.target(tip_B0_mm=[target_M_mm[0], target_M_mm[1], target_M_mm[2] - 700.0])
+        at_rest: list[float] = []
+
+        def rests(setpoint: Setpoint) -> bool:
+            if not setpoint["valid"] or setpoint["mode"] != "machine_tool":
+                return False
+            truth = self.machine.ask("DRIVE", scale_mm=setpoint["scale_setpoint_mm"])
+            if np.abs(np.subtract(truth["scale_mm"], setpoint["scale_setpoint_mm"])).max() > 0.005:
+                at_rest.clear()
+                return False
+            at_rest.append(setpoint["time_s"])
+            return setpoint["state"] == "ok" and setpoint["time_s"] - at_rest[0] > 0.5
+
+        return self.until("at rest at the target", rests)
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
+    directory = tmp_path_factory.mktemp("chain")
+    simulate = [
+        "simulate",
+        str(ROOT / "config/tripod-cmm.yaml"),
+        "--directory",
+        str(directory),
+        "--seed",
+        "3",
+        "--zero-hold",
+        "600",
+    ]
+    commands = [
+        Command(simulate, ready=directory / "control.sock"),
+        Command(["run", str(directory / "tripod-cmm.yaml")], ready=directory / "compd.sock"),
+    ]
+    with (
+        running(commands, log=directory / "output.log"),
+        MachineController(directory / "control.sock") as machine,
+        connect(directory / "compd.sock", PATIENCE_S) as daemon,
+    ):
+        chain = Chain(directory, machine, daemon, daemon.watch(RATE_HZ))
+        first = chain.until("the first answer", lambda s: s["state"] in {"no_zero", "starting"})
+        assert not first["valid"]
+        assert "tip_M_mm" not in first, "without machine zero no number may look alive"
+        machine.ask("DRIVE", scale_mm=[0.0, 0.0, 0.0])
+        chain.until("at zero", lambda _: not machine.ask("TRUTH")["moving"])
+        with connect(directory / "compd.sock", PATIENCE_S) as operator:
+            wait_for_gauges(operator, chain.setpoints)
+            operator.zero()
+        chain.until("valid after zero", lambda s: s["state"] == "ok")
+        yield chain
+
+
+def test_the_tip_of_a_cmm_is_where_the_truth_says(chain: Chain) -> None:
+    setpoint = chain.until("valid", lambda s: s["state"] == "ok")
+    truth = chain.machine.ask("TRUTH")
+    assert np.linalg.norm(np.subtract(setpoint["tip_M_mm"], truth["tip_mm"])) < 2e-3
+    assert setpoint["age_s"] < 0.5
+    assert setpoint["valid_until"] > setpoint["time_s"]
+
+
+def test_the_sources_add_up_to_the_correction(chain: Chain) -> None:
+    setpoint = chain.settle([20.0, -30.0, 200.0])
+    total = np.sum(list(setpoint["sources_mm"].values()), axis=0)
+    np.testing.assert_allclose(total, setpoint["correction_mm"], atol=2e-7)
+
+
+@pytest.mark.parametrize("target", [[40.0, 30.0, 215.0], [-45.0, 10.0, 170.0]])
+def test_driving_to_the_setpoint_brings_the_tip_nearer_than_the_scales_alone(chain: Chain, target: list[float]) -> None:
+    setpoint = chain.settle(target)
+    scale = np.array(setpoint["scale_setpoint_mm"])
+    corrected = chain.machine.ask("TIP_FOR", scale_mm=scale.tolist())["tip_mm"]
+    nominal = chain.machine.ask("TIP_FOR", scale_mm=(scale - setpoint["correction_mm"]).tolist())["tip_mm"]
+    error, error_nominal = (float(np.linalg.norm(np.subtract(tip, target))) for tip in (corrected, nominal))
+    assert error < 2e-3
+    assert error < 0.5 * error_nominal
+
+
+@pytest.mark.parametrize(
+    ("line", "fault", "gauge", "qualities"),
+    [
+        ("joints", "silent", "joints", {"timeout"}),
+        ("joints", "garble", "joints", {"mismatch", "incomplete", "crc"}),
+        ("frame_u", "garble", "frame_u", {"crc"}),
+        ("frame_u", "unplugged", "frame_u", {"line_lost"}),
+        ("cabinet", "unplugged", "cabinet", {"line_lost"}),
+    ],
+)
+def test_a_broken_comparator_line_is_held_named_and_comes_back(
+    chain: Chain, line: str, fault: str, gauge: str, qualities: set[str]
+) -> None:
+    chain.until("ok before", lambda s: s["state"] == "ok")
+    chain.machine.ask("FAULT", line=line, fault=fault)
+    try:
+        held = chain.until("held", lambda s: s["state"] == "hold")
+        assert gauge in held["reason"]
+        assert any(quality in held["reason"] for quality in (*qualities, "stale")), held["reason"]
+        assert held["valid"], "hold keeps the last good set for a while"
+    finally:
+        chain.machine.ask("FAULT", line=line, fault=None)
+    chain.until("ok again by itself", lambda s: s["state"] == "ok")
+
+
+def test_hold_ends_and_the_numbers_go(chain: Chain) -> None:
+    chain.machine.ask("FAULT", line="joints", fault="silent")
+    try:
+        stopped = chain.until("stopped", lambda s: s["state"] == "stop")
+        assert not stopped["valid"]
+        assert "correction_mm" not in stopped
+    finally:
+        chain.machine.ask("FAULT", line="joints", fault=None)
+    chain.until("ok again", lambda s: s["state"] == "ok")
+
+
+def test_a_lost_scale_leaves_a_cmm_without_a_tip_and_other_lines_go_on(chain: Chain) -> None:
+    with connect(chain.directory / "compd.sock", PATIENCE_S) as observer:
+        before = observer.status()
+        chain.daemon.release()
+        chain.until("cmm", lambda s: s["mode"] == "cmm" and s["state"] == "ok")
+        chain.machine.ask("FAULT", line="scale_2", fault="unplugged")
+        try:
+            lost = chain.until("invalid", lambda s: not s["valid"])
+            assert "scale_2" in lost["reason"]
+            polled = chain.until(
+                "the others go on", lambda _: _polls(observer, "joints") > _polls_in(before, "joints") + 10
+            )
+            assert not polled["valid"]
+        finally:
+            chain.machine.ask("FAULT", line="scale_2", fault=None)
+        chain.until("ok again", lambda s: s["state"] == "ok")
+
+
+def _polls(observer: Client, gauge: str) -> int:
+    return _polls_in(observer.status(), gauge)
+
+
+def _polls_in(status: dict[str, Any], gauge: str) -> int:
+    return sum(int(line["gauges"][gauge]["polls"]) for line in status["lines"].values() if gauge in line["gauges"])

@@ -1,0 +1,73 @@
+"""`compd effect list` and `compd effect show`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compd.cli.effect import effect as command
+from compd.errors import CompdError
+from compd.model.library import BUNDLED
+from compd.report.effect_signature import signature
+from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD
+from tests.support.paths import CONFIG
+
+
+def test_the_list_holds_every_effect() -> None:
+    result = CliRunner().invoke(command, ["list"], env={"COLUMNS": "200"})
+    assert result.exit_code == 0
+    for effect in BUNDLED:
+        assert effect.id in result.output
+    assert "temperature_link_{link}_degC" in result.output
+
+
+def test_the_card_says_everything_and_the_page_is_drawn(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    result = CliRunner().invoke(
+        command,
+        ["show", "link_expansion_lag", "--machine", str(CONFIG / "tripod-cmm.yaml"), "--html", str(page)],
+        env={"COLUMNS": "200"},
+    )
+    assert result.exit_code == 0
+    for text in ("tau dy_i/dt = dT_link_i - y_i", "link_expansion, reference_drift", "0 to 23", "60 to 30000"):
+        assert text in result.output
+    text = page.read_text(encoding="utf-8")
+    assert '"type":"cone"' in text
+    assert "the temperature steps after one hour" in text
+    assert "https://" not in text.split("</script>")[-1]
+
+
+def test_the_card_says_what_the_machine_lacks() -> None:
+    result = CliRunner().invoke(
+        command, ["show", "joint_runout", "--machine", str(CONFIG / "hexapod.yaml")], env={"COLUMNS": "200"}
+    )
+    assert result.exit_code == 0
+    assert "only a tripod" in result.output
+
+
+@pytest.mark.parametrize("effect", BUNDLED, ids=lambda effect: effect.id)
+def test_every_effect_has_a_signature(effect: object) -> None:
+    one = next(candidate for candidate in BUNDLED if candidate is effect)
+    for model in (TRIPOD, HEXAPOD):
+        if "revolute_axes" in one.needs and model is HEXAPOD:
+            with pytest.raises(CompdError, match="only a tripod"):
+                signature(one, model, DETAILS)
+            continue
+        found = signature(one, model, DETAILS)
+        assert np.isfinite(found.tip_um).all()
+        assert np.linalg.norm(found.tip_um, axis=1).max() > 1e-3
+        assert found.curves
+        assert all(np.isfinite(curve.tip_um).all() for curve in found.curves)
+        assert any(np.ptp(curve.tip_um, axis=0).max() > 0 for curve in found.curves)
+
+
+def test_the_hysteresis_curve_is_a_loop() -> None:
+    found = signature(LIBRARY["friction_hysteresis"], TRIPOD, DETAILS)
+    path_mm, tip_um = found.curves[0].driven_by, found.curves[0].tip_um[:, 0]
+    middle = np.flatnonzero(np.abs(path_mm) < 1e-9)
+    there, back, again = tip_um[middle]
+    assert abs(there - back) > 1.0
+    assert there == pytest.approx(again, abs=1e-6)

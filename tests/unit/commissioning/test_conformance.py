@@ -1,0 +1,257 @@
+"""Every installed driver on wires that go wrong; and that the suite finds drivers which are wrong."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from compd.commissioning.conformance import faults
+from compd.commissioning.conformance.cases import Result, Subject, tried
+from compd.commissioning.conformance.faults import Fault
+from compd.commissioning.conformance.report import Driver, find, try_driver
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.plugins import GAUGES, names
+from compd.simulation.wires.device import SimulatedByteDevice
+
+NAMES = names(GAUGES)
+
+
+def failures(found: Sequence[tuple[str, Result]]) -> list[str]:
+    return [f"{wire}: {result.case}: {result.came}" for wire, result in found if result.verdict == "FAIL"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_installed_driver_in_virtual_time(name: str) -> None:
+    found = list(try_driver(find(name), on_real_wires=False))
+    assert failures(found) == []
+    assert sum(result.verdict == "pass" for _, result in found) >= 12
+
+
+@pytest.mark.parametrize("name", ["heidenhain_nd28x", "modbus"])
+def test_driver_on_ptys_and_ports(name: str) -> None:
+    found = list(try_driver(find(name)))
+    assert failures(found) == []
+    assert len({wire for wire, _ in found}) == 3
+
+
+@pytest.mark.long
+@pytest.mark.timeout(400)  # real time on real wires: a busy computer takes its share
+@pytest.mark.parametrize("name", NAMES)
+def test_every_driver_on_ptys_and_ports(name: str) -> None:
+    assert failures(list(try_driver(find(name)))) == []
+
+
+@pytest.mark.parametrize(("failing", "exact", "verdict"), [(1, False, "pass"), (3, False, "FAIL"), (1, True, "FAIL")])
+def test_a_computer_may_be_late_by_chance_in_real_time_and_a_driver_wrong_never(
+    failing: int, exact: bool, verdict: str
+) -> None:
+    results = iter(["FAIL"] * failing + ["pass"] * 3)
+    case = Mock(side_effect=lambda session, subject: Result("late", "ok", "timeout", next(results)))
+    subject = Subject(registers=False, over_tcp=True, checksum=False, exact=exact, error_replies={})
+    assert tried(case, Mock(), subject).verdict == verdict
+
+
+# --- random interleavings ------------------------------------------------------------------------------------
+
+junk = st.lists(st.sampled_from(list(faults.GARBAGE_BYTES)), min_size=1, max_size=9).map(bytes)
+share = st.floats(0.0, 1.0)
+harmless_to_format = st.one_of(
+    st.just(faults.NONE),
+    st.just(faults.SILENT),
+    st.just(faults.doubled()),
+    junk.map(faults.garbage_before),
+    junk.map(faults.garbage_after),
+    st.builds(faults.garbage_inside, share, junk),
+    st.builds(faults.cut, share),
+    st.builds(faults.split, share, st.floats(0.0, 0.9)),
+    # up to when the gauge is asked again: what is later than that, a wire without its own guard cannot tell
+    st.builds(faults.late, st.floats(1.05, 3.9)),
+)
+modbus_only = st.one_of(
+    st.builds(faults.flipped, st.integers(0, 10_000)),
+    st.sampled_from(["unit", "function", "length"]).map(lambda what: faults.forged(what, False)),  # type: ignore[arg-type]
+    st.sampled_from([1, 2, 3, 4, 6]).map(lambda code: faults.refused(code, False)),
+    st.binary(max_size=40).map(faults.replaced),
+)
+with_checksum = st.one_of(harmless_to_format, st.builds(faults.flipped, st.integers(0, 10_000)))
+
+
+def run_through(driver: Driver, polls: Sequence[Sequence[Fault]]) -> None:
+    """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
+    session = driver.virtual()
+    assert session.calibrate() is None
+    for afflictions in polls:
+        poll = session.poll(afflictions)
+        assert not poll.wrong, (afflictions, poll)
+    session.settle()
+    count, poll = session.recover()
+    assert poll.ok, (count, poll)
+    assert session.poll().ok
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.DataObject) -> None:
+    driver = find(name)
+    kinds = harmless_to_format
+    if driver.registers:
+        kinds = st.one_of(harmless_to_format, modbus_only)
+    elif driver.gauge.integrity == "checksum":
+        kinds = with_checksum
+    run_through(driver, data.draw(st.lists(st.lists(kinds, max_size=3), max_size=8), label="faults by poll and reply"))
+
+
+# --- the suite finds what is wrong ---------------------------------------------------------------------------
+
+
+class Scale(SimulatedByteDevice):
+    """Answers ? by +0.1234 CR LF."""
+
+    def hear(self, data: bytes) -> bytes:
+        value = self.sense("value")
+        shown = "ERROR" if math.isnan(value) else f"{value:+.4f}"
+        return b"".join(f"{shown}\r\n".encode() for byte in data if byte == ord("?"))
+
+
+class Careful(Gauge[ByteLine]):
+    """Right; the others differ from it in one way each."""
+
+    def __init__(self, options: Any) -> None:
+        super().__init__(options)
+        self.scale = 1.0
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return (Channel("value"),)
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        time_s = line.send(b"?")
+        reply = line.receive_until(b"\r\n", 16)
+        if reply == b"ERROR\r\n":
+            return [bad(time_s, Quality.SENSOR_FAULT)]
+        if not re.fullmatch(rb"[+-]\d\.\d{4}\r\n", reply):
+            raise LineFault(Quality.MISMATCH, repr(reply))
+        return [good(self.scale * float(reply), time_s)]
+
+
+class Micrometres(Careful):
+    def __init__(self, options: Any) -> None:
+        super().__init__(options)
+        self.scale = 1e3
+
+
+class StampsTheAnswer(Careful):
+    """Its time is when the reply was read: an age that looks younger than it is."""
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        (reading,) = super().read(line)
+        line.drain()
+        return [reading._replace(time_s=reading.time_s + 0.02)]
+
+
+class Trusting(Careful):
+    """Takes the first number that it finds anywhere."""
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        time_s = line.send(b"?")
+        reply = line.receive(9)
+        digits = bytes(byte for byte in reply if byte in b"+-.0123456789")
+        try:
+            return [good(float(digits), time_s)]
+        except ValueError:
+            return [bad(time_s, Quality.MISMATCH)]
+
+
+class Remembering(Careful):
+    """Gives the last number again when nothing comes."""
+
+    _last: Sequence[Reading] = ()
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        try:
+            self._last = super().read(line)
+        except LineFault:
+            if not self._last:
+                raise
+        return self._last
+
+
+class CutOff(Careful):
+    """Calls a device's silence a sensor's fault."""
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        try:
+            return super().read(line)
+        except LineFault as fault:
+            if fault.quality is not Quality.TIMEOUT:
+                raise
+            return [bad(line.send(b""), Quality.SENSOR_FAULT)]
+
+
+def driver_of(gauge: type[Gauge[Any]], options: Mapping[str, Any] | None = None) -> Driver:
+    return Driver("x", gauge, Scale, GaugeOptions(driver="x", line="test", **(options or {})))
+
+
+def test_a_careful_driver_passes() -> None:
+    assert failures(list(try_driver(driver_of(Careful), on_real_wires=False))) == []
+
+
+@pytest.mark.parametrize(
+    ("gauge", "case"),
+    [
+        (Micrometres, "units and scale"),
+        (StampsTheAnswer, "units and scale"),
+        (Trusting, "garbage inside the reply"),
+        (Remembering, "no reply"),
+        (CutOff, "no reply"),
+    ],
+)
+def test_a_wrong_driver_is_found(gauge: type[Gauge[Any]], case: str) -> None:
+    found = list(try_driver(driver_of(gauge), on_real_wires=False))
+    assert case in {result.case for _, result in found if result.verdict == "FAIL"}, found
+
+
+def test_flips_that_a_wire_cannot_show_are_said_and_not_hidden() -> None:
+    found = {result.case: result for _, result in try_driver(driver_of(Careful), on_real_wires=False)}
+    flips = found["one bit turned"]
+    assert flips.verdict == "-"
+    assert "not detectable on this wire" in flips.came
+
+
+def test_a_checksum_that_is_not_checked_is_a_failure() -> None:
+    class Claims(Careful):
+        integrity = "checksum"
+
+    found = list(try_driver(driver_of(Claims), on_real_wires=False))
+    assert "one bit turned" in {result.case for _, result in found if result.verdict == "FAIL"}
+
+
+def test_error_replies_that_the_simulated_device_names_are_tried() -> None:
+    class WithErrors(Scale):
+        error_replies = {b"ERROR\r\n": "sensor_fault", b"E9\r\n": "device_error"}  # noqa: RUF012
+
+    options = GaugeOptions(driver="x", line="test")
+    found = list(try_driver(Driver("x", Careful, WithErrors, options), on_real_wires=False))
+    assert any("device_error" in result.wanted and result.verdict == "FAIL" for _, result in found)
+
+
+def test_real_wire_replugs(tmp_path: Path) -> None:
+    session = driver_of(Careful).real("serial", tmp_path)
+    try:
+        assert session.poll().ok
+        session.wire.unplug()
+        assert not session.poll().ok
+        assert session.poll().qualities == {Quality.LINE_LOST}
+        session.wire.replug()
+        assert session.recover()[1].ok
+    finally:
+        session.close()

@@ -1,0 +1,153 @@
+"""The fit: right numbers, honest errors, one search, and no help from rows that are gross."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from compd.comparison.aligned_recording import AlignedRecording, added_by
+from compd.comparison.compare import compare
+from compd.comparison.fit import fit, start
+from compd.comparison.prediction_uncertainty import first_order, gauge_noise, monte_carlo
+from compd.comparison.shape_search import search
+from compd.errors import CompdError
+from compd.model.effect import FittedEffect
+from compd.model.library import library
+from tests.support.measured import SIGMA_UM, gauges, hidden, record, seen
+
+Floats = NDArray[np.float64]
+LIBRARY = library()
+
+
+@pytest.fixture(scope="module")
+def blank(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
+    """A recording whose measured tips the tests replace."""
+    return seen(record(tmp_path_factory.mktemp("fit"), gauges(300, 40)))
+
+
+def measured(blank: AlignedRecording, effects: list[FittedEffect], noise_um: Floats) -> AlignedRecording:
+    """The same gauges, with these effects and this noise in the reference."""
+    _, added = added_by(effects, blank.rows)
+    return replace(blank, measured_mm=blank.predicted_mm(added) + noise_um / 1e3)
+
+
+def white(blank: AlignedRecording, seed: int) -> Floats:
+    return np.random.default_rng(seed).normal(0, SIGMA_UM, blank.measured_mm.shape)
+
+
+def fresh(*effects: str) -> list[FittedEffect]:
+    return [start(LIBRARY[one], {}, 3) for one in effects]
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        hidden("link_expansion", 1.1),
+        hidden("link_elasticity", 28.0),
+        hidden("backlash", 0.9, 1.1, 0.8),
+        hidden("tool_offset", 3.0, -2.0, 40.0),
+        hidden("frame_rod_expansion", 0.7),
+        hidden("plate_bending", 8.0),
+        hidden("joint_comparator_gain", 0.05),
+    ],
+    ids=lambda one: one.effect.id,
+)
+def test_without_noise_the_numbers_come_back(blank: AlignedRecording, truth: FittedEffect) -> None:
+    found = fit(measured(blank, [truth], 0 * white(blank, 0)), fresh(truth.effect.id))
+    np.testing.assert_allclose(found.fitted[0].theta, truth.theta, rtol=1e-6)
+    assert found.rms_um < 1e-5
+
+
+def test_two_effects_are_fitted_together(blank: AlignedRecording) -> None:
+    truth = [hidden("link_elasticity", 28.0), hidden("backlash", 0.9, 1.1, 0.8)]
+    found = fit(measured(blank, truth, white(blank, 1)), fresh("link_elasticity", "backlash"))
+    std = np.sqrt(np.diag(found.covariance))
+    assert found.names == ("link_elasticity.k", "backlash.b_1", "backlash.b_2", "backlash.b_3")
+    off = (np.concatenate([one.theta for one in found.fitted]) - np.concatenate([one.theta for one in truth])) / std
+    assert np.abs(off).max() < 4
+    assert found.rms_um == pytest.approx(SIGMA_UM, rel=0.05)
+
+
+def test_a_95_percent_interval_covers_the_truth_in_95_percent(blank: AlignedRecording) -> None:
+    truth = hidden("backlash", 0.9, 1.1, 0.8)
+    inside = []
+    for seed in range(120):
+        found = fit(measured(blank, [truth], white(blank, 100 + seed)), fresh("backlash"))
+        std = np.sqrt(np.diag(found.covariance))
+        inside += (np.abs(found.fitted[0].theta - truth.theta) < 1.96 * std).tolist()
+    assert 0.925 <= np.mean(inside) <= 0.985  # 360 intervals: two standard deviations are 2.3 %
+
+
+def test_residuals_that_hang_together_make_the_errors_larger(blank: AlignedRecording) -> None:
+    slow = np.repeat(np.random.default_rng(2).normal(0, 1.0, (20, 3)), 15, axis=0)
+    shuffled = np.random.default_rng(3).permutation(slow)
+    large, small = (
+        fit(measured(blank, [], noise), fresh("tool_offset")).covariance[0, 0] for noise in (slow, shuffled)
+    )
+    assert large > 4 * small
+
+
+def test_gross_rows_are_listed_and_move_nothing(blank: AlignedRecording) -> None:
+    truth = hidden("link_expansion", 1.1)
+    noise = white(blank, 4)
+    clean = fit(measured(blank, [truth], noise), fresh("link_expansion"))
+    noise[[50, 100, 200], 2] += [30.0, -4000.0, 3.0]
+    found = fit(measured(blank, [truth], noise), fresh("link_expansion"))
+    assert np.flatnonzero(found.outlier).tolist() == [50, 100, 200]
+    std = np.sqrt(clean.covariance[0, 0])
+    assert abs(found.fitted[0].theta[0] - clean.fitted[0].theta[0]) < 0.3 * std
+
+
+def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> None:
+    columns = gauges(600, 41)
+    loaded = np.repeat(np.arange(200) % 6 == 0, 3)
+    columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
+    found = fit(seen(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
+    assert not found.outlier.any()
+    assert found.fitted[0].effect.parameters[0].shown(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
+
+
+def test_what_the_data_cannot_tell_apart_has_no_error(blank: AlignedRecording) -> None:
+    # on a gauge that never moves its gain does nothing at all
+    still = replace(blank, rows=replace(blank.rows, frame_mm=np.zeros_like(blank.rows.frame_mm)))
+    found = fit(measured(still, [], white(blank, 5)), fresh("frame_comparator_gain"))
+    assert np.isnan(found.covariance).all()
+
+
+def test_a_time_constant_is_searched(tmp_path: Path) -> None:
+    columns = gauges(600, 42)
+    for i in (1, 2, 3):
+        steps = np.repeat(np.random.default_rng(i).normal(0, 1.5, 12), 50)
+        columns[f"temperature_link_{i}_degC"] = 20 + steps
+    truth = hidden("link_expansion_lag", 8.0, tau=1300.0)
+    one = seen(record(tmp_path, columns, [truth]))
+    (found,) = search(one, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
+    assert found.shape["tau"] == pytest.approx(1300.0, rel=0.05)
+    assert found.theta[0] == pytest.approx(8.0, rel=0.02)
+
+
+def test_too_few_rows_for_the_numbers(tmp_path: Path) -> None:
+    one = seen(record(tmp_path, gauges(3, 43)))
+    with pytest.raises(CompdError, match="numbers to fit"):
+        fit(one, fresh("base_joint_position", "link_zero"))
+
+
+def test_first_order_uncertainty_agrees_with_monte_carlo(blank: AlignedRecording) -> None:
+    truth = [hidden("link_elasticity", 28.0), hidden("backlash", 0.9, 1.1, 0.8)]
+    one = measured(blank, truth, white(blank, 6))
+    found = fit(one, fresh("link_elasticity", "backlash"))
+    noise = gauge_noise(one)
+    first = first_order(one, noise, found.fitted, found.covariance).total_um
+    index = np.arange(0, 300, 30)
+    trials = monte_carlo(one, noise, found.fitted, found.covariance, index, trials=2000, seed=1)
+    np.testing.assert_allclose(trials, first[index], rtol=0.08)  # 2000 trials: 1.6 % each
+
+
+def test_an_unknown_error_is_nan_in_the_prediction_too(blank: AlignedRecording) -> None:
+    found = compare(blank, [hidden("link_expansion", 1.1)])
+    assert np.isnan(found.uncertainty.parameters_um).all()
+    assert found.as_json()["prediction_std_um"]["total"] is None

@@ -1,0 +1,158 @@
+"""The configuration: every error at once, each with its place and what to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from compd.configuration import load
+from compd.configuration.schema import schema
+from compd.errors import ConfigurationError
+from tests.support.paths import ROOT
+
+TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
+
+Edit = Callable[[str], str]
+
+
+def problems_of(tmp_path: Path, edit: Edit) -> list[str]:
+    """What `load` says of the tripod's configuration after `edit`."""
+    text = TRIPOD.read_text()
+    changed = edit(text)
+    assert changed != text, "the edit must change the file"
+    path = tmp_path / "machine.yaml"
+    path.write_text(changed)
+    with pytest.raises(ConfigurationError) as caught:
+        load(path)
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])
+def test_shipped_machines_are_complete(name: str) -> None:
+    configuration = load(ROOT / "config" / f"{name}.yaml")
+    assert configuration.machine == name
+    assert configuration.warnings == ()
+    assert set(configuration.gauge_objects()) == set(configuration.gauges)
+
+
+CASES: list[tuple[Edit, str, str]] = [
+    (lambda t: t.replace("  rate_hz: 200", "  rat_hz: 200"), "loop.rat_hz: unknown key", "did you mean `rate_hz`?"),
+    (lambda t: t.replace("  on_stale: hold", "  #"), "loop.on_stale: is missing", "add `on_stale:`"),
+    (lambda t: t.replace("on_stale: hold", "on_stale: ignore"), "loop.on_stale", "'hold', 'fade' or 'stop'"),
+    (lambda t: t.replace("rate_hz: 200", "rate_hz: .inf"), "loop.rate_hz", "finite"),
+    (lambda t: t.replace("rate_hz: 200", "rate_hz: -1"), "loop.rate_hz", "greater than 0"),
+    (lambda t: t.replace("[0, 250, 0]", "[0, 251, 0]", 1), "geometry.base", "centroid"),
+    (lambda t: t.replace("gauge: frame_u.u1}", "gauge: frame_u.u2}"), "wired already", "each channel once"),
+    (lambda t: t.replace("{distance: u1,", "{distance: u2,"), "distance u1 is wired 0 times", "each exactly once"),
+    (lambda t: t.replace("driver: keyence_gt2_dlrs1a", "driver: kyence"), "no such driver", "keyence_gt2_dlrs1a"),
+    (lambda t: t.replace("line: joints", "line: join"), "no such line", "joints"),
+    (lambda t: t.replace("line: frame_u", "line: joints"), "needs a line that carries registers", "modbus_rtu"),
+    (lambda t: t.replace("heads: 9", "heads: 99"), "gauges.joints.heads", "15"),
+    (lambda t: t.replace("gauge: joints.9}", "gauge: joints.10}"), "no such single channel", "joints.9"),
+    (lambda t: t.replace("gauge: cabinet.room}", "gauge: cabinet.t1}"), "needs a gauge in degC", "mm"),
+    (lambda t: t.replace("usb-scale-2", "usb-scale-1"), "line `scale_1` has the same port", "one line per port"),
+    (
+        lambda t: t.replace("role: Rb, gauge: joints.3", "role: B, gauge: joints.3"),
+        "link 1 has comparators",
+        "Ra and Rb",
+    ),
+    (
+        lambda t: t.replace("{link: 2, gauge: scale_2}", "{link: 1, gauge: scale_2}"),
+        "link 2 has 0 scales",
+        "exactly one",
+    ),
+    (lambda t: t.replace("  rate_hz: 200", "  rate_hz: 200\n  rate_hz: 100"), "said twice", "keep one"),
+    (lambda t: t + "\nlooop: {}\n", "looop: unknown key", "did you mean `loop`?"),
+    (lambda t: t.replace("state:\n", "stat:\n"), "section `state` is missing", "add `state:`"),
+]
+
+
+@pytest.mark.parametrize(("edit", "where", "help_text"), CASES, ids=[case[1] for case in CASES])
+def test_each_mistake_is_named_with_a_way_out(tmp_path: Path, edit: Edit, where: str, help_text: str) -> None:
+    matching = [text for text in problems_of(tmp_path, edit) if where in text]
+    assert matching, "the mistake is not reported"
+    assert any(help_text in text for text in matching), matching
+
+
+def test_all_mistakes_come_at_once_in_the_order_of_the_file(tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        text = text.replace("zero_tip_M_mm: [0, 0, 190]", "zero_tip_M_mm: [0, 0]")
+        text = text.replace("baud: 115200", "baud: fast")
+        text = text.replace("heads: 9", "heds: 9")
+        text = text.replace("on_stale: hold", "on_stale: maybe")
+        return text.replace("correction_mm: 0.2", "correction_mm: 0")
+
+    found = problems_of(tmp_path, edit)
+    for key in ("tool.zero_tip_M_mm", "lines.frame_u.baud", "heds", "loop.on_stale", "limits.correction_mm"):
+        assert any(key in text for text in found), (key, found)
+    numbers = [int(text.split(" ")[0].rsplit(":", 1)[1]) for text in found]
+    assert numbers == sorted(numbers)
+
+
+def test_the_named_line_is_where_the_key_stands(tmp_path: Path) -> None:
+    (text,) = problems_of(tmp_path, lambda t: t.replace("on_stale: hold", "on_stale: maybe"))
+    line = int(text.split(" ")[0].rsplit(":", 1)[1])
+    assert "on_stale: maybe" in (tmp_path / "machine.yaml").read_text().splitlines()[line - 1]
+
+
+@pytest.mark.parametrize("text", ["", "- a\n- b\n", "loop: [1, 2\n", "loop:\n\trate_hz: 1\n"])
+def test_a_file_that_is_no_configuration(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "machine.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigurationError, match=r"machine\.yaml"):
+        load(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"nowhere\.yaml"):
+        load(tmp_path / "nowhere.yaml")
+
+
+def test_a_serial_format_is_a_word_and_an_exponent_a_number(tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    path.write_text(TRIPOD.read_text().replace('"7E2"', "7E2").replace("valid_for_s: 0.1", "valid_for_s: 1e-1"))
+    configuration = load(path)
+    assert configuration.lines["scale_1"].format == "7E2"  # type: ignore[union-attr]
+    assert configuration.sockets.valid_for_s == 0.1
+
+
+def test_hashes_follow_what_they_stand_for(tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    first = load(TRIPOD)
+    path.write_text(TRIPOD.read_text().replace("usb-scale-2", "usb-scale-9"))
+    moved = load(path)
+    assert moved.zero_hash == first.zero_hash, "another port does not change machine zero"
+    assert moved.config_hash != first.config_hash
+    path.write_text(TRIPOD.read_text().replace("zero_tip_M_mm: [0, 0, 190]", "zero_tip_M_mm: [0, 0, 191]"))
+    assert load(path).zero_hash != first.zero_hash
+
+
+def test_a_driver_in_a_file_must_not_be_writable_by_others(tmp_path: Path) -> None:
+    driver = tmp_path / "mine.py"
+    driver.write_text("from compd_drivers.heidenhain_nd28x import HeidenhainNd28x as Mine\n")
+    path = tmp_path / "machine.yaml"
+    path.write_text(
+        TRIPOD.read_text().replace("scale_1: {driver: heidenhain_nd28x", f"scale_1: {{driver: '{driver}:Mine'")
+    )
+    driver.chmod(0o666)
+    with pytest.raises(ConfigurationError, match="may be written by group or others"):
+        load(path)
+    driver.chmod(0o644)
+    assert load(path).drivers["scale_1"].__name__ == "HeidenhainNd28x"
+
+
+def test_the_schema_names_every_key_that_the_shipped_files_use() -> None:
+    document = schema()
+    json.dumps(document)
+    data = yaml.safe_load(TRIPOD.read_text())
+    assert set(data) <= set(document["properties"])
+    assert document["additionalProperties"] is False
+    drivers = [
+        option["properties"]["driver"].get("const")
+        for option in document["properties"]["gauges"]["additionalProperties"]["oneOf"]
+    ]
+    assert {"heidenhain_nd28x", "keyence_gt2_dlrs1a", "modbus"} <= set(drivers)

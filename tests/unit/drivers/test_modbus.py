@@ -1,0 +1,151 @@
+"""Generic register map: numbers out of registers, reads out of a map, and values that are none."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from compd.gauge import LineFault, Quality, Reading, RegisterReply
+from compd_drivers.modbus import Block, Modbus, ModbusChannel, blocks, decode
+
+
+def channel(**keys: Any) -> dict[str, Any]:
+    return {"name": "a", "function": 4, "address": 0, "type": "int16", "unit": "mm", **keys}
+
+
+class Map:
+    """A line whose registers are given."""
+
+    def __init__(self, registers: Mapping[int, int]) -> None:
+        self.registers = registers
+        self.asked: list[tuple[int, int, int, int]] = []
+
+    def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
+        self.asked.append((unit, function, address, count))
+        return RegisterReply(tuple(self.registers[i] for i in range(address, address + count)), float(len(self.asked)))
+
+
+def options(*channels: dict[str, Any]) -> Any:
+    return Modbus.Options.model_validate({"driver": "modbus", "line": "l", "unit": 5, "channels": channels})
+
+
+def read(registers: list[int], *channels: dict[str, Any]) -> list[Reading]:
+    return list(Modbus(options(*channels)).read(Map(dict(enumerate(registers)))))
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "byte_order", "registers", "value"),
+    [
+        ("int16", "high_first", "big", [0xFF38], -200.0),
+        ("uint16", "high_first", "big", [0xFF38], 65336.0),
+        ("uint16", "high_first", "little", [0x3412], 0x1234),
+        ("int32", "high_first", "big", [0xFFFF, 0xFFFE], -2.0),
+        ("int32", "low_first", "big", [0xFFFE, 0xFFFF], -2.0),
+        ("uint32", "low_first", "little", [0x0400, 0x0200], 0x00020004),
+        ("float32", "high_first", "big", [0x3F80, 0x0000], 1.0),
+        ("float32", "low_first", "big", [0x0000, 0xC000], -2.0),
+        ("float32", "high_first", "little", [0x803F, 0x0000], 1.0),
+    ],
+)
+def test_numbers_out_of_registers(kind: str, order: str, byte_order: str, registers: list[int], value: float) -> None:
+    made = ModbusChannel.model_validate(channel(type=kind, word_order=order, byte_order=byte_order))
+    assert decode(made, registers) == value
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_every_float_survives(value: float) -> None:
+    made = ModbusChannel.model_validate(channel(type="float32"))
+    assert decode(made, struct.unpack(">HH", struct.pack(">f", value))) == value
+
+
+def test_scale_and_offset_give_the_unit() -> None:
+    (reading,) = read([0x10000 - 125], channel(scale=0.1, offset=-1.0, unit="degC"))
+    assert reading.quality is Quality.OK
+    assert reading.value == pytest.approx(-13.5)
+
+
+@pytest.mark.parametrize(
+    ("registers", "keys", "quality"),
+    [
+        ([0x8000], {"invalid": [-32768]}, Quality.SENSOR_FAULT),
+        ([0xFFFF], {"type": "uint16", "invalid": [65535]}, Quality.SENSOR_FAULT),
+        ([0x7FC0, 0], {"type": "float32"}, Quality.NOT_FINITE),
+        ([0xFF80, 0], {"type": "float32"}, Quality.NOT_FINITE),
+        ([1001], {"highest": 1000.0}, Quality.OVER_RANGE),
+        ([0xFFFF], {"lowest": 0.0}, Quality.UNDER_RANGE),
+        ([5, 1], {"status": {"address": 1}}, Quality.SENSOR_FAULT),
+        ([5, 2], {"status": {"address": 1, "over_range": [2]}}, Quality.OVER_RANGE),
+        ([5, 3], {"status": {"address": 1, "under_range": [3]}}, Quality.UNDER_RANGE),
+        ([5, 0], {"status": {"address": 1}}, Quality.OK),
+        ([5, 7], {"status": {"address": 1, "ok": [6, 7]}}, Quality.OK),
+    ],
+)
+def test_values_that_are_none_are_named(registers: list[int], keys: dict[str, Any], quality: Quality) -> None:
+    (reading,) = read(registers, channel(**keys))
+    assert reading.quality is quality
+    assert math.isnan(reading.value) == (quality is not Quality.OK)
+
+
+def test_adjacent_registers_are_read_together_and_stamped_with_their_own_read() -> None:
+    gauge = Modbus(
+        options(
+            channel(name="a", address=4, type="float32"),
+            channel(name="b", address=0, type="int16"),
+            channel(name="c", address=6),
+            channel(name="d", function=3, address=7),
+        )
+    )
+    line = Map({0: 1, 4: 0x3F80, 5: 0, 6: 3, 7: 4})
+    readings = gauge.read(line)
+    assert line.asked == [(5, 3, 7, 1), (5, 4, 0, 1), (5, 4, 4, 3)]
+    assert [reading.value for reading in readings] == [1.0, 1.0, 3.0, 4.0]
+    assert [reading.time_s for reading in readings] == [3.0, 2.0, 3.0, 1.0]
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from([3, 4]), st.integers(0, 400), st.sampled_from([1, 2])), min_size=1, max_size=200)
+)
+def test_every_number_is_whole_in_one_read(spans: list[tuple[int, int, int]]) -> None:
+    found = blocks(spans)
+    assert all(1 <= block.length <= 124 for block in found)
+    for function, address, length in spans:
+        assert any(
+            block.function == function and block.address <= address and address + length <= block.address + block.length
+            for block in found
+        )
+
+
+def test_a_long_map_is_split_between_numbers() -> None:
+    assert blocks([(4, 2 * i, 2) for i in range(63)]) == (Block(4, 0, 124), Block(4, 124, 2))
+
+
+def test_a_block_that_fails_leaves_no_values() -> None:
+    class Broken(Map):
+        def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
+            raise LineFault(Quality.CRC, "b'..'")
+
+    with pytest.raises(LineFault, match="crc"):
+        Modbus(options(channel())).read(Broken({}))
+
+
+@pytest.mark.parametrize(
+    ("channels", "problem"),
+    [
+        ([channel(), channel(address=1)], "channel named twice: a"),
+        ([channel(address=65535, type="float32")], "beyond register 65535"),
+        ([channel(unit="um")], "unit"),
+        ([channel(function=1)], "function"),
+        ([channel(scale=math.inf)], "scale"),
+        ([], "channels"),
+    ],
+)
+def test_maps_that_cannot_be_are_refused(channels: list[dict[str, Any]], problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        options(*channels)

@@ -1,0 +1,361 @@
+"""The described ASCII gauge: descriptions from manuals' pages, its reply formats, and what must never pass."""
+
+from __future__ import annotations
+
+import importlib
+import textwrap
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from compd.gauge import LineFault, Quality, Reading
+from compd.lines.stream import StreamLine
+from compd_drivers.reply_format import ReplyFormat
+from compd_drivers.serial_ascii import SerialAscii
+from compd_drivers.simulated.serial_ascii import SimulatedAscii
+from tests.support.wire_rig import InstantClock, ScriptedPort
+
+CHANNEL = {"name": "value", "unit": "mm"}
+SHORT = {"driver": "serial_ascii", "line": "line", "out": "?", "out_terminator": r"\r", "in_terminator": r"\r\n"}
+
+
+def gauge(**options: Any) -> SerialAscii:
+    return SerialAscii(SerialAscii.Options.model_validate({**SHORT, "channels": [CHANNEL], **options}))
+
+
+def line_with(*script: bytes, device: Any = None) -> tuple[StreamLine, ScriptedPort]:
+    clock = InstantClock()
+    port = ScriptedPort(clock, script, device)
+    return StreamLine(port, 0.1, 0.002, clock), port
+
+
+def poll(device: SerialAscii, reply: bytes) -> list[Reading]:
+    line, _ = line_with(device=lambda request: reply)
+    return list(device.read(line))
+
+
+def fault(device: SerialAscii, reply: bytes) -> Quality:
+    with pytest.raises(LineFault) as caught:
+        poll(device, reply)
+    return caught.value.quality
+
+
+# --- reply formats -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("form", "reply", "value"),
+    [
+        ("%f", b"+12.345", 12.345),
+        ("%f", b"-.5", -0.5),
+        ("%f", b"   1.0", 1.0),
+        ("%+09.4f", b"+012.3456", 12.3456),
+        ("%+9.4f", b"+ 12.3456", 12.3456),
+        ("%+9.4f", b"  -2.3456", -2.3456),
+        ("% .3f", b" 12.345", 12.345),
+        ("%d", b"0012", 12.0),
+        ("%+06d", b"-00012", -12.0),
+        ("%4x", b"00fF", 255.0),
+        ("%e", b"+1.2345E-03", 0.0012345),
+        (r"\x02%f\x03", b"\x021.5\x03", 1.5),
+        ("100%%=%d", b"100%=7", 7.0),
+        ("%*5c%f", b"N0 : 1.5", 1.5),
+        ("%*4c%f", b"N0 :-1.5", -1.5),
+        ("%*2c%+f", b"01+1.5", 1.5),
+        ("%*s %f mm", b"GN01 1.5 mm", 1.5),
+        ("%f mm%*?[<>= ]", b"1.5 mm = <", 1.5),
+        ("%f mm%*?[<>= ]", b"1.5 mm", 1.5),
+        ("%f%*[<>=]", b"1.5>", 1.5),
+    ],
+)
+def test_formats_read_what_a_printf_prints(form: str, reply: bytes, value: float) -> None:
+    assert ReplyFormat(form).match(reply) == (pytest.approx(value),)
+
+
+@pytest.mark.parametrize(
+    ("form", "reply"),
+    [
+        ("%f", b"12"),  # the point lost
+        ("%f", b"1.2.3"),
+        ("%f", b"1.5 "),
+        ("%f", b"+-1.5"),
+        ("%f", b"1,5"),
+        ("%f", b"nan"),
+        ("%f", b"1e5"),
+        ("%+f", b"1.5"),  # the sign lost
+        ("% f", b"1.5"),
+        ("%+09.4f", b"+12.3456"),  # a digit lost
+        ("%+09.4f", b"+0123.456"),  # the point moved
+        ("%+09.4f", b"+0012.3456"),
+        ("%d", b"1.5"),
+        ("%f%*s", b"1.234"),  # what is skipped must not be a digit of the number
+        ("%f%*c", b"1.234"),
+        ("%8f%*s", b"+112.3456"),
+        ("%*5c%f", b"N0 :-1.5"),
+        ("%*4c%f", b"N0 :1.5"[:3] + b"11.5"),
+        ("%*s%f", b"x+-1.5"),
+        ("%f mm", b"1.5 in"),
+        ("%*2[0-9],%f", b"7,1.5"),
+    ],
+)
+def test_formats_refuse_everything_else(form: str, reply: bytes) -> None:
+    assert ReplyFormat(form).match(reply) is None
+
+
+@given(st.integers(-999_9999, 999_9999), st.integers(0, 8))
+def test_a_lost_byte_never_gives_another_number_where_the_width_is_given(steps: int, lost: int) -> None:
+    form = ReplyFormat("%+09.4f")
+    reply = f"{steps / 1e4:+09.4f}".encode()
+    assert form.match(reply) == (pytest.approx(steps / 1e4),)
+    assert form.match(reply[:lost] + reply[lost + 1 :]) is None
+
+
+@pytest.mark.parametrize(
+    "form", ["%q", "%s", "%.0f", "%(a)f%(a)f", "%*[]", "50%", "%<foo>", r"\q", "\\", "\u20ac", "%?f", "%*+d"]
+)
+def test_a_format_that_cannot_be_read_is_refused(form: str) -> None:
+    with pytest.raises(ValueError, match=r".+"):
+        ReplyFormat(form)
+
+
+@pytest.mark.parametrize("kind", ["sum8", "negative_sum8", "xor8", "crc8", "crc16_modbus"])
+@pytest.mark.parametrize("converter", ["%<{}>", "%0<{}>", "%1<{}>", "%01<{}>"])
+def test_checksums_find_every_turned_bit(kind: str, converter: str) -> None:
+    """The reply is the simulated device's: the two ends share no code."""
+    device = gauge(**{"in": r"\x02%+07.3f" + converter.format(kind)})
+    far_end = SimulatedAscii(device.options, lambda channel: -1.25)
+    reply = far_end.hear(b"?\r")
+    assert [reading.value for reading in poll(device, reply)] == [-1.25]
+    for bit in range(8 * (len(reply) - 2)):
+        damaged = bytearray(reply)
+        damaged[bit // 8] ^= 1 << bit % 8
+        if bytes(damaged).upper() == reply.upper() and converter.startswith("%0"):
+            continue  # a hexadecimal digit in lower case is the same digit
+        if converter.startswith(("%1", "%01")) and bit < 8:
+            assert fault(device, bytes(damaged)) is Quality.MISMATCH
+        else:
+            assert fault(device, bytes(damaged)) in {Quality.CRC, Quality.MISMATCH}
+
+
+# --- descriptions out of manuals' pages ----------------------------------------------------------------------
+
+
+def test_magnescale_mg80() -> None:
+    """MG80-SC1 manual, page 39: module number, module, mode, unit, judgement, 8 characters; blank between channels."""
+    word = {"   Error": "sensor_fault"}
+    device = gauge(
+        **{
+            "out": "R",
+            "in": "00NM%*[UGLE]%(a)+08.4f 01NM%*[UGLE]%(b)+08.4f",
+            "channels": [{"name": "a", "unit": "mm", "instead": word}, {"name": "b", "unit": "mm", "instead": word}],
+        }
+    )
+    assert [r.value for r in poll(device, b"00NMG+99.9999 01NML-00.1250\r\n")] == [99.9999, -0.125]
+    first, second = poll(device, b"00NME   Error 01NMG-00.1250\r\n")
+    assert (first.quality, second.value) == (Quality.SENSOR_FAULT, -0.125)
+    assert fault(device, b"00NMG+F0.0001 01NMG-00.1250\r\n") is Quality.MISMATCH  # the manual's overflow
+    assert fault(device, b"00AMG+99.9999 01NML-00.1250\r\n") is Quality.MISMATCH  # shows the maximum
+
+
+def test_wagner_force_gauge() -> None:
+    """Force Ten manual, page 25: sign or blank, 5 digits and point, unit; HELP instead when overloaded."""
+    device = gauge(
+        **{
+            "in": "% 7.2f LB%*?[ Peak]",
+            "in_terminator": r" \r\n",
+            "channels": [{"name": "force", "unit": "N", "scale": 4.4482216152605}],
+            "errors": [{"in": "%*?[ ]HELP%*?[ LB]", "quality": "over_range"}],
+        }
+    )
+    assert poll(device, b" 100.00 LB \r\n")[0].value == pytest.approx(444.82216152605)
+    assert poll(device, b" HELP LB \r\n")[0].quality is Quality.OVER_RANGE
+
+
+def test_surface_tester_in_three_lines() -> None:
+    """A reply of several lines: the terminator stands between them; an error reply has one line only."""
+    device = gauge(
+        **{
+            "in": r"A=%(a)+.3f\r\nB=%(b)+.3f",
+            "channels": [{"name": "a", "unit": "um"}, {"name": "b", "unit": "um"}],
+            "errors": [{"in": "NG%*2d", "quality": "device_error", "says": "not ready"}],
+        }
+    )
+    assert [r.value for r in poll(device, b"A=+1.500\r\nB=-2.500\r\n")] == [
+        pytest.approx(0.0015),
+        pytest.approx(-0.0025),
+    ]
+    readings = poll(device, b"NG07\r\n")
+    assert {r.quality for r in readings} == {Quality.DEVICE_ERROR}
+    assert readings[0].detail == "NG07: not ready"
+
+
+def test_whole_numbers_with_fixed_decimals_and_a_range() -> None:
+    channel = {**CHANNEL, "decimals": 4, "scale": -1, "range": [-1.0, 1.0]}
+    device = gauge(**{"in": "%+09d", "channels": [channel]})
+    assert poll(device, b"+00002971\r\n")[0].value == -0.2971
+    assert poll(device, b"+00012971\r\n")[0].quality is Quality.UNDER_RANGE
+    assert poll(device, b"-00012971\r\n")[0].quality is Quality.OVER_RANGE
+
+
+def test_a_reply_without_an_end_has_a_fixed_length() -> None:
+    device = gauge(**{"in": "%+07.3f", "in_terminator": ""})
+    assert poll(device, b"+01.500")[0].value == 1.5
+    assert fault(device, b"+01.50") is Quality.INCOMPLETE
+    assert fault(device, b"+01.5000") is Quality.MISMATCH
+
+
+# --- timeouts, extra input, order ----------------------------------------------------------------------------
+
+
+def test_bytes_behind_the_reply() -> None:
+    assert fault(gauge(**{"in": "%f"}), b"+1.5\r\n+") is Quality.MISMATCH
+    assert poll(gauge(**{"in": "%f", "extra_input": "ignore"}), b"+1.5\r\n+")[0].value == 1.5
+
+
+def test_two_timeouts() -> None:
+    device = gauge(**{"in": "%f", "reply_timeout_s": 3.0, "gap_timeout_s": 0.5})
+    assert fault(device, b"+1.5") is Quality.INCOMPLETE
+    clock = InstantClock()
+    line = StreamLine(ScriptedPort(clock), 0.1, 0.002, clock)
+    began_s = clock.now_s
+    with pytest.raises(LineFault) as caught:
+        device.read(line)
+    assert caught.value.quality is Quality.TIMEOUT
+    assert clock.now_s - began_s == pytest.approx(3.0, abs=0.01), "virtual time: the first byte had 3 s"
+
+
+def test_a_babbling_line_is_cut_off() -> None:
+    assert fault(gauge(**{"in": "%f"}), b"1" * 500) is Quality.MISMATCH
+    assert fault(gauge(**{"in": "%+07.3f"}), b"1" * 500) is Quality.MISMATCH
+
+
+def test_a_jump_is_asked_for_twice_and_a_temperature_is_not() -> None:
+    line, port = line_with(device=lambda request: b"+1.5\r\n")
+    gauge(**{"in": "%f"}).read(line)
+    assert port.written == [b"?\r"] * 2
+    line, port = line_with(device=lambda request: b"+21.5\r\n")
+    gauge(**{"in": "%f", "channels": [{"name": "t", "unit": "degC"}]}).read(line)
+    assert port.written == [b"?\r"]
+
+
+def test_one_behind_is_found_by_the_echo() -> None:
+    """Every reply is the answer to the request before: without the echo all would pass."""
+    pending = [b"+20.0\r\n"]
+
+    def behind(request: bytes) -> bytes:
+        pending.append(b"TT80\r\n" if request == b"ID?\r" else b"+21.0\r\n")
+        return pending.pop(0)
+
+    degrees = {"in": "%f", "channels": [{"name": "t", "unit": "degC"}]}
+    line, _ = line_with(device=behind)
+    assert gauge(**degrees).read(line)[0].value == 20.0
+    line, _ = line_with(device=behind)
+    with pytest.raises(LineFault) as caught:
+        gauge(**degrees, echo={"out": "ID?", "in": "TT%*2d"}).read(line)
+    assert caught.value.quality is Quality.MISMATCH
+
+
+def test_init_is_said_again_on_a_new_line() -> None:
+    device = gauge(
+        **{"in": "%f", "channels": [{"name": "t", "unit": "degC"}], "init": [{"out": "FORMAT 1", "in": "OK"}]}
+    )
+    answers = {b"FORMAT 1\r": b"OK\r\n", b"?\r": b"+20.0\r\n"}
+    for _ in range(2):
+        line, port = line_with(device=answers.__getitem__)
+        device.read(line)
+        device.read(line)
+        assert port.written == [b"FORMAT 1\r", b"?\r", b"?\r"]
+
+
+def test_silent_in_its_menu_and_lost() -> None:
+    device = gauge(**{"in": "%f", "silent_in_menu": True})
+    clock = InstantClock()
+    answers = {"now": b"+1.5\r\n"}
+    line = StreamLine(ScriptedPort(clock, device=lambda request: answers["now"]), 0.1, 0.002, clock)
+    device.read(line)
+    answers["now"] = b""
+    seen = []
+    for _ in range(3):
+        with pytest.raises(LineFault) as caught:
+            device.read(line)
+        seen.append(caught.value.quality)
+    assert seen == [Quality.TIMEOUT, Quality.SILENT, Quality.SILENT]
+    assert fault(device, b"") is Quality.TIMEOUT, "a new connection on which it has never answered"
+
+
+# --- devices that speak unasked ------------------------------------------------------------------------------
+
+
+def listening(*script: bytes) -> list[Reading]:
+    device = gauge(**{"out": "", "out_terminator": "", "in": "%f", "channels": [{"name": "t", "unit": "degC"}]})
+    line, _ = line_with(*script)
+    return list(device.read(line))
+
+
+def test_the_newest_whole_line_counts_and_never_a_half_one() -> None:
+    # what waits is old; then the end of a line, and a whole one
+    (reading,) = listening(b"+10.0\r\n+11.0\r\n+1", b"", b"2.5\r\n+13.0", b"\r\n")
+    assert reading.value == 13.0
+    (reading,) = listening(b"", b"+12.5\r\n", b"+13.0\r\n")
+    assert reading.value == 13.0
+
+
+def test_the_age_of_what_comes_unasked_is_never_understated() -> None:
+    clock = InstantClock()
+    port = ScriptedPort(clock, [b"+10.0\r\n", b"", b"+12.5\r\n", b"+13.0\r\n"])
+    line = StreamLine(port, 0.1, 0.002, clock)
+    began_s = clock.now_s
+    device = gauge(**{"out": "", "out_terminator": "", "in": "%f", "channels": [{"name": "t", "unit": "degC"}]})
+    assert device.read(line)[0].time_s == began_s
+    assert port.written == []
+
+
+def test_a_device_that_stops_speaking() -> None:
+    with pytest.raises(LineFault) as caught:
+        listening(b"", b"+12.5\r\n")
+    assert caught.value.quality is Quality.TIMEOUT
+    with pytest.raises(LineFault) as caught:
+        listening(b"", b"+12.5\r\n", b"+13.")
+    assert caught.value.quality is Quality.INCOMPLETE
+
+
+# --- descriptions that cannot be right -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"in": "%(b)f"}, "has no"),
+        ({"in": "%f", "channels": [CHANNEL, CHANNEL]}, "twice"),
+        ({"in": "%(value)f %(other)f"}, "other"),
+        ({"in": "OK"}, "has no"),
+        ({"in": "%f", "in_terminator": ""}, "fixed length"),
+        ({"in": "%+07.3f", "in_terminator": "", "errors": [{"in": "ERR", "quality": "device_error"}]}, "same length"),
+        ({"in": "%f", "out": "", "echo": {"out": "ID?", "in": "TT"}}, "unasked"),
+        ({"in": "%f", "channels": [{"name": "value", "unit": "V"}]}, "linearisation"),
+        ({"in": "%f", "channels": [{"name": "value", "unit": "mm", "scale": 0}]}, "scale"),
+        ({"in": "%f", "channels": [{"name": "value", "unit": "mm", "range": [1, -1]}]}, "range"),
+        ({"in": "%f", "channels": [{"name": "value"}]}, "unit"),
+        ({"in": "%y"}, "converter"),
+    ],
+)
+def test_a_description_that_cannot_be_right(options: dict[str, Any], why: str) -> None:
+    with pytest.raises(ValidationError, match=why):
+        gauge(**options)
+
+
+def test_the_examples_in_the_drivers_text_are_descriptions() -> None:
+    text = importlib.import_module(SerialAscii.__module__).__doc__ or ""
+    blocks = [
+        textwrap.dedent("\n".join(line for line in part.splitlines()[1:] if line.startswith("    ")))
+        for part in text.split("\n\n")
+        if "driver: serial_ascii" in part
+    ]
+    assert len(blocks) == 3
+    for block in blocks:
+        (options,) = yaml.safe_load(block).values()
+        SerialAscii(SerialAscii.Options.model_validate(options))

@@ -1,0 +1,171 @@
+"""The RTU master: the CRC, exact lengths, and that nothing damaged or stale ever passes."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymodbus.framer.rtu import FramerRTU
+
+from compd.gauge import LineFault, Quality
+from compd.lines.modbus_rtu import RtuMaster, crc16, gap_s
+from compd.lines.stream import StreamLine
+from tests.support.wire_rig import InstantClock, ScriptedPort
+
+Device = Callable[[bytes], bytes]
+UNIT = 1
+
+
+def framed(body: bytes) -> bytes:
+    return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
+
+
+def registers_of(unit: int, function: int, values: list[int]) -> bytes:
+    return framed(bytes([unit, function, 2 * len(values)]) + struct.pack(f">{len(values)}H", *values))
+
+
+def counting_slave(end: int = 100) -> Device:
+    """Register i holds i + 1000; the map ends before `end`."""
+
+    def answer(request: bytes) -> bytes:
+        unit, function, address, count = struct.unpack(">BBHH", request[:-2])
+        if address + count > end:
+            return framed(bytes([unit, function | 0x80, 2]))
+        return registers_of(unit, function, [i + 1000 for i in range(address, address + count)])
+
+    return answer
+
+
+def master(device: Device, alternate: bool = True) -> tuple[RtuMaster, ScriptedPort]:
+    clock = InstantClock()
+    port = ScriptedPort(clock, device=device)
+    return RtuMaster(StreamLine(port, 0.1, 0.002, clock), alternate), port
+
+
+def fault_of(device: Device, count: int = 2) -> LineFault:
+    with pytest.raises(LineFault) as caught:
+        master(device, alternate=False)[0].read_registers(UNIT, 4, 10, count)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("data", "crc"),
+    [
+        (b"123456789", 0x4B37),  # the check value of CRC-16/MODBUS
+        (bytes.fromhex("01030000000A"), 0xCDC5),
+        (bytes.fromhex("010400000001"), 0xCA31),
+    ],
+)
+def test_crc_of_known_frames(data: bytes, crc: int) -> None:
+    assert crc16(data) == crc
+
+
+@given(st.binary(max_size=260))
+def test_crc_is_the_one_that_pymodbus_computes(data: bytes) -> None:
+    assert crc16(data).to_bytes(2, "little") == FramerRTU.compute_CRC(data).to_bytes(2, "big")
+    assert crc16(data + crc16(data).to_bytes(2, "little")) == 0
+
+
+def test_request_on_the_wire() -> None:
+    line, port = master(counting_slave(), alternate=False)
+    line.read_registers(0x01, 3, 0, 10)
+    assert port.written == [bytes.fromhex("01030000000AC5CD")]
+
+
+@pytest.mark.parametrize("function", [3, 4])
+def test_registers_and_time(function: int) -> None:
+    line, _ = master(counting_slave())
+    for _ in range(3):
+        reply = line.read_registers(UNIT, function, 10, 3)
+        assert reply.registers == (1010, 1011, 1012)
+        assert reply.time_s > 0
+
+
+def test_every_second_request_asks_for_one_more() -> None:
+    line, port = master(counting_slave())
+    for _ in range(4):
+        line.read_registers(UNIT, 4, 10, 3)
+    asked = [struct.unpack(">BBHH", request[:-2])[3] for request in port.written]
+    assert sorted(asked) == [3, 3, 4, 4]
+    assert asked[0] != asked[1] != asked[2] != asked[3]
+
+
+def test_a_map_that_ends_there_is_asked_beyond_only_once() -> None:
+    line, port = master(counting_slave(end=13))
+    for _ in range(6):
+        assert line.read_registers(UNIT, 4, 10, 3).registers == (1010, 1011, 1012)
+    asked = [struct.unpack(">BBHH", request[:-2])[3] for request in port.written]
+    assert asked.count(4) == 1
+    assert len(asked) == 7
+
+
+def test_the_last_register_has_none_beyond_it() -> None:
+    line, port = master(lambda request: registers_of(UNIT, 4, [7]))
+    for _ in range(2):
+        assert line.read_registers(UNIT, 4, 0xFFFF, 1).registers == (7,)
+    assert all(struct.unpack(">BBHH", request[:-2])[3] == 1 for request in port.written)
+
+
+@pytest.mark.parametrize(
+    ("code", "name"), [(1, "illegal function"), (2, "illegal data address"), (6, "slave device busy"), (99, "unknown")]
+)
+def test_exceptions_have_their_names(code: int, name: str) -> None:
+    fault = fault_of(lambda request: framed(bytes([UNIT, 0x84, code])))
+    assert fault.quality is Quality.DEVICE_ERROR
+    assert name in fault.detail
+
+
+@pytest.mark.parametrize(
+    ("answer", "quality"),
+    [
+        (b"", Quality.TIMEOUT),
+        (registers_of(UNIT, 4, [1, 2])[:5], Quality.INCOMPLETE),
+        (registers_of(UNIT, 4, [1, 2])[:3], Quality.INCOMPLETE),
+        (registers_of(UNIT + 1, 4, [1, 2]), Quality.MISMATCH),
+        (registers_of(UNIT, 3, [1, 2]), Quality.MISMATCH),
+        (registers_of(UNIT, 4, [1, 2, 3]), Quality.MISMATCH),
+        (registers_of(UNIT, 4, [1]), Quality.MISMATCH),
+        (framed(bytes([UNIT, 0x83, 2])), Quality.MISMATCH),
+        (bytes([UNIT, 0x84, 2, 0, 0]), Quality.CRC),
+        (b"\xff" + registers_of(UNIT, 4, [1, 2]), Quality.CRC),
+        (bytes.fromhex("01040002"), Quality.INCOMPLETE),
+    ],
+)
+def test_each_fault_has_its_name(answer: bytes, quality: Quality) -> None:
+    assert fault_of(lambda request: answer).quality is quality
+
+
+@given(st.lists(st.integers(0, 0xFFFF), min_size=2, max_size=2), st.integers(0, 8), st.integers(1, 255))
+def test_no_damaged_byte_ever_passes(values: list[int], place: int, damage: int) -> None:
+    reply = bytearray(registers_of(UNIT, 4, values))
+    reply[place] ^= damage
+    fault = fault_of(lambda request: bytes(reply))
+    assert fault.quality in {Quality.CRC, Quality.INCOMPLETE, Quality.MISMATCH}
+
+
+def test_a_reply_that_is_one_behind_is_refused() -> None:
+    """The device answers each request with the answer to the one before: the classic stale reply."""
+    slave = counting_slave()
+    behind: list[bytes] = []
+
+    def late(request: bytes) -> bytes:
+        behind.append(slave(request))
+        return behind[-2] if len(behind) > 1 else b""
+
+    line, _ = master(late)
+    qualities = []
+    for _ in range(5):
+        with pytest.raises(LineFault) as caught:
+            line.read_registers(UNIT, 4, 10, 3)
+        qualities.append(caught.value.quality)
+        line.drain()
+    assert qualities[0] is Quality.TIMEOUT
+    assert set(qualities[1:]) == {Quality.MISMATCH}
+
+
+def test_the_silence_before_a_frame() -> None:
+    assert gap_s(9600) == pytest.approx(3.5 * 11 / 9600)
+    assert gap_s(115200) == 1.75e-3

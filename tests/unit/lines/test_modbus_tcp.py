@@ -1,0 +1,111 @@
+"""Modbus TCP: each of pymodbus's ways to fail has its name, and nothing old is left in a connection."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from compd.clock import MonotonicClock
+from compd.gauge import LineFault, Quality
+from compd.lines import open_line
+from compd.lines.modbus_tcp import ModbusTcp
+from tests.support.wire_rig import Rig, rig
+
+LINE = {"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}
+GAUGE: dict[str, Any] = {
+    "driver": "modbus",
+    "unit": 7,
+    "channels": [{"name": "a", "function": 4, "address": 0, "type": "int16", "unit": "degC", "scale": 0.1}],
+}
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Rig]:
+    with rig(tmp_path, LINE, {"room": GAUGE}, {"a": 21.5}) as made:
+        yield made
+
+
+def quality_of(line: Any, unit: int = 7, function: int = 4, address: int = 0, count: int = 1) -> Quality:
+    with pytest.raises(LineFault) as caught:
+        line.read_registers(unit, function, address, count)
+    return caught.value.quality
+
+
+def test_registers_of_both_functions(bench: Rig) -> None:
+    with bench.open() as line:
+        assert line.read_registers(7, 4, 0, 2).registers == (215, 0)
+        assert quality_of(line, function=3) is Quality.DEVICE_ERROR, "this map has no holding registers"
+        assert line.read_registers(7, 4, 0, 1).registers == (215,), "an exception does not cost the connection"
+
+
+def test_an_exception_has_its_name(bench: Rig) -> None:
+    with bench.open() as line, pytest.raises(LineFault, match="illegal data address"):
+        line.read_registers(7, 4, 4, 10)
+
+
+def test_an_absent_unit_times_out(bench: Rig) -> None:
+    with bench.open() as line:
+        assert quality_of(line, unit=8) is Quality.TIMEOUT
+        assert line.read_registers(7, 4, 0, 1).registers == (215,)
+
+
+@pytest.mark.parametrize("fault", ["silent", "garble", "late", "cut", "wrong unit", "noise before"])
+def test_a_broken_reply_is_a_fault_and_the_next_one_is_right(bench: Rig, fault: str) -> None:
+    with bench.open() as line:
+        bench.wire.fault = fault
+        assert quality_of(line) is Quality.TIMEOUT
+        bench.wire.fault = None
+        bench.values["a"] = -4.2
+        assert line.read_registers(7, 4, 0, 1).registers == (0x10000 - 42,)
+
+
+def test_a_closed_connection_is_a_lost_line_and_a_new_object_helps(bench: Rig) -> None:
+    with bench.open() as line:
+        bench.wire.fault = "unplugged"
+        assert quality_of(line) is Quality.LINE_LOST
+        with pytest.raises(LineFault) as caught:
+            open_line(bench.settings, MonotonicClock())
+        assert caught.value.quality is Quality.LINE_LOST
+        bench.wire.fault = None
+    with bench.open() as line:
+        assert line.read_registers(7, 4, 0, 1).registers == (215,)
+
+
+@contextmanager
+def answering(message: bytes) -> Iterator[ModbusTcp]:
+    """A line whose first request is answered by `message` in a right frame."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        host, port = listener.getsockname()
+        line = ModbusTcp(host, port, 0.1, MonotonicClock())
+        device, _ = listener.accept()
+        with device:
+            # pymodbus numbers its transactions from 1
+            device.sendall(bytes([0, 1, 0, 0, 0, len(message)]) + message)
+            yield line
+        line.close()
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        bytes([7, 4, 4, 0, 1, 0, 2]),  # two registers for one
+        bytes([7, 3, 2, 0, 1]),  # another function
+        bytes([7, 4, 2, 0]),  # half a register
+        bytes([7, 4, 9, 0, 1]),  # a byte count that is not there
+        bytes([7, 4]),
+        bytes([7, 99, 1, 2, 3]),
+    ],
+)
+def test_a_well_framed_reply_that_is_none_never_passes(message: bytes) -> None:
+    with answering(message) as line:
+        assert quality_of(line) in {Quality.MISMATCH, Quality.TIMEOUT}
+
+
+def test_a_well_framed_reply_that_is_one_passes() -> None:
+    with answering(bytes([7, 4, 2, 0, 1])) as line:
+        assert line.read_registers(7, 4, 0, 1).registers == (1,)

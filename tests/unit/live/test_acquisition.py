@@ -1,0 +1,394 @@
+"""Driver threads: lines that die, come back and delay nobody; drivers that fail; no wrong number as ok."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import structlog
+
+from compd.clock import Clock, MonotonicClock
+from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
+from compd.live.acquisition.acquisition import Acquisition, LineThread
+from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, Rig, WatchedLatest, rig
+from tests.unit.drivers.test_simulated import CASES, Case
+
+OK = Quality.OK
+BACK_OFF_S = (0.05, 0.2)
+SETTINGS_TCP = SETTINGS.validate_python({"kind": "tcp", "host": "x", "port": 1, "timeout_s": 0.1})
+
+
+# --- on real ptys and ports --------------------------------------------------------------------------------
+
+
+@contextmanager
+def acquiring(*rigs: Rig) -> Iterator[tuple[Acquisition, WatchedLatest]]:
+    """The rigs' lines under names a, b ..., their gauges ag, bg ..."""
+    names = "abc"[: len(rigs)]
+    gauges = {f"{name}g": made.gauges["g"] for name, made in zip(names, rigs, strict=True)}
+    latest = WatchedLatest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
+    lines = {
+        name: (made.settings.model_copy(update={"back_off_s": BACK_OFF_S}), [(f"{name}g", made.gauges["g"])])
+        for name, made in zip(names, rigs, strict=True)
+    }
+    acquisition = Acquisition(lines, latest, MonotonicClock())
+    acquisition.start()
+    try:
+        yield acquisition, latest
+    finally:
+        assert acquisition.stop(PATIENCE_S)
+
+
+def made(tmp_path: Path, case: Case) -> Any:
+    tmp_path.mkdir(exist_ok=True)
+    return rig(tmp_path, case.line, {"g": case.gauge}, dict(case.values))
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_an_unplugged_line_is_lost_and_comes_back_by_itself(tmp_path: Path, case: Case) -> None:
+    with made(tmp_path, case) as bench, acquiring(bench) as (acquisition, latest):
+        channel, value = f"ag.{next(iter(case.values))}", next(iter(case.values.values()))
+        assert latest.wait_for(channel, OK).value == pytest.approx(value, abs=case.step)
+        since = latest.now
+        bench.wire.fault = "unplugged"
+        for name in latest.channels:
+            assert math.isnan(latest.wait_for(name, Quality.LINE_LOST, since).value)
+        assert acquisition.status()["a"]["state"] == "lost"
+        since = latest.now
+        bench.wire.fault = None
+        assert latest.wait_for(channel, OK, since).value == pytest.approx(value, abs=case.step)
+        status = acquisition.status()["a"]
+        assert status["state"] == "open"
+        assert status["lost"] >= 1
+        assert status["opened"] >= 2
+        assert status["gauges"]["ag"]["faults"]["line_lost"] >= 1
+
+
+@pytest.mark.parametrize("name", ["modbus TCP", "modbus RTU over TCP", "keyence"])
+def test_faults_that_come_and_go_at_any_moment_leave_nothing_behind(tmp_path: Path, name: str) -> None:
+    with made(tmp_path, CASES[name]) as bench, acquiring(bench) as (_, latest):
+        channel, value = next(iter(CASES[name].values.items()))
+        for _ in range(10):
+            for fault in bench.wire.faults:
+                bench.wire.fault = fault
+        bench.wire.fault = None
+        reading = latest.wait_for(f"ag.{channel}", OK, latest.now)
+        assert reading.value == pytest.approx(value, abs=CASES[name].step)
+        assert all(
+            r.value == pytest.approx(value, abs=CASES[name].step)
+            for n, r in latest.history
+            if r.ok and n == f"ag.{channel}"
+        )
+
+
+def test_a_device_that_comes_later_is_found(tmp_path: Path) -> None:
+    with made(tmp_path, CASES["keyence"]) as bench:
+        bench.wire.fault = "unplugged"
+        with acquiring(bench) as (_, latest):
+            latest.wait_for("ag.1", Quality.LINE_LOST)
+            bench.wire.fault = None
+            latest.wait_for("ag.1", OK)
+
+
+def test_a_dead_line_does_not_delay_another(tmp_path: Path) -> None:
+    dead = CASES["keyence"]._replace(line={**CASES["keyence"].line, "timeout_s": PATIENCE_S / 2})
+    alive = CASES["modbus RTU"]
+    with (
+        made(tmp_path / "a", dead) as a,
+        made(tmp_path / "b", alive) as b,
+        acquiring(a, b) as (acquisition, latest),
+    ):
+        latest.wait_for("ag.1", OK)
+        a.wire.fault = "silent"
+        replies = a.wire.replies
+        polls = acquisition.status()["a"]["gauges"]["ag"]["polls"]
+        for _ in range(30):
+            latest.wait_for("bg.u1", OK, latest.now)
+        assert a.wire.replies <= replies + 1, "the dead line hangs in one poll"
+        assert acquisition.status()["a"]["gauges"]["ag"]["polls"] <= polls + 1
+        a.wire.fault = "unplugged"  # ends the wait
+
+
+@pytest.mark.parametrize("name", ["heidenhain 38400", "keyence", "modbus RTU", "modbus RTU over TCP", "modbus TCP"])
+def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) -> None:
+    case = CASES[name]
+    with made(tmp_path, case) as bench, acquiring(bench) as (_, latest):
+        channel = next(iter(case.values))
+        latest.wait_for(f"ag.{channel}", OK)
+        bench.wire.fault = "late"
+        since = latest.now
+        latest.wait_for(f"ag.{channel}", Quality.TIMEOUT, since)
+        old = latest.now
+        bench.values[channel] = case.values[channel] / 2  # before the fault ends: every sound reply shows this
+        bench.wire.fault = None
+        reading = latest.wait_for(f"ag.{channel}", OK, old)
+        assert reading.value == pytest.approx(case.values[channel] / 2, abs=case.step)
+
+
+@pytest.mark.parametrize(
+    ("fault", "quality"),
+    [
+        ("silent", Quality.TIMEOUT),
+        ("garble", Quality.CRC),
+        ("cut", Quality.INCOMPLETE),
+        ("noise before", Quality.CRC),
+        ("wrong unit", Quality.MISMATCH),
+    ],
+)
+def test_while_a_line_is_broken_no_reading_is_ok(tmp_path: Path, fault: str, quality: Quality) -> None:
+    with made(tmp_path, CASES["modbus RTU"]) as bench, acquiring(bench) as (_, latest):
+        latest.wait_for("ag.u1", OK)
+        bench.wire.fault = fault
+        since = latest.now
+        latest.wait_for("ag.u1", quality, since)
+        since = latest.now
+        latest.wait_for("ag.u1", quality, since)
+        assert not [reading for _, reading in latest.history[since:] if reading.ok]
+
+
+# --- on scripts --------------------------------------------------------------------------------------------
+
+
+class Line:
+    """A line that only counts what acquisition does with it."""
+
+    unexpected_bytes = 0
+
+    def __init__(self) -> None:
+        self.drained = 0
+        self.closed = False
+
+    def drain(self) -> bytes:
+        self.drained += 1
+        return b""
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Scripted(Gauge[Any]):
+    """A driver that does what `poll` does."""
+
+    def __init__(self, poll: Callable[[], Sequence[Any]], channels: int = 1) -> None:
+        super().__init__(None)
+        self._poll = poll
+        self._channels = [Channel(f"c{i}") for i in range(channels)]
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: Any) -> Sequence[Reading]:
+        return self._poll()
+
+
+class Stop(Exception):
+    """Ends a script."""
+
+
+class Bench:
+    """One LineThread on an InstantClock, run to the end of its script on its own thread."""
+
+    def __init__(self, *drivers: Gauge[Any], opener: Any = None, settings: Any = SETTINGS_TCP) -> None:
+        self.clock = InstantClock()
+        self.lines: list[Line] = []
+        names = [(f"g{i}", driver) for i, driver in enumerate(drivers)]
+        self.latest = WatchedLatest([f"{name}.{c.name}" for name, driver in names for c in driver.channels])
+        self.thread = LineThread("line", settings, names, self.latest, self.clock, opener or self.open)
+
+    def open(self, settings: Any, clock: Clock) -> Line:
+        self.lines.append(Line())
+        return self.lines[-1]
+
+    def run(self) -> None:
+        self.thread.start()
+        assert self.thread.join(PATIENCE_S)
+        assert self.thread.status()["state"] == "stopped"
+        assert all(line.closed for line in self.lines)
+        json.dumps(self.thread.status(), allow_nan=False)
+
+    def qualities(self, channel: str) -> list[Quality]:
+        return [reading.quality for name, reading in self.latest.history if name == channel]
+
+
+def test_a_line_that_cannot_be_opened_is_tried_again_later_and_later() -> None:
+    def closed(settings: Any, clock: Clock) -> Line:
+        raise LineFault(Quality.LINE_LOST, "cannot open it")
+
+    bench = Bench(Scripted(lambda: []), opener=closed)
+    bench.clock.on_wait = lambda: bench.thread.stop() if len(bench.clock.waits_s) == 7 else None
+    bench.run()
+    assert bench.clock.waits_s == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0]
+    assert bench.qualities("g0.c0") == [Quality.LINE_LOST] * 7
+    assert bench.thread.status()["lost"] == 1
+    assert "cannot open it" in bench.thread.status()["detail"]
+
+
+def test_a_lost_line_is_closed_and_made_anew_and_success_shortens_the_wait() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        if polls in (2, 3, 5):
+            raise LineFault(Quality.LINE_LOST, "pulled")
+        if polls == 6:
+            bench.thread.stop()
+        return [good(1.0, bench.clock.now_s)]
+
+    bench = Bench(Scripted(poll))
+    bench.run()
+    assert len(bench.lines) == 4
+    assert bench.thread.status()["lost"] == 3
+    assert [wait for wait in bench.clock.waits_s if wait >= 0.5] == [0.5, 1.0, 0.5]
+
+
+def test_an_absent_unit_rests_and_the_others_go_on() -> None:
+    def present() -> list[Reading]:
+        bench.clock.now_s += 0.01
+        if bench.clock.now_s > 120.0:
+            bench.thread.stop()
+        return [good(1.0, bench.clock.now_s)]
+
+    def absent() -> list[Reading]:
+        bench.clock.now_s += 0.1
+        raise LineFault(Quality.TIMEOUT, "no byte")
+
+    bench = Bench(Scripted(present), Scripted(absent))
+    bench.run()
+    status = bench.thread.status()["gauges"]
+    assert status["g1"]["faults"] == {"timeout": status["g1"]["polls"]}
+    assert status["g1"]["polls"] == 6, "at once, then after 0.5, 1, 2, 4, 8 s of rest: the next after 10 s"
+    assert status["g0"]["polls"] > 1000
+    assert bench.lines[0].drained == 6
+
+
+def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        bench.clock.now_s += 0.01
+        if polls <= 3:
+            raise LineFault(Quality.TIMEOUT, "no byte")
+        if polls == 50:
+            bench.thread.stop()
+        return [good(float(polls), bench.clock.now_s)]
+
+    bench = Bench(Scripted(poll))
+    bench.run()
+    assert [wait for wait in bench.clock.waits_s if wait >= 0.4] == pytest.approx([0.5, 1.0, 2.0])
+    assert bench.clock.now_s < 105.0
+
+
+def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        bench.clock.now_s += 0.01
+        if polls == 1:
+            raise LineFault(Quality.CRC, "b'..'")
+        if polls == 2:
+            raise LineFault(Quality.DEVICE_ERROR, "busy")
+        bench.thread.stop()
+        return [good(1.0, bench.clock.now_s)]
+
+    bench = Bench(Scripted(poll))
+    bench.run()
+    assert bench.lines[0].drained == 1, "after a device's own error nothing is under way"
+    assert [wait for wait in bench.clock.waits_s if wait >= 0.4] == pytest.approx([0.5]), "the second in a row rests"
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        ZeroDivisionError("a defect"),
+        Stop("an exception of the driver's own"),
+        [],
+        [good(1.0, 1.0), good(1.0, 1.0)],
+        [Reading(math.nan, 1.0, OK)],
+        [Reading(math.inf, 1.0, OK)],
+        [Reading(1.0, math.nan, OK)],
+        [Reading(1.0, 1e9, OK)],
+        [None],
+        None,
+    ],
+    ids=repr,
+)
+def test_a_defect_of_a_driver_is_named_logged_once_and_survived(answer: Any) -> None:
+    polls = 0
+
+    def poll() -> Any:
+        nonlocal polls
+        polls += 1
+        if polls > 2:
+            bench.thread.stop()
+            return [good(5.0, bench.clock.now_s)]
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    bench = Bench(Scripted(poll))
+    with structlog.testing.capture_logs() as logs:
+        bench.run()
+    assert bench.qualities("g0.c0") == [Quality.DRIVER_ERROR, Quality.DRIVER_ERROR, OK]
+    assert len([entry for entry in logs if entry["event"] == "driver failed"]) == 1
+    assert bench.thread.status()["gauges"]["g0"]["faults"] == {"driver_error": 2}
+
+
+def test_channels_of_one_poll_have_their_own_qualities() -> None:
+    def poll() -> list[Reading]:
+        bench.thread.stop()
+        now_s = bench.clock.now_s
+        return [good(1.0, now_s), Reading(math.nan, now_s, Quality.SENSOR_FAULT, "?"), good(math.inf, now_s)]
+
+    bench = Bench(Scripted(poll, channels=3))
+    bench.run()
+    assert [bench.qualities(f"g0.c{i}") for i in range(3)] == [[OK], [Quality.SENSOR_FAULT], [Quality.NOT_FINITE]]
+    status = bench.thread.status()["gauges"]["g0"]
+    assert status["polls"] == 1
+    assert status["ok"] == 0
+    assert status["faults"] == {"sensor_fault": 1, "not_finite": 1}
+    assert "last_ok_s" not in status
+
+
+def test_rounds_keep_the_pace_that_is_configured() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        bench.clock.now_s += 0.03
+        if polls == 10:
+            bench.thread.stop()
+        return [good(1.0, bench.clock.now_s)]
+
+    bench = Bench(Scripted(poll), settings=SETTINGS_TCP.model_copy(update={"poll_every_s": 0.1}))
+    bench.run()
+    assert bench.clock.waits_s[:9] == pytest.approx([0.07] * 9)
+    assert bench.thread.status()["round_s"] == pytest.approx(0.03)
+
+
+def test_stopping_cuts_a_back_off_short() -> None:
+    tried = threading.Event()
+
+    def closed(settings: Any, clock: Clock) -> Line:
+        tried.set()
+        raise LineFault(Quality.LINE_LOST, "no")
+
+    settings = SETTINGS_TCP.model_copy(update={"back_off_s": (1e6, 1e6)})
+    latest = WatchedLatest(["g.c0"])
+    thread = LineThread("line", settings, [("g", Scripted(lambda: []))], latest, MonotonicClock(), closed)
+    thread.start()
+    assert tried.wait(PATIENCE_S)
+    thread.stop()
+    assert thread.join(PATIENCE_S)

@@ -1,0 +1,161 @@
+"""The loop's time: absolute wake times, missed cycles skipped whole, statistics that are right."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import signal
+import threading
+import time
+
+import pytest
+
+from compd.configuration.operation import LoopSettings
+from compd.errors import Problem, StateError
+from compd.live.loop.commands import Commands
+from compd.live.loop.loop import Loop
+from compd.live.loop.setpoint import Mode, Setpoint, State
+from compd.live.loop.timing import Histogram, LoopTiming
+from compd.live.realtime import sleep_until
+from compd.live.systemd import Notifier
+from compd.readings import Latest
+
+PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==
+SETTINGS = LoopSettings(rate_hz=128, stale_after_s=0.5, on_stale="hold", hold_s=1, lock_memory=False)
+NO_ZERO = Commands(StateError(Problem(where="zero", what="none")))
+
+
+class TurnedByHand:
+    """A clock and a sleeper: sleeping turns the clock, each cycle costs what the script says."""
+
+    def __init__(self, costs_s):
+        self.now_s = 10.0
+        self.costs_s = iter(costs_s)
+        self.woken_s = []
+
+    def monotonic(self):
+        return self.now_s
+
+    def wait(self, event, timeout_s):
+        self.now_s += timeout_s
+        return event.is_set()
+
+    def sleep_until(self, time_s):
+        self.woken_s.append(time_s)
+        self.now_s = max(self.now_s, time_s)
+
+
+def turn(costs_s, late_s=0.0):
+    """Run one loop for as many cycles as there are costs; the loop and the setpoints' ticks."""
+    clock = TurnedByHand(costs_s)
+    ticks = []
+
+    class Cycle:
+        def run(self, tick, snapshot, orders):
+            assert orders is NO_ZERO
+            clock.now_s = snapshot.time_s + next(clock.costs_s)
+            return Setpoint(tick, snapshot.time_s, 0.0, math.nan, State.NO_ZERO, "none", Mode.CMM, None)
+
+    def outlet(setpoint):
+        ticks.append(setpoint.seq)
+        if len(ticks) == len(costs_s):
+            loop._stop.set()
+
+    def sleep_until(time_s):
+        clock.sleep_until(time_s + late_s)
+
+    loop = Loop(SETTINGS, Cycle(), Latest([]), NO_ZERO, [outlet], Notifier(""), clock, sleep_until)
+    loop.turn()
+    return loop, ticks, clock
+
+
+def test_wake_times_are_absolute_whatever_a_cycle_costs():
+    loop, ticks, clock = turn([0.001, 0.005, 0.0, 0.007])
+    assert clock.woken_s == [10.0 + k * PERIOD_S for k in (1, 2, 3, 4)]
+    assert ticks == [1, 2, 3, 4]
+    assert loop.timing.missed == 0
+
+
+def test_a_cycle_that_takes_too_long_costs_whole_cycles_and_they_are_counted():
+    loop, ticks, clock = turn([0.001, 2.5 * PERIOD_S, 0.001])
+    assert ticks == [1, 2, 5], "ticks 3 and 4 have passed"
+    assert clock.woken_s == [10.0 + k * PERIOD_S for k in (1, 2, 5)], "and the grid stays where it was"
+    assert (loop.timing.cycles, loop.timing.missed) == (3, 2)
+
+
+def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
+    loop, ticks, clock = turn([0.0] * 4, late_s=0.001)
+    assert ticks == [1, 2, 3, 4]
+    assert clock.woken_s == [10.001 + k * PERIOD_S for k in (1, 2, 3, 4)]
+    summary = loop.timing.summary()
+    assert summary["lateness_median_us"] == pytest.approx(1000, abs=5)
+    assert summary["period_mean_ms"] == pytest.approx(PERIOD_S * 1e3)
+    assert summary["period_deviation_ms"] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_stop_ends_a_real_loop_and_its_thread_says_what_was_permitted():
+    seen = threading.Event()
+
+    class Cycle:
+        def run(self, tick, snapshot, orders):
+            return Setpoint(tick, snapshot.time_s, 0.0, math.nan, State.NO_ZERO, "none", Mode.CMM, None)
+
+    loop = Loop(SETTINGS, Cycle(), Latest([]), NO_ZERO, [lambda setpoint: seen.set()], Notifier(""), RealClock())
+    loop.start()
+    assert seen.wait(10)
+    assert loop.alive
+    loop.stop()
+    assert not loop.alive
+    assert set(loop.permissions) == {"sched_fifo", "switch_interval", "quiet_collector"}
+    for permission in loop.permissions.values():
+        assert permission.detail
+
+
+class RealClock:
+    def monotonic(self):
+        return time.monotonic()
+
+    def wait(self, event, timeout_s):
+        return event.wait(timeout_s)
+
+
+def test_the_sleeper_does_not_wake_early_even_through_signals():
+    heard = []
+    before = signal.signal(signal.SIGALRM, lambda *_: heard.append(time.monotonic()))
+    try:
+        end_s = time.monotonic() + 0.05
+        signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+        sleep_until(end_s)
+        assert time.monotonic() >= end_s
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert heard, "the test is void unless signals came"
+
+
+def test_a_time_that_has_passed_is_not_slept_for():
+    sleep_until(0.0)
+
+
+def test_period_statistics_are_those_of_the_periods():
+    timing = LoopTiming(0.01)
+    starts = [0.0, 0.010, 0.021, 0.030, 0.0405]
+    for start in starts:
+        timing.started(start, start)
+    periods_ms = [(b - a) * 1e3 for a, b in itertools.pairwise(starts)]
+    mean = sum(periods_ms) / len(periods_ms)
+    deviation = math.sqrt(sum((p - mean) ** 2 for p in periods_ms) / (len(periods_ms) - 1))
+    summary = timing.summary()
+    assert summary["period_mean_ms"] == pytest.approx(mean, abs=1e-6)
+    assert summary["period_deviation_ms"] == pytest.approx(deviation, abs=1e-6)
+
+
+def test_a_histogram_says_nothing_of_nothing_and_keeps_the_largest():
+    histogram = Histogram()
+    assert histogram.summary() == {}
+    for us in (*[12] * 98, 402, 1e6):
+        histogram.add(us * 1e-6)
+    assert histogram.quantile_us(0.5) == 15
+    assert histogram.quantile_us(0.99) == 405
+    assert histogram.largest_us == pytest.approx(1e6)
+    assert histogram.quantile_us(1.0) == pytest.approx(1e6), "beyond the bins the largest itself is the answer"

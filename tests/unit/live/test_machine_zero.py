@@ -1,0 +1,182 @@
+"""Machine zero: taken at rest from good gauges only, kept whole on disk, refused for another machine."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from compd.configuration import load
+from compd.errors import Problem, StateError
+from compd.gauge import Quality, bad, good
+from compd.live.loop.commands import Commands
+from compd.live.loop.machine_zero import FILE_NAME, MachineZero, load_zero
+from compd.live.loop.wiring import MachineWires
+from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
+from compd.readings import Latest
+from tests.support.paths import ROOT
+
+CONFIG = ROOT / "config" / "tripod-cmm.yaml"
+ZERO = MachineZero("abc", "2026-01-01T00:00:00+00:00", {"a.1": 1.25, "b.1": -0.1})
+
+
+def test_what_is_saved_is_what_is_loaded(tmp_path):
+    path = ZERO.save(tmp_path / "state")
+    assert path == tmp_path / "state" / FILE_NAME
+    assert load_zero(tmp_path / "state", "abc", ("a.1", "b.1")) == ZERO
+    assert [p.name for p in path.parent.iterdir()] == [FILE_NAME], "no temporary file stays"
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (None, "never been taken"),
+        ("", "not JSON"),
+        ('{"format": 1, "zero_hash": "abc"', "not JSON"),
+        ("[]", "not a machine zero"),
+        ('{"format": 2, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "not a machine zero"),
+        ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": NaN}}', "not a machine zero"),
+        ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": null}}', "not a machine zero"),
+        ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": 1}}', "lacks b.1"),
+        ('{"format": 1, "zero_hash": "xyz", "taken_at": "", "readings_mm": {"a.1": 1, "b.1": 2}}', "another geometry"),
+    ],
+)
+def test_a_zero_that_is_not_whole_or_not_this_machines_is_refused(tmp_path, content, says):
+    if content is not None:
+        (tmp_path / FILE_NAME).write_text(content)
+    with pytest.raises(StateError, match=says):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+
+
+def test_a_crash_while_writing_leaves_the_old_zero(tmp_path, monkeypatch):
+    ZERO.save(tmp_path)
+
+    def power_cut(descriptor):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", power_cut)
+    with pytest.raises(StateError, match="cannot be written: Input/output error"):
+        replace(ZERO, readings_mm={"a.1": 9.0, "b.1": 9.0}).save(tmp_path)
+    monkeypatch.undo()
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+
+
+def test_the_disk_has_the_content_before_the_name_and_then_the_name(tmp_path, monkeypatch):
+    order = []
+    sync, rename = os.fsync, Path.replace
+
+    def fsync(descriptor):
+        order.append("directory" if Path(f"/proc/self/fd/{descriptor}").is_dir() else "file")
+        sync(descriptor)
+
+    def replace_(self, target):
+        order.append("rename")
+        return rename(self, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", replace_)
+    ZERO.save(tmp_path)
+    assert order == ["file", "rename", "directory"]
+
+
+def test_the_hash_is_of_geometry_gauges_and_wiring_only():
+    configuration = load(CONFIG)
+    ports = {name: line.model_copy(update={"timeout_s": 9.0}) for name, line in configuration.lines.items()}
+    assert replace(configuration, lines=ports).zero_hash == configuration.zero_hash
+    first, *others = configuration.wiring.scale
+    flipped = first.model_copy(update={"sign": -first.sign})
+    rewired = configuration.wiring.model_copy(update={"scale": (flipped, *others)})
+    assert replace(configuration, wiring=rewired).zero_hash != configuration.zero_hash
+
+
+class Taking:
+    """A zero being taken: the clock moves only when the taker waits, and the gauges are read each time."""
+
+    def __init__(self, directory):
+        configuration = load(CONFIG)
+        gauges = configuration.gauge_objects()
+        self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
+        self.wires = MachineWires(configuration, self.latest)
+        self.orders = Commands(StateError(Problem(where="zero", what="none")))
+        self.now_s = 50.0
+        self.reads = 0
+        self.value_mm = lambda channel, read: 3.0 + 0.001 * (-1) ** read
+        self.quality = lambda channel, read: Quality.OK
+        self.answers = []
+        self.taker = ZeroCapture(self.wires, self.latest, self.orders, directory, configuration.zero_hash, self)
+        self._read()
+
+    def monotonic(self):
+        return self.now_s
+
+    def wait(self, event, timeout_s):
+        self.now_s += timeout_s
+        self._read()
+        return event.is_set()
+
+    def _read(self):
+        self.reads += 1
+        for channel in self.wires.length_channels:
+            quality = self.quality(channel, self.reads)
+            reading = good(self.value_mm(channel, self.reads), self.now_s)
+            self.latest.put(self.latest.index[channel], reading if quality is Quality.OK else bad(self.now_s, quality))
+
+    def take(self):
+        self.taker.take(self.answers.append)
+        self.taker._errand.join()
+        return json.loads(self.answers[-1])
+
+
+def test_zero_is_the_mean_of_every_gauge_saved_and_then_adopted(tmp_path):
+    taking = Taking(tmp_path)
+    answer = taking.take()
+    assert answer["class"] == "ZERO"
+    assert taking.reads > 10
+    assert isinstance(taking.orders.zero, MachineZero)
+    assert set(taking.orders.zero.readings_mm) == set(taking.wires.length_channels)
+    assert taking.orders.zero.readings_mm["joints.4"] == pytest.approx(3.0, abs=1e-4)
+    assert load_zero(tmp_path, taking.orders.zero.zero_hash, taking.wires.length_channels) == taking.orders.zero
+
+
+def test_a_reading_seen_twice_counts_once(tmp_path):
+    taking = Taking(tmp_path)
+    taking.value_mm = lambda channel, read: 1.0 if read == 1 else 1.004
+    taking._read = lambda: None  # no gauge delivers again, one reading is all there is
+    taking.reads = 1
+    assert taking.take()["class"] == "ERROR", "and it is stale before the window ends"
+
+
+@pytest.mark.parametrize("quality", [Quality.TIMEOUT, Quality.CRC, Quality.NEVER_READ, Quality.SENSOR_FAULT])
+@pytest.mark.parametrize("channel", ["scale_2.position", "joints.9", "cabinet.t1"])
+def test_a_zero_with_a_gauge_that_is_not_good_is_refused_and_nothing_changes(tmp_path, channel, quality):
+    taking = Taking(tmp_path)
+    before = taking.orders.zero
+    taking.quality = lambda name, read: quality if name == channel and read == 20 else Quality.OK
+    answer = taking.take()
+    assert (answer["class"], answer["code"]) == ("ERROR", "zero_refused")
+    assert channel in answer["text"]
+    assert quality in answer["text"]
+    assert taking.orders.zero is before
+    assert not (tmp_path / FILE_NAME).exists()
+
+
+def test_a_machine_that_moves_has_no_zero(tmp_path):
+    taking = Taking(tmp_path)
+    taking.value_mm = lambda channel, read: read * 2 * REST_TOLERANCE_MM if channel == "scale_1.position" else 0.0
+    answer = taking.take()
+    assert answer["code"] == "zero_refused"
+    assert "scale_1.position moved" in answer["text"]
+
+
+def test_a_disk_that_refuses_is_told_and_the_old_zero_stays(tmp_path):
+    directory = tmp_path / "state"
+    directory.write_text("a file where the directory should be")
+    taking = Taking(directory)
+    before = taking.orders.zero
+    answer = taking.take()
+    assert answer["code"] == "zero_refused"
+    assert "cannot be written" in answer["text"]
+    assert taking.orders.zero is before

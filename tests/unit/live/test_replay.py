@@ -1,0 +1,282 @@
+"""A recorded run replayed gives the setpoints that were sent, bit for bit; and a difference is seen."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compd.cli.replay import replay as replay_command
+from compd.errors import Problem, RecordingError, StateError
+from compd.live.loop.commands import Commands
+from compd.live.loop.model_loader import ModelLoader, Models
+from compd.live.loop.setpoint import State
+from compd.live.record.replay import RecordedCycles
+from compd.live.record.replay import replay as replay_cycles
+from compd.live.service.readings_message import parse_readings
+from compd.live.service.state_json import from_plain, to_plain
+from compd.model.apply_effects import EffectMemory
+from compd.model.observations import Motion
+from tests.support.live_machine import CONFIG, machine
+from tests.support.recorded_run import ROOMY, Run
+from tests.unit.live.test_effects import file_with
+
+CYCLES = 400
+
+
+def record(run, name, cycles, every=1):
+    """Record every `every`-th of some eventful cycles; the setpoints that were sent."""
+    sent = []
+    with run.recorder(name) as recorder:
+        for number, (line, message, setpoint) in enumerate(run.eventful(cycles)):
+            if number % every == 0:
+                recorder.put(line, message)
+                sent.append(setpoint)
+    return sent
+
+
+@pytest.mark.parametrize("on_limit", ["clamp", "refuse"])
+@pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
+    run = Run(machine(name, on_stale=on_stale, on_limit=on_limit), seed=11)
+    sent = record(run, tmp_path / "run", CYCLES)
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    assert [cycle.sent for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    lost = {"hold": State.HOLD, "fade": State.FADE, "stop": State.STOP}[on_stale]
+    beyond = {"clamp": State.CLAMPED, "refuse": State.REFUSED}[on_limit]
+    assert {State.OK, State.SLEWING, lost, beyond} <= {setpoint.state for setpoint in sent}
+    assert {"cmm", "machine_tool"} == {setpoint.mode for setpoint in sent}
+
+
+def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):
+    run = Run(machine(), seed=5)
+    sent = record(run, tmp_path / "run", CYCLES, every=20)
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    assert len(replayed) == CYCLES / 20
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_no_bit_of_what_went_in_is_lost_on_the_way(name):
+    """Stronger than setpoints, which are rounded and forgive a warm start that is not quite the same."""
+    run, other = Run(machine(name), seed=3), machine(name)
+    for _, message, setpoint in run.eventful(300):
+        recorded = parse_readings(message, run.machine.latest.channels)
+        sent, read = setpoint.inputs, recorded.inputs
+        assert repr(read.snapshot) == repr(sent.snapshot), "repr: a nan is not equal to itself"
+        assert (read.zero, read.target) == (sent.zero, sent.target)
+        assert (read.carried.zero is read.zero) == (sent.carried.zero is sent.zero)
+        assert to_plain(read.carried._replace(zero=None)) == to_plain(sent.carried._replace(zero=None))
+        other.cycle.resume(read.carried, sent.models)
+        again = other.cycle.run(recorded.tick, read.snapshot, Commands(read.zero, read.target, sent.models))
+        assert again.to_packet(bytes(8)) == setpoint.to_packet(bytes(8)), "float64 that are not rounded"
+
+
+def test_what_effects_remember_goes_to_json_and_back():
+    motion = Motion(1.5, *(np.array([0.1, np.nan, -0.0]) for _ in range(6)))
+    memories = {"link.lag": (np.array([1e-300, 2.0]), np.array(3.0), np.arange(4.0).reshape(2, 2).T), "none": None}
+    remembered = EffectMemory(motion, memories, commanded=True)
+    read = from_plain(json.loads(json.dumps(to_plain(remembered), allow_nan=False)))
+    assert isinstance(read, EffectMemory)
+    assert isinstance(read.motion, Motion)
+    assert (read.motion.time_s, read.commanded, read.memories["none"]) == (1.5, True, None)
+    assert read.motion.direction.tobytes() == motion.direction.tobytes()
+    for one, other in zip(read.memories["link.lag"], memories["link.lag"], strict=True):
+        assert one.tolist() == other.tolist()
+    for number in (math.nan, math.inf, -math.inf):
+        assert repr(from_plain(to_plain(number))) == repr(number)
+    with pytest.raises(TypeError, match="set cannot be carried"):
+        to_plain({1})
+    with pytest.raises(ValueError, match="no such state"):
+        from_plain({"strange": 1})
+
+
+def test_a_cycle_without_zero_reads_back_as_it_was():
+    run = Run(machine())
+    run.machine.orders.zero = StateError(
+        Problem(where="here", what="machine zero has never been taken", next_step="take it")
+    )
+    _, message, setpoint = run.recorded(run.machine.step())
+    assert setpoint.state is State.NO_ZERO
+    recorded = parse_readings(message, run.machine.latest.channels)
+    assert recorded.setpoint_line == setpoint.to_json()
+    assert recorded.inputs.snapshot == setpoint.inputs.snapshot
+    again = run.machine.cycle.run(recorded.tick, recorded.inputs.snapshot, Commands(recorded.inputs.zero))
+    assert again.to_json() == setpoint.to_json()
+
+
+def with_models(tmp_path):
+    """A run in which a model with memory is adopted and another shadows it; its cycles' messages and setpoints."""
+    run = Run(machine())
+    configuration = run.machine.configuration
+    shelf = ModelLoader(run.machine.model, configuration.machine, configuration.geometry_hash, run.machine.wires)
+    lag = file_with(tmp_path / "lag.yaml", "link_expansion_lag", "friction_hysteresis")
+    backlash = file_with(tmp_path / "backlash.yaml", "backlash")
+    adopted = [None, Models(shelf.read(lag)), Models(shelf.read(lag), shelf.read(backlash))]
+    cycles = []
+    for models in adopted:
+        run.machine.orders.models = models
+        cycles += run.eventful(60)
+    return run, cycles, (lag, backlash)
+
+
+def test_models_are_kept_with_the_recording_whatever_becomes_of_their_files(tmp_path, capsys):
+    run, cycles, files = with_models(tmp_path)
+    with run.recorder(tmp_path / "run", replace(ROOMY, part_bytes=300_000)) as recorder:
+        for line, message, _ in cycles:
+            recorder.put(line, message)
+    for file in files:
+        file.unlink()
+    assert len(list(tmp_path.glob("run-*.csv"))) > 1
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for _, _, setpoint in cycles]
+    assert any(b'"shadow":{' in cycle.replayed for cycle in replayed)
+
+
+def test_a_model_file_that_has_changed_since_is_told_and_may_be_given_later(tmp_path):
+    run, cycles, (lag, backlash) = with_models(tmp_path)
+    said, adopted = [], lag.read_bytes()
+    lag.write_bytes(adopted + b"# fitted again\n")
+    backlash.unlink()
+    with run.recorder(tmp_path / "run", say=said) as recorder:
+        for line, message, _ in cycles:
+            recorder.put(line, message)
+    assert f"{lag} has changed since the daemon read it: it is not kept" in "\n".join(said)
+    assert f"{backlash} cannot be read: No such file or directory" in "\n".join(said)
+    with pytest.raises(RecordingError, match="give it with `--model`"):
+        list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    given = [tmp_path / "saved.yaml", file_with(tmp_path / "backlash.yaml", "backlash")]
+    given[0].write_bytes(adopted)
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run"), given))
+    assert len(replayed) == len(cycles)
+    assert not [cycle for cycle in replayed if cycle.differs]
+
+
+def altered(path, number, change):
+    """The file with `change` applied to the message in line `number`, counted from 0."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    message = json.loads(lines[number])
+    change(message)
+    lines[number] = json.dumps(message, separators=(",", ":")).encode() + b"\n"
+    path.write_bytes(b"".join(lines))
+
+
+def change_reading(message):
+    message["readings"]["scale_1.position"]["value"] += 1e-6
+
+
+def change_carried(message):
+    carried = from_plain(message["carried"])
+    message["carried"] = to_plain(carried._replace(correction_mm=carried.correction_mm + 1.0))
+
+
+def change_setpoint(message):
+    message["setpoint"]["tip_M_mm"][2] += 1e-7
+
+
+def change_time(message):
+    message["time_s"] += 1e-5
+
+
+@pytest.mark.parametrize("change", [change_reading, change_carried, change_setpoint, change_time])
+def test_one_changed_number_is_found_and_its_place_is_told(tmp_path, capsys, change):
+    run = Run(machine())
+    configuration = replace(run.machine.configuration, path=CONFIG / "tripod-cmm.yaml")
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(30):
+            recorder.put(line, message)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    altered(path, 21, change)  # two lines of opening, so the 20th cycle
+    found = [cycle for cycle in replay_cycles(configuration, RecordedCycles(path)) if cycle.differs]
+    assert [(cycle.tick, cycle.where) for cycle in found] == [(20, f"{path}:22")]
+
+
+def shipped_run(tmp_path, cycles=30):
+    """A recording of the shipped tripod, so that the command can load its configuration."""
+    from compd.configuration import load
+    from tests.support.live_machine import Machine
+
+    run = Run(Machine(load(CONFIG / "tripod-cmm.yaml")))
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(cycles):
+            recorder.put(line, message)
+    return run
+
+
+def test_the_command_says_that_nothing_differs_and_prints_setpoints(tmp_path, capsys):
+    shipped_run(tmp_path)
+    replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=True)
+    out, err = capsys.readouterr()
+    assert err == "30 cycles replayed; every setpoint is the one that was sent\n"
+    assert [json.loads(line)["class"] for line in out.splitlines()] == ["SETPOINT"] * 30
+
+
+def test_the_command_fails_and_shows_the_first_difference(tmp_path, capsys):
+    import typer
+
+    shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    altered(path, 11, change_setpoint)
+    altered(path, 15, change_setpoint)
+    with pytest.raises(typer.Exit) as ended:
+        replay_command(tmp_path / "run-0001.csv", CONFIG / "tripod-cmm.yaml", setpoints=False)
+    assert ended.value.exit_code == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"2 of 30 setpoints differ; the first is tick 10, {path}:12" in err
+    assert err.count('"class":"SETPOINT"') == 2
+
+
+def test_another_configuration_is_told_and_may_give_other_setpoints(tmp_path, capsys):
+    shipped_run(tmp_path)
+    text = (CONFIG / "tripod-cmm.yaml").read_text()
+    assert "valid_for_s: 0.1" in text
+    other = tmp_path / "other.yaml"
+    other.write_text(text.replace("valid_for_s: 0.1", "valid_for_s: 0.2"))
+    import typer
+
+    with pytest.raises(typer.Exit):
+        replay_command(tmp_path / "run", other, setpoints=False)
+    err = capsys.readouterr().err
+    assert "recorded with another configuration" in err
+    assert "30 of 30 setpoints differ" in err
+
+
+def test_a_line_torn_by_a_kill_is_left_out_and_counted(tmp_path, capsys):
+    shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    path.write_bytes(path.read_bytes()[:-100])
+    replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=False)
+    err = capsys.readouterr().err
+    assert "1 torn line" in err
+    assert "29 cycles replayed" in err
+
+
+@pytest.mark.parametrize(
+    "damage", [b"{\n", b"[1]\n", b'{"class":"READINGS"}\n', b'{"class":"READINGS","readings":{}}\n']
+)
+def test_a_damaged_line_is_named(tmp_path, damage):
+    run = shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[7] = damage
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(RecordingError, match=r"run-0001\.cycles\.jsonl:8"):
+        list(replay_cycles(run.machine.configuration, RecordedCycles(path)))
+
+
+def test_a_recording_of_another_machine_is_refused(tmp_path):
+    shipped_run(tmp_path)
+    hexapod = machine("hexapod.yaml")
+    with pytest.raises(RecordingError, match="has no reading of"):
+        list(replay_cycles(hexapod.configuration, RecordedCycles(tmp_path / "run")))
+
+
+def test_what_is_not_there_is_told_with_what_would_be_right(tmp_path):
+    with pytest.raises(RecordingError, match="a recording by `compd record`"):
+        RecordedCycles(tmp_path / "nothing")

@@ -1,0 +1,419 @@
+"""Formulas: what they may say, what they give, and that nothing gets out of them."""
+
+from __future__ import annotations
+
+import ast
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from compd.errors import ConfigurationError
+from compd.model.effect import Effect, FittedEffect, delta, missing
+from compd.model.formula.declaration import formula_effect
+from compd.model.formula.evaluator import FUNCTIONS, Formula
+from compd.model.formula.parser import DEEPEST, LONGEST, parse
+from compd.model.library import find
+from compd.model.prediction import columns, predict, sensitivities
+from tests.support.effect_rows import HEXAPOD, TRIPOD, at_zero, rows_of, varied
+
+ALLOWED_NODES = (ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
+NAMES = ("k", "humidity_pct", "x_mm", "pi")
+GRANITE = {
+    "id": "granite_swelling",
+    "port": "link",
+    "formula": "k * (humidity_pct - 50)",
+    "parameters": {"k": {"unit": "um", "plausible": [-1, 1], "source": "my notes, 2026-11"}},
+}
+
+
+def written(formula: str, port: str = "link", parameters: str = "k", **more: Any) -> Effect:
+    """An effect with parameters of one letter each, plausible from 1 to 100."""
+    declared = {name: {"unit": "um", "plausible": [1, 100], "source": "notes"} for name in parameters.split()}
+    return formula_effect({"id": "mine", "port": port, "formula": formula, "parameters": declared, **more}, "a.yaml:7")
+
+
+def value_of(formula: Formula, **at: float) -> float:
+    """The factor of the parameter k with the other names at these values."""
+    found, _ = formula.evaluate(
+        {name: np.array([[value]]) for name, value in at.items()},
+        {},
+        np.zeros(1),
+        np.ones(1, bool),
+        (None,) * formula.lags,
+    )
+    return float(found["k"][0, 0])
+
+
+# --- nothing gets out ----------------------------------------------------------------------------------
+
+ESCAPES = [
+    "().__class__",
+    "k.__class__",
+    "k.real",
+    "__import__('os')",
+    "__import__(os)",
+    "eval(k)",
+    "exec(k)",
+    "open(k)",
+    "getattr(k, k)",
+    "k[0]",
+    "k['a']",
+    "[k]",
+    "{k}",
+    "{k: k}",
+    "(k, k)",
+    "lambda: k",
+    "(lambda x: x)(k)",
+    "k if k else k",
+    "k and k",
+    "not k",
+    "k < 1",
+    "k == k",
+    "k in k",
+    "k is k",
+    "[k for k in k]",
+    "{k for k in k}",
+    "k := 2",
+    "(k := 2)",
+    "*k",
+    "k(*k)",
+    "sin(x=k)",
+    "sin(*k)",
+    "sin(**k)",
+    "f'{k}'",
+    "'a'",
+    "b'a'",
+    "...",
+    "None",
+    "True",
+    "1j",
+    "k @ k",
+    "k // 2",
+    "k % 2",
+    "k << 2",
+    "k | k",
+    "k & k",
+    "k ^ k",
+    "~k",
+    "await k",
+    "yield k",
+    "k; k",
+    "k = 2",
+    "import os",
+    "k\nk",
+    "k\\\nk",
+    "k # comment",
+    "sin",
+    "sin.k",
+    "sin(k)(k)",
+    "(sin)(k)(k)",
+    "lag",
+    "lag(k)",
+    "lag(k, k * 2)",
+    "lag(k, -3)",
+    "lag(k, 0)",
+    "lag(k, sin(1))",
+    "lag(k, humidity_pct)",
+    "k ** humidity_pct",
+    "9 ** 9 ** 9 * k",
+    "k * 2 ** 11",
+    "k * 2 ** (1 + 1)",
+    "k * 1e999",
+    "k * 1e309",
+    "reference_x_mm * k",
+    "k * model_x_mm",
+    "k * __builtins__",
+    "k * time",
+    "k * reference_link_1_mm",
+    "",
+    " ",
+    "k *",
+    "(k",
+    "k)",
+    "k k",
+    "0x1for k in k",
+    "1if k else 2",
+    "k" * (LONGEST + 1),
+    "-" * 250 + "k",
+    "(" * 140 + "k" + ")" * 139,
+    "sin(" * 50 + "k" + ")" * 50,
+    "k\u00b7x",
+    "\uff4b",
+    "k\x00",
+    "minimum(k)",
+    "minimum(k, k, k)",
+    "abs()",
+    "k + 1",
+    "1",
+    "humidity_pct",
+    "k * humidity_pct + humidity_pct",
+    "k ** 2",
+    "sin(k)",
+]
+
+
+@pytest.mark.parametrize("text", ESCAPES)
+def test_what_is_no_formula_is_refused_in_words(text: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        written(text)
+    assert all("a.yaml:7" in problem.where for problem in refused.value.problems)
+    assert len(str(refused.value)) < 1500
+
+
+def nothing_but_arithmetic(text: str) -> None:
+    """Either the text is refused, or its tree holds arithmetic alone and evaluates to numbers."""
+    try:
+        formula = parse(text, ("k",), "test")
+    except ConfigurationError:
+        return
+    for node in ast.walk(formula.tree):
+        assert isinstance(node, ALLOWED_NODES), ast.dump(node)
+        if isinstance(node, ast.Call):
+            assert isinstance(node.func, ast.Name)
+            assert node.func.id in (*FUNCTIONS, "lag")
+            assert not node.keywords
+        if isinstance(node, ast.Constant):
+            assert type(node.value) in (int, float)
+    assert not any(name.startswith(("reference_", "model_")) for name in formula.columns)
+    found, _ = formula.evaluate(
+        {name: np.array([[0.5], [-2.0]]) for name in formula.columns},
+        dict.fromkeys(formula.shape, 3.0),
+        np.array([0.0, 10.0]),
+        np.array([True, False]),
+        (None,) * formula.lags,
+    )
+    assert set(found) == set(formula.linear)
+    assert all(value.dtype == np.float64 for value in found.values())
+
+
+@settings(deadline=None, max_examples=400)
+@given(st.text(max_size=LONGEST + 20))
+def test_no_text_gets_out(text: str) -> None:
+    nothing_but_arithmetic(text)
+
+
+@settings(deadline=None, max_examples=600)
+@given(st.text(alphabet="k0129.exsinlagpow_+-*/(), []'\":=<lmbd", max_size=60))
+def test_no_text_of_tempting_characters_gets_out(text: str) -> None:
+    nothing_but_arithmetic(text)
+
+
+PIECES = [  # not formatted: a list to choose from
+    "k",
+    "1",
+    "9",
+    "**",
+    "*",
+    "+",
+    "-",
+    "/",
+    "(",
+    ")",
+    ",",
+    "sin",
+    "lag",
+    "pi",
+    "humidity_pct",
+    "reference_x_mm",
+    ".",
+    "__class__",
+    "[",
+    "]",
+    "lambda",
+    ":",
+    "if",
+    "else",
+    "for",
+    "in",
+    "=",
+    ":=",
+    "'",
+    "e9",
+    "_",
+    " ",
+]
+
+
+@settings(deadline=None, max_examples=800)
+@given(st.lists(st.sampled_from(PIECES), max_size=40))
+def test_no_heap_of_tokens_gets_out(pieces: list[str]) -> None:
+    nothing_but_arithmetic("".join(pieces))
+
+
+# --- what formulas give --------------------------------------------------------------------------------
+
+Made = tuple[str, float]  # a text, and its value computed beside it
+
+
+def combined(children: st.SearchStrategy[Made]) -> st.SearchStrategy[Made]:
+    def binary(left: Made, right: Made, sign: str) -> Made:
+        value = {"+": left[1] + right[1], "-": left[1] - right[1], "*": left[1] * right[1]}[sign]
+        return f"({left[0]} {sign} {right[0]})", value
+
+    return st.one_of(
+        st.builds(binary, children, children, st.sampled_from("+-*")),
+        st.builds(lambda one: (f"-{one[0]}", -one[1]), children),
+        st.builds(lambda one: (f"sin({one[0]})", math.sin(one[1])), children),
+        st.builds(lambda one: (f"abs({one[0]})", abs(one[1])), children),
+        st.builds(lambda a, b: (f"maximum({a[0]}, {b[0]})", max(a[1], b[1])), children, children),
+    )
+
+
+LEAVES = st.one_of(
+    st.floats(0.001, 1000).map(lambda value: (repr(value), value)),
+    st.just(("humidity_pct", 47.5)),
+    st.just(("x_mm", -1.25)),
+    st.just(("pi", math.pi)),
+)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.recursive(LEAVES, combined, max_leaves=6))
+def test_a_formulas_value_is_pythons(made: Made) -> None:
+    text, value = made
+    assume(len(text) < LONGEST - 10)
+    formula = parse(f"k * {text}", ("k",), "test")
+    assert value_of(formula, humidity_pct=47.5, x_mm=-1.25) == pytest.approx(value, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "linear", "shape"),
+    [
+        ("k * x_mm", ["k"], []),
+        ("a * x_mm + b * sin(w * x_mm)", ["a", "b"], ["w"]),
+        ("k * (x_mm - x0)", ["k"], ["x0"]),
+        ("-k * x_mm / (1 + b * x_mm)", ["k"], ["b"]),
+        ("k * exp(-time_s / tau)", ["k"], ["tau"]),
+        ("a * b * x_mm", ["a"], ["b"]),
+        ("x_mm * k / 3 - (k - b) * 2", ["k", "b"], []),
+        ("k * abs(x_mm) ** p", ["k"], ["p"]),
+        ("k * lag(x_mm, tau)", ["k"], ["tau"]),
+    ],
+)
+def test_parameters_are_linear_or_searched(text: str, linear: list[str], shape: list[str]) -> None:
+    formula = parse(text, tuple(sorted((*linear, *shape), key=text.index)), "test")
+    assert sorted(formula.linear) == sorted(linear)
+    assert list(formula.shape) == shape
+
+
+def test_each_parameter_gets_its_own_factor() -> None:
+    formula = parse("x_mm * k / 4 - (k - b) * 2", ("k", "b"), "test")
+    found, _ = formula.evaluate({"x_mm": np.array([[8.0], [12.0]])}, {}, np.zeros(2), np.ones(2, bool), ())
+    np.testing.assert_allclose(found["k"][:, 0], [0.0, 1.0])
+    np.testing.assert_allclose(np.broadcast_to(found["b"], (2, 1))[:, 0], 2.0)
+
+
+def test_arithmetic_that_fails_gives_nan_and_no_warning() -> None:
+    formula = parse("k * log(x_mm) / (x_mm - x_mm)", ("k",), "test")
+    assert math.isnan(value_of(formula, x_mm=-1.0))
+
+
+# --- effects -------------------------------------------------------------------------------------------
+
+
+def test_the_persons_example() -> None:
+    effect = find(GRANITE, "model.yaml:12")
+    assert effect.needs == ("humidity_pct",)
+    rows = at_zero(values={"humidity_pct": 53.0})
+    found, _ = delta(FittedEffect(effect, np.array([0.1])), rows)
+    np.testing.assert_allclose(found["link"], 0.3e-3)
+    (problem,) = missing(effect, rows.available - {"humidity_pct"}, 3)
+    assert "a hygrometer" in problem.next_step
+
+
+def test_temperature_link_is_the_links_own() -> None:
+    effect = written("k * (temperature_link - 20) * link_mm / 1000")
+    rows = at_zero(values={"temperature_link_2_degC": 21.5})
+    found, _ = delta(FittedEffect(effect, np.array([2.0])), rows)
+    np.testing.assert_allclose(found["link"][0] / (2e-3 * rows.link_mm[0] / 1000), [0, 1.5, 0], atol=1e-12)
+    assert written("k * strain_link_ppm").needs == ("strain_link_{link}_ppm",)
+
+
+@pytest.mark.parametrize("model", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])
+@pytest.mark.parametrize(
+    "more",
+    [{"port": port} for port in ("scale", "joint", "frame", "link")]
+    + [
+        {"port": port, "axis": axis}
+        for port, axis in zip(("base_joint", "platform_joint", "plate", "tool", "reference"), "xyzxy", strict=True)
+    ],
+    ids=lambda more: more["port"],
+)
+def test_a_formula_serves_every_port_and_moves_the_tip(model: object, more: dict[str, str]) -> None:
+    machine = TRIPOD if model is TRIPOD else HEXAPOD
+    effect = written(
+        "k * (temperature_room_degC - 20) + m * sin(humidity_pct) + n * lag(pressure_hPa - 1010, tau)",
+        parameters="k m n tau",
+        **more,
+    )
+    arguments = varied(machine, 6)
+    rows = rows_of(machine, arguments)
+    shape = effect.shapes(rows)[3]
+    theta = np.array([1.0, -2.0, 0.5])
+    found, _ = delta(FittedEffect(effect, theta, shape), rows)
+    moved = predict(machine, rows, found).tip_mm - predict(machine, rows, {}).tip_mm
+    basis, _ = effect.basis(rows, shape, None)
+    by = columns(effect, rows, basis, sensitivities(machine, rows, effect.ports))
+    np.testing.assert_allclose(by.tip @ theta, moved, atol=1e-3 * np.abs(moved).max())
+    if more["port"] == "reference":
+        np.testing.assert_allclose(moved[:, [0, 2]], 0, atol=1e-12)
+
+
+def test_a_lag_in_a_formula_remembers() -> None:
+    effect = written("k * lag(temperature_room_degC, 500) + m * lag(humidity_pct, tau)", parameters="k m tau")
+    assert effect.remembers
+    assert {"time", "order"} <= set(effect.needs)
+    arguments = varied(TRIPOD, 9)
+    rows = rows_of(TRIPOD, arguments)
+    fitted = FittedEffect(effect, np.array([1.0, 2.0]), {"tau": 60.0})
+    whole, _ = delta(fitted, rows)
+    memory = None
+    for i in range(9):
+        from tests.support.effect_rows import part
+
+        one, memory = delta(fitted, rows_of(TRIPOD, part(arguments, slice(i, i + 1))), memory)
+        np.testing.assert_array_equal(one["link"][0], whole["link"][i])
+
+
+def test_one_parameter_per_link() -> None:
+    declared = {"k": {"unit": "um", "plausible": [-1, 1], "source": "notes", "per": "link"}}
+    effect = formula_effect(
+        {"id": "mine", "port": "link", "formula": "k * direction", "parameters": declared}, "a.yaml:7"
+    )
+    found, _ = delta(FittedEffect(effect, np.array([1.0, 2.0, 3.0])), at_zero())
+    np.testing.assert_allclose(found["link"][0], [1e-3, 2e-3, 3e-3])
+    assert effect.needs == ("direction",)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"port": "engine"}, "port"),
+        ({"colour": "red"}, "Extra inputs"),
+        ({"parameters": {}}, "at least 1"),
+        ({"parameters": {"k": {"unit": "um", "plausible": [1, -1], "source": "s"}}}, "range is empty"),
+        ({"parameters": {"k": {"unit": "um", "plausible": [-1, math.inf], "source": "s"}}}, "finite"),
+        ({"parameters": {"k": {"unit": "um", "plausible": [-1, 1]}}}, "source"),
+        ({"port": "tool"}, "does not fit the port tool"),
+        ({"axis": "x"}, "this port has no direction"),
+        ({"port": "frame", "formula": "k * temperature_link"}, "has no links"),
+        ({"formula": "k * humidity"}, "is no column"),
+        ({"formula": "humidity_pct"}, "a parameter is not in the formula"),
+        ({"id": "Not an id"}, "pattern"),
+    ],
+)
+def test_a_wrong_declaration_is_refused_with_its_place(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=said) as refused:
+        find({**GRANITE, **change}, "model.yaml:12")
+    assert all(problem.where.startswith("model.yaml:12") for problem in refused.value.problems)
+
+
+def test_the_place_in_the_formula_is_named() -> None:
+    with pytest.raises(ConfigurationError, match="character 16"):
+        written("k * (1 + x_mm) @ 2")
+    with pytest.raises(ConfigurationError, match=f"{DEEPEST} levels"):
+        written("k * " + "sin(" * DEEPEST + "x_mm" + ")" * DEEPEST)

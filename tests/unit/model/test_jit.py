@@ -1,0 +1,88 @@
+"""Where compiled kernels are kept: in a directory of their own version, or nowhere, and then they work as well."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from compd.model.kernels import jit
+
+
+@pytest.fixture
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the sources that jit.py takes for its own."""
+    folder = tmp_path / "model"
+    shutil.copytree(Path(jit.__file__).parents[1], folder, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "__file__", str(folder / "kernels" / "jit.py"))
+    monkeypatch.setattr(jit._config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"), [("solve_status.py", "= 100.0", "= 200.0"), ("kernels/linear.py", "1e12", "1e11")]
+)
+def test_a_changed_limit_or_helper_does_not_run_old_kernels(sources: Path, name: str, old: str, new: str) -> None:
+    before = jit._cache_directory()
+    assert Path(before).parent == sources / "__pycache__"
+    assert jit._cache_directory() == before
+    text = (sources / name).read_text()
+    assert old in text
+    (sources / name).write_text(text.replace(old, new))
+    assert jit._cache_directory() != before
+
+
+def test_a_read_only_installation_keeps_them_with_the_user(sources: Path, tmp_path: Path) -> None:
+    (sources / "__pycache__").write_text("a file where the directory would be, as unwritable as can be")
+    assert Path(jit._cache_directory()).parent == tmp_path / "user" / "compd"
+    (tmp_path / "user" / "compd").rename(tmp_path / "gone")
+    (tmp_path / "user" / "compd").write_text("here too")
+    assert jit._cache_directory() == ""
+
+
+def test_a_directory_that_the_person_names_is_the_only_one(
+    sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jit._config, "CACHE_DIR", str(tmp_path / "named"))
+    assert Path(jit._cache_directory()).parent == tmp_path / "named"
+    assert str(tmp_path / "named") == jit._config.CACHE_DIR
+
+
+def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code = (
+        "import numpy as np; from compd.model.kernels import jit; from compd.model.transform import to_outer;"
+        "print(repr(jit.CACHE_DIRECTORY), to_outer(np.eye(3), np.ones(3), np.zeros(3)).tolist())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(blocked)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "'' [1.0, 1.0, 1.0]"
+
+
+def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path: Path) -> None:
+    """numba names a kernel by what its process compiled before, so these two do not agree on the name."""
+    ours = (
+        "import numpy as np; from compd.model.kernels.rotation import compose;"
+        "print(compose(np.eye(3), np.eye(3)).sum())"
+    )
+    other = f"import numba; numba.njit(lambda x: x + 1)(1); {ours}"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def start(code: str) -> subprocess.Popen[str]:
+        return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+
+    together = [start(code) for code in (ours, other, ours, other)]
+    afterwards = [process.communicate()[0].strip() for process in together]
+    afterwards += [start(code).communicate()[0].strip() for code in (ours, other)]
+    assert afterwards == ["3.0"] * 6

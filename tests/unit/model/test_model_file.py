@@ -1,0 +1,142 @@
+"""The model file: what is written is read, whole or not at all, and only for its own machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from compd.errors import StateError
+from compd.model_file import ModelFile, ModelStep, read_model_file, write_model_file
+from tests.support.measured import hidden
+
+FORMULA = {
+    "id": "granite_swelling",
+    "port": "link",
+    "formula": "k * (humidity_pct - 50)",
+    "parameters": {"k": {"unit": "um", "plausible": [-1, 1], "source": "my notes"}},
+}
+
+
+def example() -> ModelFile:
+    """Two effects that know of each other's errors."""
+    fitted = (hidden("link_elasticity", 28.0), hidden("link_expansion_lag", 1.1, tau=1300.0))
+    covariance = np.array([[1e-7, 2e-8], [2e-8, 4e-6]])
+    step = ModelStep(
+        "add",
+        "link_elasticity",
+        "2026-11-20T10:00:00+00:00",
+        "run.csv",
+        "0f",
+        1.6,
+        0.2,
+        0.15,
+        {"effects": [], "covariance": []},
+    )
+    return ModelFile("tripod-cmm", ("link_elasticity", "link_expansion_lag"), fitted, covariance, (step,))
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.declared == example().declared
+    assert found.steps == example().steps
+    np.testing.assert_allclose(found.fitted[0].theta, 1 / 28.0, rtol=1e-15)
+    assert dict(found.fitted[1].shape) == {"tau": 1300.0}
+    np.testing.assert_array_equal(found.covariance, example().covariance)
+    np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
+
+
+def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    (number,) = yaml.safe_load(path.read_text())["effects"][0]["parameters"]
+    assert number["unit"] == "N/um"
+    assert number["value"] == pytest.approx(28.0)
+    assert number["std"] == pytest.approx(np.sqrt(1e-7) * 28.0**2)
+
+
+def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    file = ModelFile("tripod-cmm", ("link_expansion",), (hidden("link_expansion", 1.1),), np.full((1, 1), np.nan))
+    write_model_file(path, file, 3)
+    assert np.isnan(read_model_file(path, "tripod-cmm", 3).covariance).all()
+
+
+def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
+    from compd.model.effect import FittedEffect
+    from compd.model.library import find
+
+    path = tmp_path / "m.yaml"
+    effect = find(FORMULA, "here")
+    file = ModelFile("tripod-cmm", (FORMULA,), (FittedEffect(effect, np.array([0.1])),), np.full((1, 1), 1e-4))
+    write_model_file(path, file, 3)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.declared == (FORMULA,)
+    assert found.fitted[0].effect.equation == effect.equation
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda data: data.update(machine="hexapod"), "belongs to another machine"),
+        (lambda data: data.update(format=9), "no model file of this version"),
+        (lambda data: data["effects"][0].update(effect="link_elastisity"), "no such effect"),
+        (lambda data: data["effects"][0].update(parameters=[]), "has not the parameters of link_elasticity"),
+        (lambda data: data["effects"][1].update(shape={}), "has not the shape constants"),
+        (lambda data: data["effects"][1].pop("parameters"), "effect 2: cannot be read"),
+        (lambda data: data.update(covariance=[[1.0]]), "another size"),
+        (lambda data: data["steps"][0].pop("kind"), "a step cannot be read"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: str) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    data = yaml.safe_load(path.read_text())
+    edit(data)  # type: ignore[operator]
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError, match=said):
+        read_model_file(path, "tripod-cmm", 3)
+
+
+def test_every_problem_is_in_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    data = yaml.safe_load(path.read_text())
+    data["effects"][0]["effect"] = "nothing"
+    data["effects"][1]["shape"] = {}
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError) as caught:
+        read_model_file(path, "tripod-cmm", 3)
+    assert len(caught.value.problems) == 2
+
+
+@pytest.mark.parametrize("text", ["", "- a", "a: [", "\x00"])
+def test_what_is_no_model_file_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(text)
+    with pytest.raises(StateError):
+        read_model_file(path, "tripod-cmm", 3)
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(StateError, match="cannot be read"):
+        read_model_file(tmp_path / "none.yaml", "tripod-cmm", 3)
+
+
+def test_a_disk_that_refuses_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    before = path.read_bytes()
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(StateError, match="No space left"):
+        write_model_file(path, ModelFile("tripod-cmm"), 3)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["m.yaml"]

@@ -1,0 +1,207 @@
+"""Predictions with something added at the ports, their derivatives, and the example recordings."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.model.effect import PORTS, Deltas, FittedEffect, Port, delta, deltas, port_size, together
+from compd.model.joint_correction import scale_for_length_mm
+from compd.model.kernels.rotation import compose, rotation_vector
+from compd.model.kinematics import inverse_kinematics
+from compd.model.machine import MachineModel
+from compd.model.observations import Observations
+from compd.model.observe import Movement
+from compd.model.prediction import altered, columns, predict, pull_back, sensitivities, shares
+from compd.model.solve_status import Reason
+from compd.model.tool import ToolOnPlate
+from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, rows_of, some_shape, varied
+from tests.support.model_machines import Floats
+from tests.support.paths import SHARED
+
+RECORDINGS = SHARED / "recordings"
+ON_PLATE = replace(TRIPOD, arrangement=ToolOnPlate(TRIPOD.zero.contact.tip_M_mm))
+MACHINES = {"tripod": TRIPOD, "hexapod": HEXAPOD, "tool on plate": ON_PLATE}
+STEP = 1e-4  # mm, or rad at the port `revolute_axis`
+
+
+def changed(model: MachineModel, rows: Observations, port: Port, i: int) -> tuple[Floats, Floats, Floats]:
+    """Central differences of tip, attitude and link lengths by the port's i-th number."""
+    step = np.zeros((len(rows), port_size(port, rows)))
+    step[:, i] = STEP
+    ahead, behind = predict(model, rows, {port: step}), predict(model, rows, {port: -step})
+    assert (ahead.reason == Reason.OK).all()
+    turned = rotation_vector(compose(ahead.rotation_M_P, behind.rotation_M_P.transpose(0, 2, 1)))
+    return (
+        (ahead.tip_mm - behind.tip_mm) / (2 * STEP),
+        turned / (2 * STEP),
+        (ahead.link_length_mm - behind.link_length_mm) / (2 * STEP),
+    )
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("port", PORTS)
+def test_derivatives_are_the_predictions_own(name: str, port: Port) -> None:
+    model = MACHINES[name]
+    rows = rows_of(model, varied(model, 6))
+    found = sensitivities(model, rows, [port])[port]
+    size = port_size(port, rows)
+    assert found.tip.shape == (6, 3, size)
+    assert size > 0 or (name == "hexapod" and port == "revolute_axis")
+    for i in range(size):
+        tip, rotation, link_length = changed(model, rows, port, i)
+        np.testing.assert_allclose(found.tip[:, :, i], tip, rtol=1e-6, atol=1e-7)
+        np.testing.assert_allclose(found.rotation[:, :, i], rotation, rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(found.link_length[:, :, i], link_length, atol=1e-8)
+
+
+def test_nothing_added_is_the_nominal_machine() -> None:
+    arguments = varied(TRIPOD)
+    rows = rows_of(TRIPOD, arguments)
+    values = GaugeValues(arguments["scale_mm"], arguments["joint_mm"], arguments["frame_mm"], {})
+    result, _ = compensate_cmm(TRIPOD, values, WarmStart.at_zero(TRIPOD))
+    np.testing.assert_allclose(predict(TRIPOD, rows, {}).tip_mm, result.tip_M_mm, atol=1e-9)
+    np.testing.assert_allclose(rows.tip_M_mm, result.tip_M_mm, atol=1e-9)
+    np.testing.assert_allclose(rows.link_mm, result.link_length_mm, atol=1e-12)
+
+
+@pytest.mark.parametrize("id_", list(LIBRARY))
+def test_an_effects_columns_are_what_its_numbers_do(id_: str) -> None:
+    """G theta is the prediction's change for a small theta, whatever the ports."""
+    effect = LIBRARY[id_]
+    rows = rows_of(TRIPOD, varied(TRIPOD, 5))
+    basis, _ = effect.basis(rows, some_shape(effect), None)
+    theta = 1e-3 * np.array([sum(one.parameter.fitted_range) / 2 or one.parameter.high for one in effect.columns(3)])
+    found, _ = delta(FittedEffect(effect, theta, some_shape(effect)), rows)
+    moved = predict(TRIPOD, rows, found).tip_mm - predict(TRIPOD, rows, {}).tip_mm
+    by = columns(effect, rows, basis, sensitivities(TRIPOD, rows, effect.ports))
+    assert by.tip.shape == (5, 3, len(theta))
+    np.testing.assert_allclose(by.tip @ theta, moved, atol=1e-3 * np.abs(moved).max() + 1e-12)
+    assert np.abs(moved).max() > 0
+
+
+def test_a_row_that_cannot_be_solved_says_so_and_harms_no_other() -> None:
+    arguments = varied(TRIPOD, 4)
+    arguments["scale_mm"] = arguments["scale_mm"].copy()
+    arguments["scale_mm"][1] = -470.0
+    arguments["joint_mm"][2, 4] = np.nan
+    rows = rows_of(TRIPOD, arguments)
+    found = predict(TRIPOD, rows, {})
+    assert [Reason(int(code)) for code in found.reason] == [Reason.OK, found.reason[1], Reason.NOT_FINITE, Reason.OK]
+    assert found.reason[1] != Reason.OK
+    assert np.isnan(found.tip_mm[[1, 2]]).all()
+    by = sensitivities(TRIPOD, rows, list(PORTS))
+    assert np.isfinite(by["link"].tip[[0, 3]]).all()
+    pulled = pull_back(by["link"], np.ones((4, 3)))
+    assert np.isnan(pulled[[1, 2]]).all()
+    assert np.isfinite(pulled[[0, 3]]).all()
+
+
+@pytest.mark.parametrize("model", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])
+def test_a_residual_pulled_back_leads_to_the_tip_again(model: MachineModel) -> None:
+    rows = rows_of(model, varied(model, 8))
+    link = sensitivities(model, rows, ["link"])["link"]
+    errors_mm = np.random.default_rng(0).normal(0, 1e-3, (8, model.links))
+    residual_mm = (link.tip @ errors_mm[:, :, None])[:, :, 0]
+    pulled = pull_back(link, residual_mm)
+    np.testing.assert_allclose((link.tip @ pulled[:, :, None])[:, :, 0], residual_mm, atol=1e-12)
+    if model is TRIPOD:
+        np.testing.assert_allclose(pulled, errors_mm, atol=1e-12)
+    else:
+        assert (np.linalg.norm(pulled, axis=1) <= np.linalg.norm(errors_mm, axis=1) + 1e-15).all()
+
+
+def test_shares_add_up() -> None:
+    rows = rows_of(TRIPOD, varied(TRIPOD))
+    ids = ["link_expansion", "backlash", "base_joint_position", "tool_bending", "frame_rod_expansion"]
+    fitted = [FittedEffect(LIBRARY[id_], np.full(len(LIBRARY[id_].columns(3)), 2.0)) for id_ in ids]
+    each, _ = deltas(fitted, rows, {})
+    found = shares(TRIPOD, rows, each)
+    whole = predict(TRIPOD, rows, together(list(each.values()))).tip_mm - predict(TRIPOD, rows, {}).tip_mm
+    assert list(found) == ids
+    np.testing.assert_allclose(sum(found.values()), whole, atol=1e-12)
+    alone: Deltas = each["tool_bending"]
+    by_itself = predict(TRIPOD, rows, alone).tip_mm - rows.tip_M_mm
+    np.testing.assert_allclose(found["tool_bending"], by_itself, rtol=2e-3)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
+    """Inverse kinematics of what was predicted, with everything added, gives the readings that it came from."""
+    model = MACHINES[name]
+    rows = rows_of(model, varied(model, 7))
+    machine_effects = [effect for effect in LIBRARY.values() if effect.live]
+    fitted = [
+        FittedEffect(effect, np.full(len(effect.columns(model.links)), 0.8), some_shape(effect))
+        for effect in machine_effects
+        if model is not HEXAPOD or "revolute_axes" not in effect.needs
+    ]
+    each, _ = deltas(fitted, rows, {})
+    found = together(list(each.values()))
+    shown = predict(model, rows, found)
+    machine = altered(model, rows.joint_mm, rows.frame_mm, found)
+    places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
+    pose = inverse_kinematics(machine.mechanism, *places, shown.rotation_M_P)
+    length_mm = pose.link_length_mm - machine.reading_to_length_mm
+    scale_mm = scale_for_length_mm(model.zero.link_length_mm, length_mm, machine.joint_shortening_mm)
+    np.testing.assert_allclose(scale_mm, rows.scale_mm, atol=1e-9)
+    assert np.abs(shown.tip_mm - predict(model, rows, {}).tip_mm).max() > 1e-3
+
+
+def recorded(file: Path) -> tuple[Observations, Floats]:
+    """An example recording of the tripod: its rows, and the reference less the nominal model, in um."""
+    with file.open(encoding="utf-8") as lines:
+        table = list(csv.DictReader(lines))
+    data = {name: np.array([float(row[name]) for row in table]) for name in table[0]}
+
+    def several(names: list[str], unit: float = 1.0) -> Floats:
+        return unit * np.stack([data[name] for name in names], axis=1)
+
+    scale_mm = several([f"scale_{i}_mm" for i in (1, 2, 3)])
+    movement = Movement(several([f"approach_{i}" for i in (1, 2, 3)]), 0 * scale_mm, np.zeros((len(table), 9)))
+    arguments: Mapping[str, Any] = {
+        "scale_mm": scale_mm,
+        "joint_mm": several([f"joint_{k}_um" for k in range(1, 10)], 1e-3),
+        "frame_mm": several([f"frame_{d}_um" for d in ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")], 1e-3),
+        "quantities": {k: v for k, v in data.items() if k.startswith(("temperature", "force", "pressure"))},
+        "time_s": data["time_s"],
+        "session_start": np.concatenate([[True], np.diff(data["session"]) != 0]),
+        "movement": movement,
+    }
+    rows = rows_of(TRIPOD, arguments)
+    return rows, 1e3 * (several([f"reference_{axis}_mm" for axis in "xyz"]) - rows.tip_M_mm)
+
+
+ANSWERED = ["example-link-expansion", "example-plate-bending", "example-elastic-and-backlash"]
+
+
+@pytest.mark.parametrize("name", ANSWERED)
+@pytest.mark.parametrize("part", ["train", "valid"])
+def test_the_hidden_effects_come_out_with_their_numbers(name: str, part: str) -> None:
+    """Plain least squares of the effects that are known to be hidden: their numbers, and nothing left but noise."""
+    folder = RECORDINGS / name
+    if not folder.exists():
+        pytest.skip(f"no example recordings: {folder} is not there")
+    answer = json.loads((folder / "answer.json").read_text())["effects"]
+    rows, residual_um = recorded(folder / f"{part}.csv")
+    by = sensitivities(TRIPOD, rows, list(PORTS))
+    blocks = [columns(LIBRARY[id_], rows, LIBRARY[id_].basis(rows, {}, None)[0], by).tip for id_ in answer]
+    G = 1e3 * np.concatenate(blocks, axis=2).reshape(residual_um.size, -1)
+    theta, _, rank, _ = np.linalg.lstsq(G, residual_um.ravel(), rcond=None)
+    left_um = residual_um.ravel() - G @ theta
+    assert np.sqrt((left_um**2).mean()) < 0.165  # the reference's 0.15 and the gauges' noise
+    true = np.concatenate([np.atleast_1d(value) for value in answer.values()])
+    shown = [
+        one.parameter.shown(value)[0]
+        for one, value in zip([c for id_ in answer for c in LIBRARY[id_].columns(3)], theta, strict=True)
+    ]
+    assert rank == len(true)
+    np.testing.assert_allclose(shown, true, rtol=0.04)

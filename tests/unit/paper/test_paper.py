@@ -1,0 +1,80 @@
+"""The paper's experiments run, gain what they must, and print what they found beside what the paper states."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compd.cli.main import app
+from compd.configuration import Configuration, load
+from compd.paper import drift_experiment, link_experiment, plate_experiment
+from compd.paper.reduction import Reduction, rms
+from compd.simulation.truth import strengths
+from tests.support.simulated import TRIPOD
+
+
+@pytest.fixture(scope="module")
+def tripod() -> Configuration:
+    return load(TRIPOD)
+
+
+def test_figure_18_load_and_warmth_hardly_show_with_rods_and_comparators(tripod: Configuration) -> None:
+    found = link_experiment.run(tripod, 3)
+    slope = np.polyfit(found.without.axial_N, found.without.cold_um, 1)[0]
+    # tube and screw, and the ball at the base and at the platform that no comparator is asked about
+    gives = link_experiment.TUBE_UM_PER_N + 2 * strengths.Strengths().ball_give_along_um_per_N
+    assert slope == pytest.approx(-gives, rel=0.05)  # it warms up a little meanwhile
+    assert np.ptp(found.without.axial_N) > 60.0
+    assert found.without.link_degC[-1] - found.without.link_degC[0] > 1.0
+    for reduction in link_experiment.reductions(found):
+        assert reduction.percent > 80.0
+
+
+def test_figure_20_has_136_distances_and_the_joints_gain_most_of_it(tripod: Configuration) -> None:
+    found = plate_experiment.run(tripod, 3)
+    assert len(found.nominal_mm) == 17 * 16 / 2
+    assert rms(found.joints_um) < rms(found.without_um)
+    assert rms(found.full_um) < rms(found.joints_um)
+    first = plate_experiment.reductions(found)[0]
+    assert first.percent == pytest.approx(100 * (1 - rms(found.joints_um) / rms(found.without_um)))
+    assert "32 %" in first.paper
+
+
+def test_figure_20_gains_nothing_where_the_joints_are_perfect(
+    tripod: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    perfect = replace(strengths.Strengths(), ball_runout_um=0.0, ball_give_along_um_per_N=0.0)
+    monkeypatch.setattr("compd.simulation.truth.world.Strengths", lambda: perfect)
+    found = plate_experiment.run(tripod, 3)
+    assert abs(plate_experiment.reductions(found)[0].percent) < 5.0
+
+
+def test_figure_21_the_ball_stands_still_once_the_frame_is_measured(tripod: Configuration) -> None:
+    found = drift_experiment.run(tripod, 3)
+    z, x, y = drift_experiment.reductions(found)
+    assert z.without_um > 10.0
+    assert z.without_um > max(x.without_um, y.without_um)
+    assert z.percent > 80.0
+    assert len(found.time_h) > 50
+
+
+@pytest.mark.parametrize("figure", ["fig18", "fig20", "fig21"])
+def test_command_prints_the_reduction_and_draws_a_page(tmp_path: Path, figure: str) -> None:
+    page = tmp_path / "pictures" / "page.html"
+    result = CliRunner().invoke(app, ["paper", figure, "--page", str(page)], terminal_width=160)
+    assert result.exit_code == 0, result.output
+    assert "reduction" in result.output
+    text = page.read_text(encoding="utf-8")
+    assert "The paper:" in text
+    assert text.count("Plotly.newPlot") >= 1
+    if figure == "fig20":
+        assert "32 %" in result.output
+        assert "32 %" in text
+
+
+def test_reduction_is_a_share_of_what_was_there() -> None:
+    assert Reduction("", 4.0, 1.0, "").percent == pytest.approx(75.0)

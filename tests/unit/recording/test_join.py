@@ -1,0 +1,263 @@
+"""Two clocks, two rates: the planted offset is found again, or the join is refused in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer import Typer
+from typer.testing import CliRunner
+
+from compd.arrays import FloatArray
+from compd.cli.join import join as join_command
+from compd.errors import RecordingError
+from compd.recording.clock_offset import estimate_offset
+from compd.recording.instrument_export import Track, read_track
+from compd.recording.join import Instrument, join
+from compd.recording.reader import read_recording
+from compd.recording.writer import write_recording
+from tests.support.two_clocks import Path3, path3, track_of
+
+SCALE_NOISE_MM, TRACKER_NOISE_MM = 1e-4, 0.005
+SIDECAR = {"machine": "tripod-cmm"}
+app = Typer()
+app.command()(join_command)
+
+
+@app.callback()
+def _several() -> None:
+    """Keeps `join` a command of its own, as in `compd`."""
+
+
+def gauges(path: Path, motion: Path3, time_s: FloatArray, rng: np.random.Generator, **extra: FloatArray) -> Path:
+    """A recording of gauges alone at `time_s`."""
+    scale_mm = motion.scales(time_s) + rng.normal(0.0, SCALE_NOISE_MM, (len(time_s), 3))
+    columns = {"time_s": time_s, **{f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}}
+    columns |= {f"joint_{k}_um": np.zeros(len(time_s)) for k in range(1, 10)}
+    names = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
+    columns |= {f"frame_{name}_um": np.zeros(len(time_s)) for name in names}
+    write_recording(path, {**columns, **extra}, SIDECAR)
+    return path
+
+
+def export(path: Path, track: Track, head: str = "t_s,Tracker X [mm],Tracker Y [mm],Tracker Z [mm]") -> Path:
+    rows = np.column_stack([track.time_s, track.position_mm])
+    path.write_text("\n".join([head, *(",".join(f"{value:.6f}" for value in row) for row in rows)]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("period_s", "instrument_period_s"), [(0.2, 0.1), (0.02, 0.1), (0.1, 0.013)])
+def test_offset_from_recorded_motion(period_s: float, instrument_period_s: float, seed: int) -> None:
+    """Rows that follow the motion: 1 ms, where the instrument's noise alone is worth 5 um / (40 mm/s) a sample."""
+    rng = np.random.default_rng(seed)
+    motion = path3(rng, 60, (1.5, 4.0))
+    planted_s = float(rng.uniform(-500, 500))
+    track, _ = track_of(motion, rng, planted_s, instrument_period_s, TRACKER_NOISE_MM)
+    time_s = np.arange(20.0, motion.end_s - 30.0, period_s)
+    scale_mm = motion.scales(time_s) + rng.normal(0.0, SCALE_NOISE_MM, (len(time_s), 3))
+    found = estimate_offset(time_s, scale_mm, track)
+    assert abs(found.offset_s - planted_s) < 0.001
+    assert abs(found.offset_s - planted_s) < 3 * found.std_s < 0.01
+    assert found.agreement > 0.999
+    assert found.runner_up is not None
+    assert found.runner_up[1] < 0.8
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_offset_from_one_row_per_dwell(seed: int) -> None:
+    """One row in each dwell of 1.5 to 4 s, no row in motion: a fifth of a second, and an uncertainty that says
+    that no offset within a dwell is better than another."""
+    rng = np.random.default_rng(seed)
+    motion = path3(rng, 80, (1.5, 4.0))
+    planted_s = float(rng.uniform(-500, 500))
+    track, _ = track_of(motion, rng, planted_s, 0.1, TRACKER_NOISE_MM)
+    time_s = (motion.arrive_s + motion.leave_s)[:-1] / 2 + rng.uniform(-0.3, 0.3, 79)
+    found = estimate_offset(time_s, motion.scales(time_s), track)
+    assert abs(found.offset_s - planted_s) < 0.2
+    assert 0.1 < found.std_s < 0.8
+
+
+def test_offset_from_one_link_by_interferometer() -> None:
+    rng = np.random.default_rng(3)
+    motion = path3(rng, 40, (1.0, 3.0))
+    instrument_s = np.arange(0.0, motion.end_s, 0.05)
+    length_mm = motion.scales(instrument_s)[:, 1:2] + rng.normal(0.0, 1e-4, (len(instrument_s), 1))
+    track = Track(Path("laser.csv"), instrument_s - 12.345, length_mm, ("length",), {}, 0)
+    time_s = np.arange(5.0, motion.end_s - 5.0, 0.1)
+    assert abs(estimate_offset(time_s, motion.scales(time_s), track).offset_s - 12.345) < 0.001
+
+
+def test_joined_recording_is_right_where_the_machine_dwells(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    motion = path3(rng, 60, (1.5, 4.0))
+    track, frame = track_of(motion, rng, -77.7, 0.05, TRACKER_NOISE_MM)
+    time_s = np.arange(10.0, motion.end_s + 5.0, 0.1)
+    humidity = {"humidity_pct": np.linspace(40, 50, len(time_s))}
+    recording = read_recording(gauges(tmp_path / "g.csv", motion, time_s, rng, **humidity), needs_reference=False)
+    joined = join(
+        recording, read_track(export(tmp_path / "t.csv", track), {}), tmp_path / "out.csv", Instrument(sigma_um=5)
+    )
+    found = read_recording(tmp_path / "out.csv")
+    assert found.reference is not None
+    assert (found.reference.quantity, found.reference.frame) == ("tool_position", "instrument")
+    assert found.reference_sigma_mm == pytest.approx([0.005] * 3)
+    assert found.reference_mm is not None
+    there = np.isfinite(found.reference_mm).all(axis=1)
+    assert there.sum() == joined.matched
+    assert joined.matched + sum(joined.left_out.values()) == found.rows
+    assert joined.left_out["outside the instrument's time"] >= 49
+    truth_mm = motion.tip(found.time_s[there]) @ frame[:3] + frame[3]
+    error_mm = found.reference_mm[there] - truth_mm
+    assert np.sqrt(np.mean(error_mm**2)) < 1.2 * TRACKER_NOISE_MM
+    assert np.abs(error_mm).max() < 0.05, "no row in motion among them"
+    standing = (motion.arrive_s[:, None] + 0.2 < time_s) & (time_s < motion.leave_s[:, None] - 0.2)
+    assert there[: len(time_s)][standing.any(axis=0)].mean() > 0.95, "dwells are matched"
+    assert np.array_equal(found.columns["humidity_pct"], recording.columns["humidity_pct"])
+    provenance = found.sidecar.provenance["join"]
+    assert provenance["gauges_sha256"] == recording.sha256
+    assert provenance["offset_s"] == pytest.approx(-77.7, abs=0.001)
+
+
+def standing_still(motion: Path3) -> Path3:
+    return Path3(motion.arrive_s, motion.leave_s, np.repeat(motion.target_mm[:1], len(motion.target_mm), axis=0))
+
+
+def repeating(motion: Path3) -> Path3:
+    """Ten moves, again and again, each time alike."""
+    count = len(motion.leave_s) // 10
+    cycle_s = motion.leave_s[9]
+    arrive_s = np.concatenate([motion.arrive_s[:10] + k * cycle_s for k in range(count)])
+    leave_s = np.concatenate([motion.leave_s[:10] + k * cycle_s for k in range(count)])
+    return Path3(arrive_s, leave_s, np.tile(motion.target_mm[:10], (count, 1)))
+
+
+def test_ambiguous_or_absent_motion_is_refused() -> None:
+    rng = np.random.default_rng(5)
+    motion = path3(rng, 60, (1.5, 4.0))
+    other = path3(rng, 60, (1.5, 4.0))
+    time_s = np.arange(5.0, motion.end_s - 60.0, 0.2)
+    track, _ = track_of(motion, rng, 30.0, 0.1, TRACKER_NOISE_MM)
+    again, _ = track_of(repeating(motion), rng, 30.0, 0.1, TRACKER_NOISE_MM)
+    again_s = np.arange(5.0, repeating(motion).leave_s[39], 0.2)
+    still, _ = track_of(standing_still(motion), rng, 30.0, 0.1, 0.0001)
+    noise_mm = rng.normal(0.0, SCALE_NOISE_MM, (len(time_s), 3))
+    for seconds, scale_mm, seen, wanted in (
+        (time_s, standing_still(motion).scales(time_s) + noise_mm, track, "the machine stands still"),
+        (time_s, motion.scales(time_s), still, "the instrument stands still"),
+        (again_s, repeating(motion).scales(again_s), again, "two offsets fit equally well"),
+        (time_s, other.scales(time_s), track, "no offset makes the instrument follow"),
+        (time_s[:9], motion.scales(time_s[:9]), track, "too few rows"),
+    ):
+        with pytest.raises(RecordingError, match=wanted) as caught:
+            estimate_offset(seconds, scale_mm, seen)
+        assert "--offset S" in str(caught.value)
+
+
+def test_offset_by_hand_and_refusals_write_nothing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    motion = standing_still(path3(rng, 20, (1.5, 4.0)))
+    track, _ = track_of(motion, rng, 30.0, 0.1, 0.001)
+    path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, 40.0, 0.5), rng)
+    export(tmp_path / "t.csv", track)
+    arguments = ["join", str(path), str(tmp_path / "t.csv"), str(tmp_path / "out.csv")]
+    result = CliRunner().invoke(app, arguments)
+    assert isinstance(result.exception, RecordingError)
+    assert "stands still" in str(result.exception)
+    result = CliRunner().invoke(app, [*arguments, "--offset", "1000"])
+    assert isinstance(result.exception, RecordingError)
+    assert "no row matches" in str(result.exception)
+    assert not (tmp_path / "out.csv").exists()
+    assert not (tmp_path / "out.yaml").exists()
+    result = CliRunner().invoke(app, [*arguments, "--offset", "30"])
+    assert result.exit_code == 0, result.output
+    assert "clock offset +30.0000 s, given" in result.output
+    assert "70 of 70 rows have a reference now" in result.output
+    again = CliRunner().invoke(app, [*arguments, "--offset", "30"])
+    assert isinstance(again.exception, RecordingError)
+    assert "is there already" in str(again.exception)
+
+
+def test_command_shows_the_offset_and_its_uncertainty(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    motion = path3(rng, 30, (1.5, 4.0))
+    track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
+    path = gauges(tmp_path / "g.csv", motion, np.arange(0.0, motion.end_s, 0.2), rng)
+    names = export(tmp_path / "t.csv", track, "when_s,a,b,c")
+    arguments = ["join", str(path), str(names), str(tmp_path / "out.csv"), "--time", "when_s", "--unit", "mm"]
+    result = CliRunner().invoke(app, [*arguments, "--x", "a", "--y", "b", "--z", "c", "--frame", "machine"])
+    assert result.exit_code == 0, result.output
+    assert "clock offset +4.5" in result.output
+    assert "s (one standard uncertainty)" in result.output
+    assert "x from 'a'" in result.output
+    found = read_recording(tmp_path / "out.csv")
+    assert found.reference is not None
+    assert found.reference.frame == "machine"
+
+
+def test_exclusions_keep_their_rows(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    motion = path3(rng, 10, (1.5, 4.0))
+    path = gauges(tmp_path / "g.csv", motion, np.arange(0.0, motion.end_s, 0.2), rng)
+    lines = path.read_text().split("\n")
+    path.write_text("\n".join([*lines[:5], "", *lines[5:]]))
+    path.with_suffix(".yaml").write_text("machine: tripod-cmm\nexcluded_rows: [{row: 9, reason: door}]\n")
+    recording = read_recording(path, needs_reference=False)
+    track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
+    join(recording, track, tmp_path / "out.csv", Instrument(), 4.5)
+    found = read_recording(tmp_path / "out.csv")
+    assert found.time_s[found.excluded] == recording.time_s[recording.excluded]
+    assert list(found.sidecar.excluded.values()) == ["door"]
+
+
+EXPORTS: dict[str, tuple[str, list[str]]] = {
+    "no time": ("a_mm,x_mm\n1,2\n2,3\n", ["no column is a time by its name", "--time"]),
+    "no position": ("t_s,a,b\n1,2,3\n2,3,4\n", ["no column is a position or a length", "--x, --y, --z"]),
+    "two x": ("t_s,x_mm,raw_x_mm\n1,2,3\n2,3,4\n", ["2 columns may be x", "x_mm, raw_x_mm", "--x"]),
+    "no unit": ("t_s,x\n1,2\n2,3\n", ["no unit of x in its name", "--unit"]),
+    "time without unit": ("time,x_mm\n1,2\n2,3\n", ["no unit of time"]),
+    "time backwards": ("t_s,x_mm\n1,2\n3,3\n2,4\n4,5\n", ["row 4: time does not rise"]),
+    "decimal comma": ("t_s;x_mm\n1,5;2,5\n2,5;3,5\n", ["separated by semicolons", "decimal comma"]),
+    "clock time": ("t_s,x_mm\n12:00:01,2\n12:00:02,3\n", ["a time of day"]),
+    "two rows": ("t_s,x_mm\n1,2\n2,3\n", ["2 rows have a time and x"]),
+}
+
+
+@pytest.mark.parametrize("mistake", EXPORTS)
+def test_export_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
+    text, wanted = EXPORTS[mistake]
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        read_track(path, {})
+    for part in wanted:
+        assert part in str(caught.value)
+
+
+def test_export_is_read_in_its_own_units(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(
+        "Time [ms],X (m),Y (µm),temperature_degC\n1000,1,2000,20\n2000,1.5,,20\n3000,2,4000,20\n4000,2,4000,20\n"
+    )
+    track = read_track(path, {})
+    assert track.axes == ("x", "y")
+    assert track.time_s == pytest.approx([1.0, 3.0, 4.0])
+    assert track.position_mm[0] == pytest.approx([1000.0, 2.0])
+    assert track.left_out == 1
+
+
+def test_length_needs_its_link(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    motion = path3(rng, 40, (1.0, 3.0))
+    path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, motion.end_s - 5.0, 0.1), rng)
+    recording = read_recording(path, needs_reference=False)
+    seen_s = np.arange(0.0, motion.end_s, 0.05)
+    track = Track(tmp_path / "l.csv", seen_s - 12.0, motion.scales(seen_s)[:, :1], ("length",), {}, 0)
+    with pytest.raises(RecordingError, match="--link"):
+        join(recording, track, tmp_path / "out.csv", Instrument())
+    join(recording, track, tmp_path / "out.csv", Instrument(link=1))
+    found = read_recording(tmp_path / "out.csv")
+    assert found.reference_links == (1,)
+    assert found.reference is not None
+    assert found.reference.quantity == "link_length"

@@ -1,0 +1,310 @@
+"""Reading what is right: every variant of the format, the examples, and what was written."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from compd.cli.recording import recording
+from compd.configuration import load
+from compd.errors import RecordingError
+from compd.recording.reader import check_against, read_recording
+from compd.recording.recording import last_direction
+from compd.recording.writer import write_recording
+from tests.support.paths import ROOT, SHARED
+from tests.support.recordings import HEADER, SIDECAR, Edit, cell, column, csv_text, header, put, without
+
+TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
+EXAMPLES = ("elastic-and-backlash", "link-expansion", "not-in-the-library", "nothing-missing", "plate-bending")
+NO_REFERENCE = without("reference_x_mm", "reference_y_mm", "reference_z_mm")
+
+
+@pytest.mark.parametrize("part", ["train", "valid"])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example_reads_without_complaint(name: str, part: str) -> None:
+    path = SHARED / "recordings" / f"example-{name}" / f"{part}.csv"
+    if not path.is_file():
+        pytest.skip(f"needs the example recordings in {SHARED}")
+    found = read_recording(path, load(TRIPOD))
+    assert found.warnings == ()
+    assert found.left_out == {}
+    assert found.scale_mm is not None
+    assert found.joint_mm is not None
+    assert found.frame_mm is not None
+    shapes = found.scale_mm.shape[1], found.joint_mm.shape[1], found.frame_mm.shape[1], found.reference_axes
+    assert shapes == (3, 9, 9, ("x", "y", "z"))
+    assert found.usable([*found.gauge_columns, *found.reference_columns]).mask.all()
+    assert "temperature_link_2_degC" in found.quantities
+    assert found.reference_sigma_mm == pytest.approx([0.00015] * 3)
+    assert "joint_1_um" not in found.quantities
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_direction_from_the_scales_is_the_recorded_one(name: str) -> None:
+    """Most rows: an axis may have gone out and back between two rows, which only the column knows."""
+    path = SHARED / "recordings" / f"example-{name}" / "train.csv"
+    if not path.is_file():
+        pytest.skip(f"needs the example recordings in {SHARED}")
+    found = read_recording(path)
+    assert found.scale_mm is not None
+    assert found.approach is not None
+    derived = last_direction(found.scale_mm, found.session)
+    there = np.isfinite(derived)
+    assert there.mean() > 0.95
+    assert (derived[there] == found.approach[there]).mean() > 0.95
+
+
+def test_real_recording_reads_without_complaint() -> None:
+    path = SHARED / "real" / "voron-frame-expansion.csv"
+    if not path.is_file():
+        pytest.skip(f"needs the real recording in {SHARED}")
+    found = read_recording(path)
+    assert found.sidecar.external
+    assert found.warnings == ()
+    assert (found.rows, found.reference_axes) == (1203, ("z",))
+    assert found.scale_mm is None
+    assert found.approach is None
+    assert found.model_mm is not None
+    assert not found.model_mm.any()
+    assert sorted(set(found.fold.tolist())) == list(range(8))
+    assert found.visit is not None
+    for visit in set(found.visit.tolist()):
+        assert len(set(found.fold[found.visit == visit].tolist())) == 1, "a visit stays in one fold"
+
+
+def test_units_and_order(tmp_path: Path) -> None:
+    text = cell(2, "joint_3_um", "-6.61")(cell(2, "frame_u6_um", "1.25")(cell(2, "frame_t1_um", "2.5")(csv_text())))
+    found = read_recording(put(tmp_path, text))
+    assert found.joint_mm is not None
+    assert found.frame_mm is not None
+    assert found.joint_mm[0, 2] == float("-0.00661"), "the very number that a gauge in mm delivers"
+    assert found.frame_mm[0, [0, 8]].tolist() == [0.0025, 0.00125]
+    assert list(found.quantities) == ["temperature_room_degC", "pressure_hPa"]
+    assert found.row[[0, -1]].tolist() == [2, 21]
+    assert found.session is not None
+    assert found.session.tolist() == [1] * 10 + [2] * 10
+
+
+TOLERATED: dict[str, Edit] = {
+    "byte order mark": lambda t: "\ufeff" + t,
+    "Windows line ends": lambda t: t.replace("\n", "\r\n"),
+    "spaces around cells": lambda t: t.replace(",", " , "),
+    "trailing empty rows": lambda t: t + "," * (len(HEADER) - 1) + "\n" + "\n\n",
+    "trailing empty columns": lambda t: t.replace("\n", ",,\n"),
+    "quoted numbers": lambda t: t.replace("20.104", '"20.104"'),
+    "no line end at the end": lambda t: t[:-1],
+    "1.0 for a number": lambda t: t.replace("\n10,1,", "\n10.0,1.0,"),
+}
+
+
+@pytest.mark.parametrize("habit", TOLERATED)
+def test_what_means_one_thing_only_is_taken(tmp_path: Path, habit: str) -> None:
+    text = TOLERATED[habit](csv_text())
+    assert text != csv_text()
+    (tmp_path / "plain").mkdir()
+    plain = read_recording(put(tmp_path / "plain", csv_text()))
+    found = read_recording(put(tmp_path, text))
+    assert list(found.columns) == list(plain.columns)
+    assert all(np.array_equal(found.columns[name], plain.columns[name]) for name in plain.columns)
+    assert np.array_equal(found.row, plain.row)
+    assert found.left_out == {}
+    assert found.warnings == ()
+
+
+def test_empty_cells_are_left_out_where_needed_and_counted(tmp_path: Path) -> None:
+    text = csv_text()
+    for edit in (
+        cell(4, "scale_2_mm", ""),
+        cell(5, "scale_2_mm", ""),
+        cell(5, "pressure_hPa", ""),
+        cell(6, "time_s", ""),
+        cell(9, "session", ""),
+    ):
+        text = edit(text)
+    lines = text.split("\n")
+    lines.insert(11, "")
+    sidecar = SIDECAR + "excluded_rows: [{row: 5, reason: door}, {rows: 7-8, reason: beam cut}]\n"
+    found = read_recording(put(tmp_path, "\n".join(lines), sidecar))
+    assert found.left_out == {"time_s is empty": 1, "empty row": 1}
+    assert found.rows == 19
+    assert np.isfinite(found.time_s).all()
+    assert found.row[found.excluded].tolist() == [5, 7, 8]
+    usable = found.usable(["scale_2_mm", "pressure_hPa"])
+    assert usable.left_out == {"excluded by a person": 3, "scale_2_mm is empty": 1}
+    assert usable.mask.sum() == 15
+    assert found.usable(["scale_1_mm"]).mask.sum() == 16
+    assert found.session is not None
+    assert found.session[found.row == 9] == -1
+    assert found.sidecar.excluded == {5: "door", 7: "beam cut", 8: "beam cut"}
+
+
+def test_any_subset_of_axes_and_own_sigmas(tmp_path: Path) -> None:
+    sidecar = SIDECAR.replace("0.15", "[0.1, 0.3]").replace("frame: machine", "frame: instrument")
+    found = read_recording(put(tmp_path, without("reference_y_mm")(csv_text()), sidecar))
+    assert found.reference_axes == ("x", "z")
+    assert found.reference_mm is not None
+    assert found.reference_mm.shape == (20, 2)
+    assert found.reference_sigma_mm == pytest.approx([0.0001, 0.0003])
+    assert found.reference is not None
+    assert found.reference.frame == "instrument"
+    unknown = read_recording(put(tmp_path, csv_text(), SIDECAR.replace("  sigma_um: 0.15\n", "")))
+    assert np.isnan(unknown.reference_sigma_mm).all()
+
+
+def test_pose_with_attitude(tmp_path: Path) -> None:
+    rows = csv_text().splitlines()
+    rows = [
+        rows[0] + ",reference_rx_rad,reference_ry_rad,reference_rz_rad",
+        *(row + ",0.1,0.2,0.3" for row in rows[1:]),
+    ]
+    found = read_recording(put(tmp_path, "\n".join(rows), SIDECAR.replace("tool_position", "tool_pose")))
+    assert found.reference_rotation_rad is not None
+    assert found.reference_rotation_rad[3].tolist() == [0.1, 0.2, 0.3]
+
+
+def test_link_length_needs_no_frame(tmp_path: Path) -> None:
+    frame = [name for name in HEADER if name.startswith("frame_")]
+    text = header("reference_x_mm", "reference_link_2_mm")(
+        without("reference_y_mm", "reference_z_mm", *frame)(csv_text())
+    )
+    found = read_recording(put(tmp_path, text, "machine: tripod-cmm\nreference: {quantity: link_length}\n"))
+    assert found.reference_links == (2,)
+    assert found.reference_link_mm is not None
+    assert found.reference_link_mm.shape == (20, 1)
+    assert found.frame_mm is None
+    assert found.reference_mm is None
+
+
+def test_ball_plate(tmp_path: Path) -> None:
+    text = header("pressure_hPa", "ball")(NO_REFERENCE(csv_text()).replace("1013.25", "17"))
+    (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n18,0,0,0\n17,50.001,-50,0.5\n")
+    sidecar = "machine: tripod-cmm\nreference: {quantity: ball_plate, balls: plate.csv}\n"
+    found = read_recording(put(tmp_path, text, sidecar))
+    assert found.reference is not None
+    assert found.reference.frame == "instrument", "a plate's coordinates are its own"
+    assert found.reference_mm is not None
+    assert found.reference_mm[5].tolist() == [50.001, -50.0, 0.5]
+    before = found.sha256
+    (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n18,0,0,0\n17,50.002,-50,0.5\n")
+    assert read_recording(tmp_path / "run.csv").sha256 != before, "the plate is part of the provenance"
+
+
+def test_external_model_needs_no_gauges(tmp_path: Path) -> None:
+    text = "time_s,wind_m_per_s,model_x_mm,reference_x_mm\n0,1,2,3\n1,1,2,3.5\n"
+    sidecar = SIDECAR.replace("tripod-cmm", "external")
+    found = read_recording(put(tmp_path, text, sidecar))
+    assert found.model_mm is not None
+    assert found.model_mm.tolist() == [[2.0], [2.0]]
+    assert list(found.quantities) == ["wind_m_per_s"]
+
+
+def test_points_may_have_names(tmp_path: Path) -> None:
+    text = header("visit", "point")(csv_text())
+    lines = text.split("\n")
+    lines[1:3] = [line.replace(",1,0,", ",1,P-07,") for line in lines[1:3]]
+    found = read_recording(put(tmp_path, "\n".join(lines)))
+    assert found.point is not None
+    assert found.point[0] == found.point[1] != found.point[2]
+
+
+def test_gauges_alone_are_for_join_only(tmp_path: Path) -> None:
+    path = put(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
+    with pytest.raises(RecordingError, match="compd join"):
+        read_recording(path)
+    assert read_recording(path, needs_reference=False).reference is None
+
+
+def test_implausible_values_are_warned_of_not_refused(tmp_path: Path) -> None:
+    text = column("temperature_room_degC", "68")(cell(3, "joint_1_um", "5000")(csv_text()))
+    warnings = "\n".join(str(warning) for warning in read_recording(put(tmp_path, text)).warnings)
+    assert "joint_1_um (G), row 3: implausible" in warnings
+    assert "temperature_room_degC (Y), rows 2, 3, 4 and 17 more rows" in warnings
+
+
+def test_unknown_unit_is_kept_and_warned_of(tmp_path: Path) -> None:
+    found = read_recording(put(tmp_path, header("pressure_hPa", "coolant_flow_foo")(csv_text())))
+    assert "coolant_flow_foo" in found.quantities
+    assert "ends in no unit that is known" in str(found.warnings[0])
+
+
+def test_check_against_counts_gauges(tmp_path: Path) -> None:
+    found = read_recording(put(tmp_path, without("joint_9_um")(csv_text())))
+    with pytest.raises(RecordingError, match="8 joint comparator columns, tripod-cmm has 9"):
+        check_against(found, load(TRIPOD))
+
+
+def test_direction_ignores_creep_but_adds_it_up() -> None:
+    scale_mm = np.array([[0.0, 1.0, 1.0002, 0.9998, 0.5, 0.4996, 0.4992, 0.4988, 0.5]]).T
+    assert np.array_equal(last_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True)
+
+
+def test_check_prints_what_there_is(tmp_path: Path) -> None:
+    result = CliRunner().invoke(recording, ["check", str(put(tmp_path, csv_text()))])
+    assert result.exit_code == 0
+    assert "20 rows" in result.output
+    assert "3 scales, 9 joint comparators, 9 frame comparators" in result.output
+
+
+number = st.floats(-1000, 1000, allow_nan=False)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(data=st.data())
+def test_what_is_written_is_read_back(tmp_path: Path, data: st.DataObject) -> None:
+    rows = data.draw(st.integers(2, 12))
+    empty_or_number = st.one_of(st.just(math.nan), number)
+
+    def drawn(cells: st.SearchStrategy[float]) -> np.ndarray:
+        return np.array(data.draw(st.lists(cells, min_size=rows, max_size=rows)))
+
+    columns = {"time_s": np.cumsum(drawn(st.floats(0.001, 100.0))).round(6)}
+    columns |= {name: drawn(number) for name in HEADER if name.startswith(("scale", "joint", "frame"))}
+    columns |= {"fan_speed_rpm": drawn(empty_or_number), "session": drawn(st.integers(0, 9))}
+    columns |= {f"reference_{axis}_mm": drawn(number) for axis in "xyz"}
+    columns |= {f"approach_{i}": drawn(st.sampled_from([-1.0, 1.0, math.nan])) for i in (1, 2, 3)}
+    sidecar = {"machine": "tripod-cmm", "reference": {"quantity": "tool_position", "frame": "instrument"}}
+    path = tmp_path / "round.csv"
+    write_recording(path, columns, sidecar, overwrite=True)
+    found = read_recording(path)
+    assert list(found.columns) == list(columns)
+    for name, values in columns.items():
+        decimals = 6 if name.endswith("_um") else 9 if name.endswith("_mm") else 15
+        np.testing.assert_array_equal(found.columns[name], np.round(values, decimals) if decimals < 15 else values)
+    assert [file.name for file in sorted(tmp_path.iterdir())] == ["round.csv", "round.yaml"]
+
+
+def test_writer_refuses_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    sidecar = {"machine": "tripod-cmm"}
+    for columns, wanted in (
+        ({"time_s": [0, 1], "scale_1_um": [1, 2]}, "no column of the format"),
+        ({"time_s": [0, 1], "scale_1_mm": [1]}, "not as long as the others"),
+        ({"time_s": [0, 0], "scale_1_mm": [1, 2]}, "does not rise"),
+        ({"time_s": [0, math.nan], "scale_1_mm": [1, 2]}, "is missing"),
+        ({"time_s": [0, 1], "scale_1_mm": [1, math.inf]}, "infinite"),
+    ):
+        with pytest.raises(RecordingError, match=wanted):
+            write_recording(path, columns, sidecar)
+        assert list(tmp_path.iterdir()) == []
+    path.write_text("mine")
+    with pytest.raises(RecordingError, match="is there already"):
+        write_recording(path, {"time_s": [0, 1]}, sidecar)
+    assert path.read_text() == "mine"
+    with pytest.raises(RecordingError, match="cannot be written to"):
+        write_recording(tmp_path / "nowhere" / "run.csv", {"time_s": [0, 1]}, sidecar)
+
+
+def test_failed_second_file_leaves_what_was_there(tmp_path: Path) -> None:
+    """The CSV's place is taken by a directory: nothing can be renamed onto it."""
+    path = tmp_path / "run.csv"
+    path.mkdir()
+    (path / "keep").touch()
+    with pytest.raises(RecordingError, match="cannot be written to"):
+        write_recording(path, {"time_s": [0, 1]}, {"machine": "x"}, overwrite=True)
+    assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.csv"]

@@ -1,0 +1,218 @@
+"""Simulated campaigns: recordings in the format, with what was asked for in them and nothing else."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compd.cli.main import app
+from compd.configuration import load
+from compd.errors import CompdError
+from compd.recording.reader import read_recording
+from compd.recording.recording import Recording
+from compd.simulation.campaign.campaign import Campaign
+from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, plan
+from compd.simulation.campaign.row_log import LoggedRows
+from compd.simulation.campaign.simulated_recording import Recorded, record
+from compd.simulation.campaign.sizing import Sizing
+from compd.simulation.causes.catalogue import CAUSES, LEAST_FLOORS, MOST_FLOORS, HiddenCause, asked, build, drawn
+from compd.simulation.truth.instruments import BALLS, TRACKER_SIGMA_UM, ball_plate_mm
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.strengths import NOTHING, SEEN, SEEN_WITHOUT_NOISE
+from tests.support.paths import SHARED
+from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, wiring
+
+EXAMPLE = SHARED / "recordings" / "example-nothing-missing" / "train.csv"
+
+
+@pytest.fixture(scope="module")
+def machine() -> Mechanism:
+    return Mechanism(tripod())
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    return record(load(TRIPOD), 3, [HiddenCause("link_expansion", None, 4.0)])
+
+
+def column(recorded: Recorded, name: str) -> Any:
+    return np.array(recorded.columns[name], dtype=float)
+
+
+def test_columns_are_those_of_the_example_recordings(recorded: Recorded) -> None:
+    if not EXAMPLE.exists():
+        pytest.skip(f"the example recordings are not at {EXAMPLE.parent.parent}")
+    with EXAMPLE.open(encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file))
+    assert set(recorded.columns) == set(header)
+    assert 0.8 * len(rows) < len(recorded.columns["time_s"]) < 1.3 * len(rows)
+
+
+def test_sessions_points_repeats_and_loads(recorded: Recorded) -> None:
+    time_s, session, point, visit = (column(recorded, name) for name in ("time_s", "session", "point", "visit"))
+    assert np.all(np.diff(time_s) > 0)
+    assert np.unique(session).tolist() == list(range(1, SESSIONS + 1))
+    assert np.diff(time_s)[np.diff(session) > 0] == pytest.approx(GAP_S, rel=0.02)
+    again = np.diff(visit) == 0
+    assert 0.1 < again.mean() < 0.3
+    assert np.all(point[:-1][again] == point[1:][again])
+    for number in np.unique(point[np.isfinite(point)]):
+        assert len(np.unique(session[point == number])) > 1  # revisited in other weather
+    loaded = np.any([column(recorded, f"force_{axis}_N") != 0 for axis in "xyz"], axis=0)
+    assert 0.35 < loaded.mean() < 0.55
+    for link in (1, 2, 3):
+        forward = (column(recorded, f"approach_{link}") > 0).mean()
+        assert 0.3 < forward < 0.7
+    for place in ("link_1", "link_2", "link_3", "platform", "tool", "frame", "base"):
+        assert np.ptp(column(recorded, f"temperature_{place}_degC")) > 2.0
+
+
+def test_immediate_repeats_scatter_as_the_tracker_does(recorded: Recorded) -> None:
+    again = np.diff(column(recorded, "visit")) == 0
+    differences = np.concatenate([np.diff(column(recorded, f"reference_{axis}_mm"))[again] for axis in "xyz"])
+    sigma_um = 1.4826 * np.median(np.abs(differences)) / np.sqrt(2) * 1e3
+    assert sigma_um == pytest.approx(TRACKER_SIGMA_UM, rel=0.15)
+
+
+def test_a_pass_moves_at_constant_speed(recorded: Recorded) -> None:
+    time_s, scale_mm = column(recorded, "time_s"), column(recorded, "scale_1_mm")
+    quick = np.diff(time_s) < 0.25
+    speed = np.abs(np.diff(scale_mm)[quick] / np.diff(time_s)[quick])
+    assert quick.sum() > 20
+    assert speed.max() < 21.0
+    assert np.unique(np.round(speed[speed > 0.5], 0)).size > 3
+
+
+def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
+    days = plan(machine, 3)
+    found = Campaign(tripod(), wiring(), days, 3, NOTHING, sigma_um=TRACKER_SIGMA_UM, outlier_share=0.01).run()
+    true = Campaign(tripod(), wiring(), days, 3, NOTHING).run()
+    names = [f"reference_{axis}_mm" for axis in "xyz"]
+    wrong_um = 1e3 * np.array([np.array(found.columns[n]) - np.array(true.columns[n]) for n in names])
+    far = np.abs(wrong_um).max(axis=0) > 6 * TRACKER_SIGMA_UM
+    assert 0.002 < far.mean() < 0.02
+    assert np.std(wrong_um[:, ~far]) == pytest.approx(TRACKER_SIGMA_UM, rel=0.1)
+
+
+def test_gauges_explain_a_machine_without_hidden_causes(machine: Mechanism) -> None:
+    for geometry, wires in ((tripod(), wiring()), (hexapod(), wiring(HEXAPOD))):
+        sizing = Sizing(geometry, wires, 4)
+        rows = Campaign(geometry, wires, sizing.plan.thinned(5), 4, SEEN_WITHOUT_NOISE).run()
+        assert rows.error_um() < 1e-3
+        unseen = replace(SEEN_WITHOUT_NOISE, platform_expansion_ppm_per_K=10.0)
+        assert Campaign(geometry, wires, sizing.plan.thinned(5), 4, unseen).run().error_um() > 0.1
+
+
+@pytest.mark.parametrize(
+    "name", ["link_expansion", "backlash", "joint_contact", "reference_drift", "humidity_swelling"]
+)
+def test_a_cause_is_as_strong_as_it_takes(name: str) -> None:
+    sizing = Sizing(tripod(), wiring(), 5)
+    sized = sizing.cause(HiddenCause(name, None, 3.0))
+    assert sized.floors == pytest.approx(3.0, rel=0.06)
+    assert CAUSES[name].least <= abs(sized.cause.strength) <= CAUSES[name].most
+    given = sizing.cause(HiddenCause(name, sized.cause.strength))
+    assert given.floors == pytest.approx(sized.floors, rel=1e-9)
+
+
+def test_weak_disturbances_are_two_and_weak(recorded: Recorded) -> None:
+    sizing = Sizing(tripod(), wiring(), 3)
+    assert len(recorded.weak) == 2
+    assert "link_expansion" not in [cause.id for cause in recorded.weak]
+    for cause in recorded.weak:
+        again = build(cause.id, cause.strength, sizing.mechanism, 3)
+        assert sizing.floors(again) == pytest.approx(0.2, rel=0.1)
+
+
+def test_what_is_hidden_follows_from_its_number(machine: Mechanism) -> None:
+    found = [drawn(seed, machine) for seed in range(300)]
+    assert found == [drawn(seed, machine) for seed in range(300)]
+    assert {one.id for one in found} == set(CAUSES)
+    assert all(LEAST_FLOORS <= one.floors <= MOST_FLOORS for one in found)
+    outside = np.mean([not CAUSES[one.id].in_library for one in found])
+    assert 0.1 < outside < 0.3
+    without_axes = Mechanism(hexapod())
+    assert "revolute_axis_tilt" not in {drawn(seed, without_axes).id for seed in range(300)}
+
+
+def test_what_is_asked_for() -> None:
+    stiffness, backlash = asked(["link_elasticity=25", "backlash"])
+    assert stiffness == HiddenCause("link_elasticity", 1 / 25)
+    assert backlash == HiddenCause("backlash", None)
+    with pytest.raises(CompdError) as caught:
+        asked(["witchcraft=1", "backlash=much", "link_elasticity=0"])
+    assert len(caught.value.problems) == 3
+
+
+def test_the_same_seed_brings_home_the_same(machine: Mechanism) -> None:
+    def rows() -> LoggedRows:
+        days = plan(machine, 6).thinned(4)
+        causes = [build("backlash", 1.0, machine, 6)]
+        return Campaign(tripod(), wiring(), days, 6, SEEN, causes, sigma_um=0.15, outlier_share=0.01).run()
+
+    first, again = rows(), rows()
+    for name, values in first.columns.items():
+        np.testing.assert_array_equal(values, again.columns[name])
+
+
+def test_other_days_are_on_the_same_machine(recorded: Recorded) -> None:
+    other = record(load(TRIPOD), 3, [HiddenCause("link_expansion", recorded.hidden[0].cause.strength)], other_days=1)
+    assert {cause.id: cause.values for cause in recorded.weak} == {cause.id: cause.values for cause in other.weak}
+    there, here = (column(one, "reference_x_mm")[:50] for one in (recorded, other))
+    assert np.abs(there - here).max() > 1.0
+
+
+def test_balls_of_a_plate_are_apart_and_within_reach(machine: Mechanism) -> None:
+    balls = ball_plate_mm(machine.tip0_M)
+    apart = np.linalg.norm(balls[:, None] - balls, axis=2) + 1e3 * np.eye(BALLS)
+    assert balls.shape == (BALLS, 3)
+    assert apart.min() > 20.0
+
+
+@pytest.mark.parametrize(
+    ("config", "options", "quantity"),
+    [
+        (TRIPOD, ["--hidden", "7"], "tool_position"),
+        (TRIPOD, ["--effect", "link_expansion=11", "--reference", "interferometer"], "link_length"),
+        (TRIPOD, ["--effect", "backlash", "--reference", "ball_plate"], "ball_plate"),
+        (HEXAPOD, ["--effect", "humidity_swelling"], "tool_position"),
+    ],
+)
+def test_command_writes_what_the_workbench_reads(
+    tmp_path: Path, config: Path, options: list[str], quantity: str
+) -> None:
+    out = tmp_path / "days.csv"
+    result = CliRunner().invoke(app, ["campaign", str(config), "--out", str(out), "--seed", "2", *options])
+    assert result.exit_code == 0, result.output
+    recording = read_recording(out, load(config))
+    assert recording.reference is not None
+    assert recording.reference.quantity == quantity
+    assert recording.rows > 400
+    answer = json.loads((tmp_path / "days.answer.json").read_text(encoding="utf-8"))
+    (name,) = answer["effects"]
+    assert answer["kind"] == ("library" if CAUSES[name].in_library else "outside")
+    assert answer["answers"] == ([name] if CAUSES[name].in_library else [])
+    assert len(answer["weak_disturbances"]) == 2
+    if "--hidden" in options:
+        assert name not in result.output  # under seal
+    if quantity == "link_length":
+        assert recording.reference_link_mm is not None
+        assert _expansion_ppm_per_K(recording) == pytest.approx(11.0, rel=0.1)
+
+
+def _expansion_ppm_per_K(recording: Recording) -> float:
+    """Of link 1, from what the interferometer shows beyond scale and comparators, equation (1)."""
+    columns = recording.columns
+    warm_K = columns["temperature_link_1_degC"] - 20.0
+    measured_um = columns["joint_1_um"] + (columns["joint_2_um"] + columns["joint_3_um"]) / 2
+    grown_um = 1e3 * (columns["reference_link_1_mm"] - columns["scale_1_mm"]) + measured_um
+    length_mm = Mechanism(tripod()).lengths0_mm[0] + columns["scale_1_mm"]
+    slope, *_ = np.linalg.lstsq((length_mm * warm_K * 1e-3)[:, None], grown_um, rcond=None)
+    return float(slope[0])

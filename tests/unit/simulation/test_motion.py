@@ -1,0 +1,92 @@
+"""Drives: trapezoids that arrive, setpoints that are followed within speed and acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, SPEED_MM_PER_S, Follower, Move, Tour
+
+
+@pytest.mark.parametrize("way_mm", [0.001, 3.0, 150.0])
+def test_a_move_keeps_speed_and_acceleration_and_arrives(way_mm: float) -> None:
+    move = Move(np.array([1.0, -2.0, 0.0]), np.array([1.0 + way_mm, -2.0 - way_mm / 3, 0.0]))
+    times_s = np.linspace(0.0, move.duration_s, 4001)
+    path_mm = np.array([move.position_mm(time_s) for time_s in times_s])
+    step_s = times_s[1]
+    speed = np.diff(path_mm, axis=0) / step_s
+    np.testing.assert_array_equal(path_mm[0], move.start_mm)
+    np.testing.assert_array_equal(path_mm[-1], move.end_mm)
+    assert np.abs(speed).max() <= SPEED_MM_PER_S * (1 + 1e-9)
+    assert np.abs(np.diff(speed, axis=0)).max() / step_s <= ACCELERATION_MM_PER_S2 * (1 + 1e-3)
+    assert np.abs(speed[-1]).max() < 2 * ACCELERATION_MM_PER_S2 * step_s
+
+
+def test_a_move_to_where_it_is_takes_no_time() -> None:
+    here = np.array([1.0, 2.0])
+    assert Move(here, here).duration_s == 0.0
+    np.testing.assert_array_equal(Move(here, here).position_mm(0.0), here)
+
+
+def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
+    points_mm = np.array([[5.0, 0.0], [0.0, 9.0], [-4.0, -4.0]])
+    tour = Tour(np.zeros(2), points_mm, 1.0, np.random.default_rng(1))
+    seen: list[int] = []
+    moved_s = 0.0
+    for _ in range(3000):
+        moved_s += tour.advance(0.01)
+        if tour.phase == "dwelling":
+            np.testing.assert_array_equal(tour.position_mm, points_mm[tour.point - 1])
+            if not seen or seen[-1] != tour.point:
+                seen.append(tour.point)
+    assert set(seen) == {1, 2, 3}
+    assert 0 < moved_s < 30.0
+    assert 30.0 - moved_s == pytest.approx(len(seen), abs=1.1)  # a second at each point
+
+
+def test_a_tour_does_not_depend_on_the_step() -> None:
+    points_mm = np.random.default_rng(4).uniform(-20, 20, (5, 3))
+    one = Tour(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    many = Tour(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    moved_s = one.advance(40.0)
+    assert sum(many.advance(0.008) for _ in range(5000)) == pytest.approx(moved_s, abs=1e-6)
+    assert one.point == many.point
+    np.testing.assert_allclose(one.position_mm, many.position_mm, atol=1e-6)
+
+
+@pytest.mark.parametrize("step_s", [0.001, 0.02, 0.5])
+def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
+    drives = Follower(np.zeros(3))
+    drives.setpoint_mm = np.array([40.0, -0.002, 0.0])
+    positions = [drives.position_mm]
+    while drives.phase == "moving":
+        drives.advance(step_s)
+        positions.append(drives.position_mm)
+        assert len(positions) * step_s < 10.0
+    np.testing.assert_array_equal(drives.position_mm, drives.setpoint_mm)
+    path_mm = np.array(positions)
+    assert np.abs(np.diff(path_mm, axis=0)).max() <= SPEED_MM_PER_S * step_s * (1 + 1e-9)
+    assert path_mm[:, 0].max() <= 40.0 + 0.01  # brakes in time
+
+
+def test_follower_comes_from_one_side_whatever_the_steps() -> None:
+    """A play of a micrometre would show a turn at the end."""
+    rng = np.random.default_rng(1)
+    drives = Follower(np.zeros(3))
+    for _ in range(100):
+        start_mm = drives.position_mm
+        drives.setpoint_mm = rng.uniform(-60.0, 60.0, 3)
+        way = np.sign(drives.setpoint_mm - start_mm)
+        while drives.phase == "moving":
+            drives.advance(rng.uniform(0.015, 0.045))
+            assert np.all(way * drives.position_mm <= way * drives.setpoint_mm)
+
+
+def test_follower_takes_new_setpoints_on_the_way() -> None:
+    drives = Follower(np.zeros(1))
+    drives.setpoint_mm = np.array([40.0])
+    drives.advance(0.3)
+    drives.setpoint_mm = np.array([-1.0])
+    drives.advance(10.0)
+    np.testing.assert_array_equal(drives.position_mm, [-1.0])
+    assert drives.advance(1.0) == 0.0
