@@ -42,9 +42,9 @@ def compare(
     file: ModelFile | None = None
     for path in recordings:
         try:
-            seen, _ = open_recording(path, machine)
-            file = open_model(model, seen)
-            found.append(compared(seen, file.fitted, file.covariance))
+            aligned, _ = open_recording(path, machine)
+            file = open_model(model, aligned)
+            found.append(compared(aligned, file.fitted, file.covariance))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -66,18 +66,18 @@ def compare(
 def open_recording(path: Path, machine: Path | None) -> tuple[AlignedRecording, Configuration | None]:
     """A recording on its machine. Raises RecordingError with every problem."""
     from compd.cli.recording import read_with_machine
-    from compd.comparison.aligned_recording import observed
+    from compd.comparison.aligned_recording import align_recording
 
     recording, configuration = read_with_machine(path, machine)
-    return observed(recording, configuration), configuration
+    return align_recording(recording, configuration), configuration
 
 
-def open_model(path: Path | None, seen: AlignedRecording) -> ModelFile:
+def open_model(path: Path | None, aligned: AlignedRecording) -> ModelFile:
     """The model file, or the model without effects where none is named. Raises StateError."""
     from compd.model_file import ModelFile, read_model_file
 
-    machine = seen.recording.machine
-    return ModelFile(machine) if path is None else read_model_file(path, machine, seen.rows.links)
+    machine = aligned.recording.machine
+    return ModelFile(machine) if path is None else read_model_file(path, machine, aligned.rows.links)
 
 
 def write_page_to(path: Path) -> None:
@@ -117,7 +117,7 @@ def print_comparisons(found: list[Comparison]) -> None:
             console.print(f"  - {finding.text}")
         if len(one.findings) > MOST_SENTENCES:
             console.print(f"  and {len(one.findings) - MOST_SENTENCES} weaker ones (--json and --html have all)")
-        rows = one.seen.recording.row[one.outlier].tolist()
+        rows = one.aligned.recording.row[one.outlier].tolist()
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")
             console.print(f"Rows beyond all noise, not used: {shown}")

@@ -49,11 +49,11 @@ def diagnose(
     if html is not None:
         write_page_to(html)
     sealed = [open_recording(path, machine)[0] for path in recordings[1:]]
-    seen, _ = open_recording(recordings[0], machine)
-    file = open_model(model, seen)
+    aligned, _ = open_recording(recordings[0], machine)
+    file = open_model(model, aligned)
     effects = [*library().values()]
     with steps_shown(quiet=as_json) as progress:
-        found = diagnosed(seen, file.fitted, file.covariance, effects, progress)
+        found = diagnosed(aligned, file.fitted, file.covariance, effects, progress)
     checked = [opened(found, one) for one in sealed]
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis
@@ -85,7 +85,7 @@ def _print(console: Console, found: Diagnosis, checked: list[Holdout]) -> None:
         console.print("\n[bold]Next[/], measure:")
         for row in found.next_measurement:
             console.print("    " + ", ".join(f"{name} {value}" for name, value in row.items()), soft_wrap=True)
-        path = found.before.seen.recording.path
+        path = found.before.aligned.recording.path
         for step in found.steps:
             if step.rivals:
                 pair = f"{step.effect.id},{step.rivals[0].name}"

@@ -37,9 +37,9 @@ def add(
     from compd.diagnosis.model_changes import add as added
 
     declared, found = declaration_of(effect)
-    seen, configuration = open_recording(recording, machine)
-    file = _opened(model, seen, configuration) if model.exists() else _begun(seen, configuration)
-    _finish(model, added(file, declared, found, seen, _now()), f"added {found.id}", dry_run)
+    aligned, configuration = open_recording(recording, machine)
+    file = _opened(model, aligned, configuration) if model.exists() else _begun(aligned, configuration)
+    _finish(model, added(file, declared, found, aligned, _now()), f"added {found.id}", dry_run)
 
 
 def remove(
@@ -53,8 +53,10 @@ def remove(
     from compd.cli.compare import open_recording
     from compd.diagnosis.model_changes import remove as removed
 
-    seen, configuration = open_recording(recording, machine)
-    _finish(model, removed(_opened(model, seen, configuration), effect, seen, _now()), f"removed {effect}", dry_run)
+    aligned, configuration = open_recording(recording, machine)
+    _finish(
+        model, removed(_opened(model, aligned, configuration), effect, aligned, _now()), f"removed {effect}", dry_run
+    )
 
 
 def fit(
@@ -64,8 +66,8 @@ def fit(
     from compd.cli.compare import open_recording
     from compd.diagnosis.model_changes import refit
 
-    seen, configuration = open_recording(recording, machine)
-    _finish(model, refit(_opened(model, seen, configuration), seen, _now()), "fitted again", dry_run)
+    aligned, configuration = open_recording(recording, machine)
+    _finish(model, refit(_opened(model, aligned, configuration), aligned, _now()), "fitted again", dry_run)
 
 
 def undo(model: ModelOption) -> None:
@@ -94,18 +96,18 @@ def declaration_of(text: str) -> tuple[Declaration, Effect]:
     return text, find(text, "compd effect add")
 
 
-def _opened(path: Path, seen: AlignedRecording, configuration: Configuration | None) -> ModelFile:
+def _opened(path: Path, aligned: AlignedRecording, configuration: Configuration | None) -> ModelFile:
     """All its numbers are about to be fitted again, on this geometry."""
     from compd.model_file import read_model_file
 
-    file = read_model_file(path, seen.recording.machine, seen.rows.links)
+    file = read_model_file(path, aligned.recording.machine, aligned.rows.links)
     return replace(file, geometry=_geometry(configuration))
 
 
-def _begun(seen: AlignedRecording, configuration: Configuration | None) -> ModelFile:
+def _begun(aligned: AlignedRecording, configuration: Configuration | None) -> ModelFile:
     from compd.model_file import ModelFile
 
-    return ModelFile(seen.recording.machine, geometry=_geometry(configuration))
+    return ModelFile(aligned.recording.machine, geometry=_geometry(configuration))
 
 
 def _geometry(configuration: Configuration | None) -> str:
@@ -123,7 +125,7 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
 
     from compd.model_file import numbers_of, write_model_file
 
-    links = change.after.seen.rows.links
+    links = change.after.aligned.rows.links
     if dry_run:
         done = f"not written: would have {done}"
     else:

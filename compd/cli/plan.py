@@ -30,7 +30,7 @@ def plan(
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
     from compd.cli.compare import open_model, open_recording
     from compd.comparison.compare import compare
-    from compd.comparison.shape_search import search
+    from compd.comparison.shape_search import search_constants
     from compd.diagnosis.measurement_programmes import limits_of
     from compd.diagnosis.next_measurement import plan as planned
     from compd.errors import CompdError, Problem
@@ -48,8 +48,8 @@ def plan(
             )
         )
     effects = [find(name, "--rivals") for name in names]
-    seen, _ = open_recording(recording, machine)
-    file = open_model(model, seen)
+    aligned, _ = open_recording(recording, machine)
+    file = open_model(model, aligned)
     present = [one.effect.id for one in file.fitted if one.effect.id in names]
     if present:
         raise CompdError(
@@ -61,7 +61,7 @@ def plan(
                 next_step="`compd effect remove` takes it out",
             )
         )
-    limits = limits_of(seen)
+    limits = limits_of(aligned)
     if workspace is not None:
         x0, x1, y0, y1, z0, z1 = _numbers("--workspace", workspace, 6)
         low, high = limits.tip_low_M_mm.copy(), limits.tip_high_M_mm.copy()
@@ -74,9 +74,9 @@ def plan(
         limits = limits._replace(temperature_degC=(coldest, warmest))
     if speed is not None:
         limits = limits._replace(speed_mm_per_s=speed)
-    sigma_um = compare(seen, file.fitted, file.covariance).floor.by_axis_um
-    first, second = (search(seen, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
-    found = planned(seen, file.fitted, (first, second), sigma_um, limits, rows)
+    sigma_um = compare(aligned, file.fitted, file.covariance).floor.by_axis_um
+    first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
+    found = planned(aligned, file.fitted, (first, second), sigma_um, limits, rows)
     if out is None:
         found.write_to(sys.stdout)
     else:

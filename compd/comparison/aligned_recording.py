@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.registration import Registration, free_motion, lay_over
+from compd.comparison.registration import Registration, free_motion, register
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.effect import Deltas, Effect, FittedEffect, Port, Shape, deltas, missing, together
+from compd.model.effect import Deltas, Effect, FittedEffect, Port, Shape, deltas, missing, sum_deltas
 from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
@@ -118,7 +118,7 @@ class AlignedRecording:
         return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
 
 
-def observed(recording: Recording, configuration: Configuration | None) -> AlignedRecording:
+def align_recording(recording: Recording, configuration: Configuration | None) -> AlignedRecording:
     """A recording on the machine that the configuration describes; None only for an external model.
 
     Raises RecordingError where there is no reference, or where nothing can be computed from any row.
@@ -144,7 +144,7 @@ def observed(recording: Recording, configuration: Configuration | None) -> Align
     registration = None
     # with fewer than three axes a frame cannot be laid over another: it must lie near already
     if recording.reference.frame == "instrument" and len(axes) == 3:
-        registration = lay_over(np.where(recording.excluded[:, None], np.nan, measured), rows.tip_M_mm)
+        registration = register(np.where(recording.excluded[:, None], np.nan, measured), rows.tip_M_mm)
         measured = measured if registration is None else registration.into_M(measured)
     return AlignedRecording(recording, model, rows, recording.reference_axes, axes, measured, registration)
 
@@ -158,7 +158,7 @@ def added_by(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[s
     if problems:
         raise CompdError(problems)
     each, _ = deltas(fitted, rows, {})
-    return each, together(list(each.values()))
+    return each, sum_deltas(list(each.values()))
 
 
 def _rows(recording: Recording, model: MachineModel) -> Observations:

@@ -15,9 +15,9 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording, added_by
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.fit import free_motion_of
-from compd.comparison.noise_floor import NoiseFloor, gross_rows, noise_floor, repeat_scatter
+from compd.comparison.noise_floor import NoiseFloor, noise_floor, outlier_rows, repeat_scatter
 from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, first_order, gauge_noise
-from compd.comparison.residual_trends import Trend, whereabouts
+from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect
 from compd.model.prediction import pull_back
@@ -40,7 +40,7 @@ class Comparison:
     attitude_residual_urad : (N, 3), None where no attitude was measured.
     """
 
-    seen: AlignedRecording
+    aligned: AlignedRecording
     fitted: tuple[FittedEffect, ...]
     residual_um: FloatArray
     used: BoolArray
@@ -67,7 +67,7 @@ class Comparison:
     @cached_property
     def distance_um(self) -> FloatArray:
         """(N,) length of the residual over all coordinates; of links, the largest."""
-        if self.seen.of_links:
+        if self.aligned.of_links:
             return np.asarray(np.abs(self.residual_um).max(axis=1))
         return np.asarray(np.linalg.norm(self.residual_um, axis=1))
 
@@ -79,16 +79,14 @@ class Comparison:
     @property
     def at_floor(self) -> bool:
         """Whether chance alone could have made the ratio as large as it is."""
-        numbers = float(self.used.sum() * len(self.seen.labels))
+        numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
         return self.floor_ratio <= float(f_distribution.ppf(CONFIDENCE, numbers, dof))
 
     @property
     def verdict(self) -> str:
         """The result in a sentence or two, for a person at the machine."""
-        who = (
-            f"{self.seen.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um (rms per coordinate)"
-        )
+        who = f"{self.aligned.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um (rms per coordinate)"
         if self.at_floor:
             return f"{who}, which is the noise of the measurement itself ({self.floor.um:.3g} um): nothing is missing."
         share = 1 - 1 / self.floor_ratio
@@ -99,7 +97,7 @@ class Comparison:
 
     def as_json(self) -> dict[str, Any]:
         """What `compd compare --json` prints; nan and inf are null."""
-        recording = self.seen.recording
+        recording = self.aligned.recording
         size = np.abs(self.residual_um[self.used])
         distance = self.distance_um[self.used]
         excluded = recording.rows - int(self.used.sum()) + sum(recording.left_out.values())
@@ -108,7 +106,7 @@ class Comparison:
             "sha256": recording.sha256,
             "machine": recording.machine,
             "effects": [one.effect.id for one in self.fitted],
-            "axes": list(self.seen.labels),
+            "axes": list(self.aligned.labels),
             "residual_rms_um": self.rms_um,
             "residual_rms_xyz_um": self._by_axis(self.rms_by_axis_um),
             "residual_mean_xyz_um": self._by_axis(self.residual_um[self.used].mean(axis=0)),
@@ -139,7 +137,7 @@ class Comparison:
             "where_it_fails": [finding.as_json() for finding in self.findings],
             "verdict": self.verdict,
         }
-        if self.seen.registered:
+        if self.aligned.registered:
             found["registration"] = self._registration()
         if self.attitude_residual_urad is not None:
             turned = self.attitude_residual_urad[self.used]
@@ -148,14 +146,14 @@ class Comparison:
         return finite
 
     def _by_axis(self, values: FloatArray) -> dict[str, float]:
-        return {label: float(value) for label, value in zip(self.seen.labels, values, strict=True)}
+        return {label: float(value) for label, value in zip(self.aligned.labels, values, strict=True)}
 
     def _outliers_counted(self) -> dict[str, int]:
         count = int(self.outlier.sum())
         return {"beyond all noise": count} if count else {}
 
     def _registration(self) -> dict[str, Any]:
-        laid = self.seen.registration
+        laid = self.aligned.registration
         if laid is None:
             return {"how": "displacements and small rotations fitted along"}
         return {
@@ -166,16 +164,16 @@ class Comparison:
 
 
 def compare(
-    seen: AlignedRecording, fitted: Sequence[FittedEffect] = (), covariance: FloatArray | None = None
+    aligned: AlignedRecording, fitted: Sequence[FittedEffect] = (), covariance: FloatArray | None = None
 ) -> Comparison:
     """Compare a recording with the model and its effects; nothing of the model is fitted here.
 
     covariance : (P, P) of the effects' numbers jointly; where None, from each effect's own.
     Raises CompdError where an effect needs what the recording has not, RecordingError where too few rows are usable.
     """
-    by_effect, added = added_by(fitted, seen.rows)
-    usable, left = seen.usable
-    predicted_mm = seen.predicted_mm(added)
+    by_effect, added = added_by(fitted, aligned.rows)
+    usable, left = aligned.usable
+    predicted_mm = aligned.predicted_mm(added)
     known = usable & np.isfinite(predicted_mm).all(axis=1)
     left_out = dict(left)
     if (usable & ~known).any():
@@ -183,33 +181,33 @@ def compare(
     if known.sum() < FEWEST_ROWS:
         raise RecordingError(
             Problem(
-                where=str(seen.recording.path),
+                where=str(aligned.recording.path),
                 what="too few rows can be compared",
                 value=str(int(known.sum())),
                 allowed=f"{FEWEST_ROWS} or more",
                 next_step="; ".join(f"{n} rows: {why}" for why, n in left_out.items()),
             )
         )
-    residual_um = (seen.measured_mm - predicted_mm) * UM_PER_MM
+    residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
     residual_um[~known] = np.nan
-    residual_um, outlier = _without_frame(seen, residual_um, known)
+    residual_um, outlier = _without_frame(aligned, residual_um, known)
     used = known & ~outlier
-    gauges, uncertainty = _uncertainty(seen, residual_um, used, fitted, covariance)
+    gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance)
     floor = noise_floor(
         residual_um,
         used,
-        seen.recording.visit,
-        seen.recording.reference_sigma_mm * UM_PER_MM,
+        aligned.recording.visit,
+        aligned.recording.reference_sigma_mm * UM_PER_MM,
         np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
-        _orders(seen),
+        _orders(aligned),
     )
     links_um = None
-    if seen.model is not None and not seen.of_links and len(seen.axes) == 3:
-        links_um = pull_back(seen.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
+    if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
+        links_um = pull_back(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
         links_um[~known] = np.nan
-    turned = seen.attitude_residual_urad(added)
+    turned = aligned.attitude_residual_urad(added)
     return Comparison(
-        seen,
+        aligned,
         tuple(fitted),
         residual_um,
         used,
@@ -218,20 +216,22 @@ def compare(
         floor,
         uncertainty,
         gauges,
-        contributions(seen, by_effect, used),
-        whereabouts(seen, residual_um, links_um, used, floor),
+        contributions(aligned, by_effect, used),
+        find_trends(aligned, residual_um, links_um, used, floor),
         links_um,
         turned,
     )
 
 
-def _without_frame(seen: AlignedRecording, residual_um: FloatArray, known: BoolArray) -> tuple[FloatArray, BoolArray]:
+def _without_frame(
+    aligned: AlignedRecording, residual_um: FloatArray, known: BoolArray
+) -> tuple[FloatArray, BoolArray]:
     """The residual without what the instrument's frame explains, and the rows beyond all noise."""
     outlier = np.zeros(len(known), dtype=bool)
     left_um = residual_um
     for _ in range(3):  # a gross row bends the frame a little, and the frame decides which row is gross
-        left_um = residual_um - free_motion_of(seen, residual_um, known & ~outlier)
-        found = gross_rows(left_um, known, seen.recording.visit)
+        left_um = residual_um - free_motion_of(aligned, residual_um, known & ~outlier)
+        found = outlier_rows(left_um, known, aligned.recording.visit)
         if (found == outlier).all():
             break
         outlier = found
@@ -239,7 +239,7 @@ def _without_frame(seen: AlignedRecording, residual_um: FloatArray, known: BoolA
 
 
 def _uncertainty(
-    seen: AlignedRecording,
+    aligned: AlignedRecording,
     residual_um: FloatArray,
     used: BoolArray,
     fitted: Sequence[FittedEffect],
@@ -247,22 +247,22 @@ def _uncertainty(
 ) -> tuple[GaugeNoise | None, Uncertainty]:
     """The gauges' noise and the prediction's uncertainty."""
     joint = _blocks([one.covariance for one in fitted]) if covariance is None else covariance
-    if seen.model is None:
-        return None, first_order(seen, None, fitted, joint)
-    gauges = gauge_noise(seen)
-    found = first_order(seen, gauges, fitted, joint)
-    repeats = repeat_scatter(residual_um, used, seen.recording.visit)
+    if aligned.model is None:
+        return None, first_order(aligned, None, fitted, joint)
+    gauges = gauge_noise(aligned)
+    found = first_order(aligned, gauges, fitted, joint)
+    repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
     # what the gauges' scatter alone would do to the residual cannot be more than the residual's own scatter
     if repeats is not None and (np.sqrt(np.mean(found.gauges_um[used] ** 2, axis=0)) > 1.5 * repeats.by_axis_um).any():
-        gauges = gauge_noise(seen, from_repeats=False)
-        found = first_order(seen, gauges, fitted, joint)
+        gauges = gauge_noise(aligned, from_repeats=False)
+        found = first_order(aligned, gauges, fitted, joint)
     return gauges, found
 
 
-def _orders(seen: AlignedRecording) -> tuple[FloatArray, ...]:
+def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:
     """What rows can be neighbours in: time, place, everything measured."""
-    place = [column for column in seen.rows.tip_M_mm.T if np.isfinite(column).any()]
-    return (seen.recording.time_s, *place, *seen.recording.quantities.values())
+    place = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
+    return (aligned.recording.time_s, *place, *aligned.recording.quantities.values())
 
 
 def _blocks(parts: Sequence[FloatArray]) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import free_motion_of
-from compd.model.effect import Deltas, together
+from compd.model.effect import Deltas, sum_deltas
 from compd.units import UM_PER_MM
 
 
@@ -21,27 +21,29 @@ class Contribution(NamedTuple):
     without_rms_um: float
 
 
-def contributions(seen: AlignedRecording, by_effect: Mapping[str, Deltas], used: BoolArray) -> dict[str, Contribution]:
+def contributions(
+    aligned: AlignedRecording, by_effect: Mapping[str, Deltas], used: BoolArray
+) -> dict[str, Contribution]:
     """By source: "joints" and "frame" where they were recorded, then each effect by its id.
 
     by_effect : what each effect adds at its ports.  used : (N,) the rows that count.
     Where the instrument's frame is fitted, it is fitted anew without each source.
     """
-    whole = together(list(by_effect.values()))
-    predicted_mm = seen.predicted_mm(whole)
+    whole = sum_deltas(list(by_effect.values()))
+    predicted_mm = aligned.predicted_mm(whole)
     off: dict[str, Deltas] = {}
-    if seen.model is not None and seen.recording.joint_mm is not None:
-        off["joints"] = {**whole, "joint": -seen.rows.joint_mm}
-    if seen.model is not None and seen.recording.frame_mm is not None:
-        off["frame"] = {**whole, "frame": -seen.rows.frame_mm}
+    if aligned.model is not None and aligned.recording.joint_mm is not None:
+        off["joints"] = {**whole, "joint": -aligned.rows.joint_mm}
+    if aligned.model is not None and aligned.recording.frame_mm is not None:
+        off["frame"] = {**whole, "frame": -aligned.rows.frame_mm}
     for name in by_effect:
-        off[name] = together([added for other, added in by_effect.items() if other != name])
+        off[name] = sum_deltas([added for other, added in by_effect.items() if other != name])
     found: dict[str, Contribution] = {}
     for name, added in off.items():
-        without_mm = seen.predicted_mm(added)
+        without_mm = aligned.predicted_mm(added)
         good = used & np.isfinite(without_mm).all(axis=1)
-        residual_um = (seen.measured_mm - without_mm) * UM_PER_MM
-        residual_um = residual_um - free_motion_of(seen, residual_um, good)
+        residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
+        residual_um = residual_um - free_motion_of(aligned, residual_um, good)
         found[name] = Contribution(_rms(((predicted_mm - without_mm) * UM_PER_MM)[good]), _rms(residual_um[good]))
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording, added_by
-from compd.comparison.noise_floor import gross_rows, robust_sigma
+from compd.comparison.noise_floor import outlier_rows, robust_sigma
 from compd.errors import CompdError, Problem
 from compd.model.effect import Effect, FittedEffect, Shape
 from compd.recording.recording import Recording
@@ -60,7 +60,7 @@ def start(effect: Effect, shape: Shape, links: int) -> FittedEffect:
 
 
 def fit(
-    seen: AlignedRecording, effects: Sequence[FittedEffect], weight_sigma_um: FloatArray | None = None
+    aligned: AlignedRecording, effects: Sequence[FittedEffect], weight_sigma_um: FloatArray | None = None
 ) -> FitResult:
     """Fit the effects together; with the instrument's frame where it is not known.
 
@@ -72,36 +72,36 @@ def fit(
 
     Raises CompdError where an effect needs what the recording has not, or fewer rows than numbers are usable.
     """
-    sigma_um = np.ones(len(seen.labels)) if weight_sigma_um is None else weight_sigma_um
-    usable, _ = seen.usable
+    sigma_um = np.ones(len(aligned.labels)) if weight_sigma_um is None else weight_sigma_um
+    usable, _ = aligned.usable
     begun = tuple(effects)
-    added_by(begun, seen.rows)  # refuses here what cannot be fitted
-    columns_um = [seen.columns(one.effect, one.shape) * UM_PER_MM for one in begun]
+    added_by(begun, aligned.rows)  # refuses here what cannot be fitted
+    columns_um = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in begun]
     ends = np.cumsum([0, *(column.shape[2] for column in columns_um)])
-    G_um = np.concatenate([*columns_um, seen.free_columns * UM_PER_MM], axis=2)
+    G_um = np.concatenate([*columns_um, aligned.free_columns * UM_PER_MM], axis=2)
     usable = usable & np.isfinite(G_um).all(axis=(1, 2))
-    _check_rows(seen, usable, G_um.shape[2])
+    _check_rows(aligned, usable, G_um.shape[2])
 
     theta = np.concatenate([np.zeros(0), *(one.theta for one in begun)])
     free = np.zeros(G_um.shape[2] - len(theta))
     outlier = np.zeros(len(usable), dtype=bool)
     seen_before: set[bytes] = set()
     for _ in range(ROUNDS):
-        theta, free, residual_um = _gauss_newton(seen, begun, ends, G_um, theta, free, usable & ~outlier, sigma_um)
-        found = gross_rows(residual_um / sigma_um, usable, seen.recording.visit)
+        theta, free, residual_um = _gauss_newton(aligned, begun, ends, G_um, theta, free, usable & ~outlier, sigma_um)
+        found = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit)
         if (found == outlier).all() or found.tobytes() in seen_before:
             break
         seen_before.add(outlier.tobytes())
         outlier = found
     residual_um[~usable] = np.nan
     used = usable & ~outlier
-    covariance, clusters = _covariance(seen, G_um, residual_um, used, sigma_um)
+    covariance, clusters = _covariance(aligned, G_um, residual_um, used, sigma_um)
     return FitResult(
         tuple(
             replace(one, theta=theta[a:b], covariance=covariance[a:b, a:b])
             for one, a, b in zip(begun, ends[:-1], ends[1:], strict=True)
         ),
-        tuple(f"{one.effect.id}.{column.name}" for one in begun for column in one.effect.columns(seen.rows.links)),
+        tuple(f"{one.effect.id}.{column.name}" for one in begun for column in one.effect.columns(aligned.rows.links)),
         covariance[: len(theta), : len(theta)],
         residual_um,
         used,
@@ -110,9 +110,9 @@ def fit(
     )
 
 
-def free_motion_of(seen: AlignedRecording, residual_um: FloatArray, use: BoolArray) -> FloatArray:
+def free_motion_of(aligned: AlignedRecording, residual_um: FloatArray, use: BoolArray) -> FloatArray:
     """(N, m) the part of a residual that a small motion of the instrument's frame explains, robustly; in um."""
-    G = seen.free_columns
+    G = aligned.free_columns
     if not G.shape[2] or not use.any():
         return np.zeros_like(residual_um)
     found = np.zeros(G.shape[2])
@@ -123,14 +123,14 @@ def free_motion_of(seen: AlignedRecording, residual_um: FloatArray, use: BoolArr
     return np.asarray(G @ found)
 
 
-def _check_rows(seen: AlignedRecording, usable: BoolArray, numbers: int) -> None:
-    measured = int(usable.sum()) * len(seen.labels)
+def _check_rows(aligned: AlignedRecording, usable: BoolArray, numbers: int) -> None:
+    measured = int(usable.sum()) * len(aligned.labels)
     if measured <= numbers:
         raise CompdError(
             Problem(
-                where=str(seen.recording.path),
+                where=str(aligned.recording.path),
                 what=f"{measured} measured values for {numbers} numbers to fit",
-                value=f"{int(usable.sum())} rows of {seen.recording.rows} are usable",
+                value=f"{int(usable.sum())} rows of {aligned.recording.rows} are usable",
                 allowed="more values than numbers",
                 next_step="`compd recording check` says which rows are left out",
             )
@@ -138,7 +138,7 @@ def _check_rows(seen: AlignedRecording, usable: BoolArray, numbers: int) -> None
 
 
 def _gauss_newton(
-    seen: AlignedRecording,
+    aligned: AlignedRecording,
     begun: Sequence[FittedEffect],
     ends: IntArray,
     G_um: FloatArray,
@@ -151,8 +151,8 @@ def _gauss_newton(
     G = G_um[use]
     for _ in range(STEPS):
         now = [replace(one, theta=theta[a:b]) for one, a, b in zip(begun, ends[:-1], ends[1:], strict=True)]
-        _, added = added_by(now, seen.rows)
-        residual_um = (seen.measured_mm - seen.predicted_mm(added)) * UM_PER_MM - G_um[:, :, len(theta) :] @ free
+        _, added = added_by(now, aligned.rows)
+        residual_um = (aligned.measured_mm - aligned.predicted_mm(added)) * UM_PER_MM - G_um[:, :, len(theta) :] @ free
         weights = _weights(residual_um[use] / sigma_um)
         step = _solve(G, residual_um[use], weights, sigma_um)
         theta, free = theta + step[: len(theta)], free + step[len(theta) :]
@@ -186,10 +186,10 @@ def _inverse(normal: FloatArray) -> FloatArray:
 
 
 def _covariance(
-    seen: AlignedRecording, G_um: FloatArray, residual_um: FloatArray, used: BoolArray, sigma_um: FloatArray
+    aligned: AlignedRecording, G_um: FloatArray, residual_um: FloatArray, used: BoolArray, sigma_um: FloatArray
 ) -> tuple[FloatArray, int]:
     """(P, P) of all fitted numbers, the frame's last; and the number of blocks."""
-    group = blocks_of(seen.recording)[used]
+    group = blocks_of(aligned.recording)[used]
     clusters = len(np.unique(group))
     numbers = G_um.shape[2]
     if not numbers:

@@ -11,7 +11,7 @@ from scipy.stats import f
 from compd.arrays import BoolArray, FloatArray, IntArray
 
 # Beyond five standard deviations a normal error comes once in two million: it is no noise.
-GROSS = 5.0
+OUTLIER_SIGMAS = 5.0
 # Median of |x| and its 95 % point, of a normal distribution with standard deviation 1.
 _MEDIAN, _P95 = 0.674490, 1.959964
 # A declared uncertainty is taken to be right within 5 %, which counts as so many measurements (GUM, G.4.2:
@@ -59,7 +59,7 @@ def robust_sigma(values: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.median(size, axis=0) / _MEDIAN, np.quantile(size, 0.95, axis=0) / _P95))
 
 
-def gross_rows(residual_um: FloatArray, use: BoolArray, visit: IntArray | None = None) -> BoolArray:
+def outlier_rows(residual_um: FloatArray, use: BoolArray, visit: IntArray | None = None) -> BoolArray:
     """(N,) rows of `use` with a coordinate of residual_um (N, m) beyond GROSS robust standard deviations.
 
     A row whose visit was repeated and found the same is not gross: the machine really was there.
@@ -68,7 +68,7 @@ def gross_rows(residual_um: FloatArray, use: BoolArray, visit: IntArray | None =
     if use.sum() < 5:
         return found
     middle = np.median(residual_um[use], axis=0)
-    far = np.abs(residual_um - middle) > GROSS * np.maximum(robust_sigma(residual_um[use] - middle), 1e-9)
+    far = np.abs(residual_um - middle) > OUTLIER_SIGMAS * np.maximum(robust_sigma(residual_um[use] - middle), 1e-9)
     found = use & np.where(np.isfinite(residual_um), far, False).any(axis=1)
     if visit is None or not found.any():
         return found
@@ -95,7 +95,7 @@ class _Repeats(NamedTuple):
     @property
     def gross(self) -> BoolArray:
         """(R,) beyond all noise of repeats."""
-        limit_um = GROSS * np.maximum(robust_sigma(self.deviation_um), 1e-9)
+        limit_um = OUTLIER_SIGMAS * np.maximum(robust_sigma(self.deviation_um), 1e-9)
         return np.asarray((np.abs(self.deviation_um) > limit_um).any(axis=1))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
-from compd.model.effect import Deltas, FittedEffect, Port, by_port, together
+from compd.model.effect import Deltas, FittedEffect, Port, by_port, sum_deltas
 from compd.model.frame import solve_frame
 from compd.model.observations import Observations
 from compd.model.prediction import STEP_MM
@@ -49,13 +49,13 @@ class Uncertainty(NamedTuple):
         return np.asarray(np.hypot(self.gauges_um, self.parameters_um))
 
 
-def gauge_noise(seen: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
+def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
     """Of each gauge: its scatter within visits, at least what its last digit hides; else that alone.
 
     from_repeats : False where the machine moves within a visit, so that the gauges' scatter is no noise.
     """
-    recording, rows = seen.recording, seen.rows
-    usable, _ = seen.usable
+    recording, rows = aligned.recording, aligned.rows
+    usable, _ = aligned.usable
     found: dict[str, FloatArray] = {}
     repeated = False
     for port in GAUGE_PORTS:
@@ -81,44 +81,44 @@ def _step(values_um: FloatArray) -> float:
 
 
 def first_order(
-    seen: AlignedRecording, noise: GaugeNoise | None, fitted: Sequence[FittedEffect], covariance: FloatArray
+    aligned: AlignedRecording, noise: GaugeNoise | None, fitted: Sequence[FittedEffect], covariance: FloatArray
 ) -> Uncertainty:
     """GUM, 5.1: squares of sensitivity times standard uncertainty, added up.
 
     covariance : (P, P) of all fitted numbers jointly; nan where a number's error is not known, which makes the
     prediction's nan.  noise : None for an external model, whose gauges are its own affair: nan.
     """
-    shape = seen.measured_mm.shape
+    shape = aligned.measured_mm.shape
     variance = np.full(shape, np.nan) if noise is None else np.zeros(shape)
     if noise is not None:
-        by = seen.sensitivity(["scale", "joint", "base_joint"])
+        by = aligned.sensitivity(["scale", "joint", "base_joint"])
         for port in GAUGE_PORTS:
             at = by["base_joint" if port == "frame" else port]
-            sensitivity = (at.link_length if seen.of_links else at.tip)[:, list(seen.axes)]
+            sensitivity = (at.link_length if aligned.of_links else at.tip)[:, list(aligned.axes)]
             if port == "frame":
-                sensitivity = sensitivity @ _base_joints_by_frame(seen)
+                sensitivity = sensitivity @ _base_joints_by_frame(aligned)
             variance += sensitivity**2 @ noise.at(port) ** 2
     parameters = np.zeros(shape)
     if fitted:
-        G = np.concatenate([seen.columns(one.effect, one.shape) for one in fitted], axis=2)
+        G = np.concatenate([aligned.columns(one.effect, one.shape) for one in fitted], axis=2)
         parameters = np.sqrt(np.maximum((G @ covariance * G).sum(axis=2), 0.0))
     return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM)
 
 
-def _base_joints_by_frame(seen: AlignedRecording) -> FloatArray:
+def _base_joints_by_frame(aligned: AlignedRecording) -> FloatArray:
     """(3 n, 9) by how much the base joints move with the frame's distances; by central differences.
 
     The frame moves by micrometres in a metre: its middle state serves for every row.
     """
-    assert seen.model is not None
-    distances_mm = seen.model.zero.distances_mm + np.nanmedian(seen.rows.frame_mm, axis=0)
+    assert aligned.model is not None
+    distances_mm = aligned.model.zero.distances_mm + np.nanmedian(aligned.rows.frame_mm, axis=0)
     step = STEP_MM * np.eye(9)
-    ends = [solve_frame(seen.model.frame, distances_mm + signed).base_joints_M_mm for signed in (step, -step)]
+    ends = [solve_frame(aligned.model.frame, distances_mm + signed).base_joints_M_mm for signed in (step, -step)]
     return np.asarray((ends[0] - ends[1]).reshape(9, -1).T / (2 * STEP_MM))
 
 
 def monte_carlo(
-    seen: AlignedRecording,
+    aligned: AlignedRecording,
     noise: GaugeNoise,
     fitted: Sequence[FittedEffect],
     covariance: FloatArray,
@@ -130,13 +130,13 @@ def monte_carlo(
 
     The whole forward model each time: what first order leaves out is in it (GUM supplement 1, JCGM 101:2008).
     """
-    assert seen.model is not None
+    assert aligned.model is not None
     rng = np.random.default_rng(seed)
-    rows = take(seen.rows, index)
-    bases = [one.effect.basis(seen.rows, one.shape, None)[0][index] for one in fitted]
+    rows = take(aligned.rows, index)
+    bases = [one.effect.basis(aligned.rows, one.shape, None)[0][index] for one in fitted]
     theta = np.concatenate([np.zeros(0), *(one.theta for one in fitted)])
     root = _root(covariance)
-    predicted = np.empty((trials, len(index), len(seen.axes)))
+    predicted = np.empty((trials, len(index), len(aligned.axes)))
     for trial in range(trials):
         drawn = theta + root @ rng.standard_normal(len(theta))
         parts: list[Deltas] = [
@@ -147,7 +147,7 @@ def monte_carlo(
             numbers = drawn[begin : begin + basis.shape[2]]
             parts.append(by_port(one.effect, rows, basis @ numbers))
             begin += basis.shape[2]
-        predicted[trial] = seen.predicted_mm(together(parts), rows)
+        predicted[trial] = aligned.predicted_mm(sum_deltas(parts), rows)
     return np.asarray(predicted.std(axis=0, ddof=1) * UM_PER_MM)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.noise_floor import GROSS, robust_sigma
+from compd.comparison.noise_floor import OUTLIER_SIGMAS, robust_sigma
 
 # Laying over converges in three or four rounds: each drops the rows that the last one shows to be gross.
 ROUNDS = 10
@@ -26,7 +26,7 @@ class Registration(NamedTuple):
         return np.asarray(measured_mm @ self.rotation.T + self.translation_mm)
 
 
-def lay_over(measured_mm: FloatArray, predicted_M_mm: FloatArray) -> Registration | None:
+def register(measured_mm: FloatArray, predicted_M_mm: FloatArray) -> Registration | None:
     """The rigid motion that lays points (N, 3) over predicted ones, least squares without gross rows.
 
     Rows that are nan on either side are left out. None where fewer than three rows are left: nothing fixes a frame.
@@ -40,7 +40,7 @@ def lay_over(measured_mm: FloatArray, predicted_M_mm: FloatArray) -> Registratio
             return None
         found = _rigid(measured_mm[keep], predicted_M_mm[keep])
         distance_mm = np.linalg.norm(predicted_M_mm - found.into_M(measured_mm), axis=1)
-        limit_mm = GROSS * float(robust_sigma(distance_mm[keep][:, None])[0])
+        limit_mm = OUTLIER_SIGMAS * float(robust_sigma(distance_mm[keep][:, None])[0])
         kept = known & (distance_mm <= max(limit_mm, 1e-9))
         if (kept == keep).all():
             break

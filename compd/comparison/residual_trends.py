@@ -94,11 +94,11 @@ class Trend:
         }
 
 
-def covariates(seen: AlignedRecording) -> list[Covariate]:
+def covariates(aligned: AlignedRecording) -> list[Covariate]:
     """Time, place, every measured quantity, and each link's length and direction."""
-    recording = seen.recording
+    recording = aligned.recording
     found = [Covariate("time", "h", recording.time_s / 3600.0)]
-    for axis, column in zip("xyz", seen.rows.tip_M_mm.T, strict=True):
+    for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
         if np.isfinite(column).any():
             found.append(Covariate(axis, "mm", column))
     for name, column in recording.quantities.items():
@@ -109,7 +109,7 @@ def covariates(seen: AlignedRecording) -> list[Covariate]:
         if bottom in recording.quantities:
             name = f"{top.removesuffix('_degC')} - {bottom.removesuffix('_degC')}"
             found.append(Covariate(name, "K", recording.quantities[top] - recording.quantities[bottom]))
-    for i, length in enumerate(seen.rows.link_mm.T, start=1):
+    for i, length in enumerate(aligned.rows.link_mm.T, start=1):
         found.append(Covariate(f"length of link {i}", "mm", length, i))
     if recording.approach is not None:
         for i, direction in enumerate(recording.approach.T, start=1):
@@ -117,8 +117,8 @@ def covariates(seen: AlignedRecording) -> list[Covariate]:
     return found
 
 
-def whereabouts(
-    seen: AlignedRecording, residual_um: FloatArray, links_um: FloatArray | None, used: BoolArray, floor: NoiseFloor
+def find_trends(
+    aligned: AlignedRecording, residual_um: FloatArray, links_um: FloatArray | None, used: BoolArray, floor: NoiseFloor
 ) -> tuple[Trend, ...]:
     """What each coordinate of the residual follows, the strongest first; nothing where it is at the floor.
 
@@ -126,15 +126,15 @@ def whereabouts(
     One coordinate at a time, straight lines only, tested on blocks of neighbouring rows: a first look, not a proof.
     """
     used = _thinned(used)
-    coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(seen.labels)]
+    coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(aligned.labels)]
     if links_um is not None:
         # noise at the tip, seen through the same Jacobian as the residual, is as much smaller at the links
         share = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(
             float(np.sqrt(np.mean(residual_um[used] ** 2))), 1e-12
         )
         coordinates += [(f"link {i + 1}", column, float(share[i] * floor.um)) for i, column in enumerate(links_um.T)]
-    all_covariates = covariates(seen)
-    group = blocks_of(seen.recording)
+    all_covariates = covariates(aligned)
+    group = blocks_of(aligned.recording)
     looks = len(coordinates) * len(all_covariates)
     found: list[tuple[float, Trend]] = []
     for label, values, floor_um in coordinates:
@@ -142,7 +142,7 @@ def whereabouts(
             continue
         own = int(label.removeprefix("link ")) if label.startswith("link") else 0
         candidates = [one for one in all_covariates if not own or one.link in (0, own)]
-        found += _follow(label, values, used, candidates, group, looks, _largest(seen, values, used))
+        found += _follow(label, values, used, candidates, group, looks, _largest(aligned, values, used))
     found.sort(key=lambda pair: -pair[0])
     return _clearest([finding for _, finding in found])
 
@@ -256,11 +256,11 @@ def _likeness(one: Covariate, other: Covariate, used: BoolArray) -> float:
     return float(abs(np.corrcoef(a, b)[0, 1]))
 
 
-def _largest(seen: AlignedRecording, values: FloatArray, used: BoolArray) -> str:
+def _largest(aligned: AlignedRecording, values: FloatArray, used: BoolArray) -> str:
     """The end of the workspace, or of the recording, at which the error is much larger than at the other end."""
     best, said = MUCH_LARGER, ""
-    places = {"time": seen.recording.time_s}
-    places |= dict(zip("xyz", seen.rows.tip_M_mm.T, strict=True))
+    places = {"time": aligned.recording.time_s}
+    places |= dict(zip("xyz", aligned.rows.tip_M_mm.T, strict=True))
     for name, place in places.items():
         rows = used & np.isfinite(place)
         if rows.sum() < 30 or np.ptp(place[rows]) == 0:

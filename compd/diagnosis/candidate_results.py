@@ -42,7 +42,7 @@ def _alone(
     (k,) = entry.members
     candidate = contest.candidates[k]
     theta, covariance = contest.fitted(entry.members)[0]
-    shown = tuple(numbers(candidate.effect, bench.seen.rows.links, theta, covariance))
+    shown = tuple(numbers(candidate.effect, bench.aligned.rows.links, theta, covariance))
     phi = explained_fraction(contest.base, entry.loss)
     rms_um = bench.before.floor.um * float(np.sqrt(max(entry.loss, 0.0)))
     named = [one.effect.id for one in steps]

@@ -70,25 +70,25 @@ class Pool:
     untestable: Mapping[str, str] = field(default_factory=dict)
 
 
-def library_pool(seen: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> Pool:
+def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> Pool:
     """Every effect that is not `present` in the model, at every choice of its shape constants."""
     found: list[Candidate] = []
     untestable: dict[str, str] = {}
-    usable, _ = seen.usable
+    usable, _ = aligned.usable
     for effect in effects:
         if effect.id in present:
             continue
-        why = _lacks(effect, seen)
+        why = _lacks(effect, aligned)
         if why:
             untestable[effect.id] = why
             continue
-        shapes = effect.shapes(seen.rows)
+        shapes = effect.shapes(aligned.rows)
         searched = sum(
             CHOICE_COUNTS if constant.choice else SEARCH_COUNTS
             for constant in effect.constants
             if len({shape[constant.name] for shape in shapes}) > 1
         )
-        variants = [_candidate(effect, shape, seen, searched) for shape in shapes]
+        variants = [_candidate(effect, shape, aligned, searched) for shape in shapes]
         why = _silent(variants, usable)
         if why:
             untestable[effect.id] = why
@@ -97,18 +97,18 @@ def library_pool(seen: AlignedRecording, effects: Sequence[Effect], present: Col
     return Pool(tuple(found), untestable)
 
 
-def _candidate(effect: Effect, shape: Shape, seen: AlignedRecording, searched: int) -> Candidate:
-    limits = np.array([column.parameter.fitted_range for column in effect.columns(seen.rows.links)])
-    return Candidate(effect.id, effect, shape, seen.columns(effect, shape) * UM_PER_MM, limits, searched)
+def _candidate(effect: Effect, shape: Shape, aligned: AlignedRecording, searched: int) -> Candidate:
+    limits = np.array([column.parameter.fitted_range for column in effect.columns(aligned.rows.links)])
+    return Candidate(effect.id, effect, shape, aligned.columns(effect, shape) * UM_PER_MM, limits, searched)
 
 
-def _lacks(effect: Effect, seen: AlignedRecording) -> str:
+def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
     """What it needs and does not get, in words; "" where it has everything."""
-    if effect.id == "reference_registration" and seen.registered:
+    if effect.id == "reference_registration" and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
-    if seen.model is None and effect.live:
+    if aligned.model is None and effect.live:
         return "acts inside the machine, and of this machine only the model's prediction is known"
-    return "; ".join(problem.what for problem in missing(effect, seen.rows.available, seen.rows.links))
+    return "; ".join(problem.what for problem in missing(effect, aligned.rows.available, aligned.rows.links))
 
 
 def _silent(variants: Sequence[Candidate], usable: BoolArray) -> str:

@@ -14,21 +14,21 @@ FEWEST_SESSIONS = 3
 SECTORS = 5
 
 
-def schemes(seen: AlignedRecording) -> tuple[IntArray, ...]:
+def schemes(aligned: AlignedRecording) -> tuple[IntArray, ...]:
     """Ways to divide the rows, each (N,) numbered from 0: by session (or time), and by place where points are known.
 
     An effect has to prove itself in each: left-out sessions test its weather, left-out sectors its geometry, which
     neighbouring points would praise wrongly (they leak).
     """
-    found = [_by_session(seen)]
-    by_place = _by_sector(seen)
+    found = [_by_session(aligned)]
+    by_place = _by_sector(aligned)
     if by_place is not None:
         found.append(by_place)
     return tuple(found)
 
 
-def _by_session(seen: AlignedRecording) -> IntArray:
-    recording = seen.recording
+def _by_session(aligned: AlignedRecording) -> IntArray:
+    recording = aligned.recording
     fold = recording.fold
     if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
         fold = np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows
@@ -39,9 +39,9 @@ def _by_session(seen: AlignedRecording) -> IntArray:
     return np.asarray(np.unique(fold, return_inverse=True)[1], dtype=np.int64)
 
 
-def _by_sector(seen: AlignedRecording) -> IntArray | None:
+def _by_sector(aligned: AlignedRecording) -> IntArray | None:
     """Sectors with equally many points; None where the tip or its points are not known or too few."""
-    point, tip = seen.recording.point, seen.rows.tip_M_mm
+    point, tip = aligned.recording.point, aligned.rows.tip_M_mm
     known = np.isfinite(tip).all(axis=1)
     if point is None or not known.any():
         return None

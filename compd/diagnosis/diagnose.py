@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
-from compd.comparison.shape_search import search
+from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidate_results import judged
 from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.empirical_search import EmpiricalFinding, Rest, held_out_losses, ranked, together
@@ -34,7 +34,7 @@ NEXT_ROWS = 12
 
 
 def diagnose(
-    seen: AlignedRecording,
+    aligned: AlignedRecording,
     fitted: Sequence[FittedEffect],
     covariance: FloatArray | None,
     effects: Sequence[Effect],
@@ -46,9 +46,9 @@ def diagnose(
     Raises CompdError as `compare` does.
     """
     progress("comparing the model with the recording")
-    before = compare(seen, fitted, covariance)
+    before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
-    pool = library_pool(seen, effects, [one.effect.id for one in fitted])
+    pool = library_pool(aligned, effects, [one.effect.id for one in fitted])
     bench = DiagnosisProblem(before, pool)
     found = explain(bench, progress)
     for _ in range(ROUNDS - 1):
@@ -62,16 +62,16 @@ def diagnose(
 
 
 def _diagnosis(bench: DiagnosisProblem, found: Explanation, covariance: FloatArray | None) -> Diagnosis:
-    contest, seen, before = found.contest, bench.seen, bench.before
+    contest, aligned, before = found.contest, bench.aligned, bench.before
     effects = _worth_naming(found)
     chance = _chances(contest, effects)
     current, joint = before.fitted, covariance
     for number, k in enumerate(effects, start=1):
-        result = search(seen, current, contest.candidates[k].effect, bench.sigma_um)
+        result = search_constants(aligned, current, contest.candidates[k].effect, bench.sigma_um)
         if number == len(effects):
-            result = with_disturbances(result, seen, bench.sigma_um, bench.pool.candidates)
+            result = with_disturbances(result, aligned, bench.sigma_um, bench.pool.candidates)
         current, joint = result.fitted, result.covariance
-    after = compare(seen, current, joint) if effects else before
+    after = compare(aligned, current, joint) if effects else before
     quiet = not found.described and at_floor(after.floor_ratio, contest.base - 1.0 if effects else 0.0)
     steps = _steps(bench, found, effects, current[len(before.fitted) :], chance, quiet)
     candidates = judged(bench, contest, steps, chance)
@@ -109,7 +109,7 @@ def _steps(
     steps, left = [], contest.base
     for place, one in enumerate(fitted):
         loss = contest.entries([effects[: place + 1]])[0].loss
-        known = numbers(one.effect, bench.seen.rows.links, one.theta, one.covariance)
+        known = numbers(one.effect, bench.aligned.rows.links, one.theta, one.covariance)
         others = rivals(contest, effects, place) if quiet else ()
         phi = explained_fraction(left, loss)
         steps.append(
@@ -131,7 +131,7 @@ def _depends(bench: DiagnosisProblem, found: Explanation, effects: Members) -> t
         contest.entries([effects])[0].loss if effects else contest.base,
         bench.before.floor.um,
         cost(contest.base - 1.0),
-        bench.seen.rows.links,
+        bench.aligned.rows.links,
     )
     losses = held_out_losses(bench.evidence, held, searched)
     lines = ranked(rest, searched, losses)
@@ -155,13 +155,15 @@ def _chances(contest: Contest, effects: Members) -> dict[str, float]:
 def _next(bench: DiagnosisProblem, diagnosis: Diagnosis) -> list[dict[str, object]]:
     """Rows that tell the first rivals apart; for the unexplained, what to vary."""
     for step in diagnosis.steps:
-        if step.rivals and bench.seen.model is not None:
+        if step.rivals and bench.aligned.model is not None:
             rival = bench.pool.candidates[step.rivals[0].member]
             try:
-                other = search(bench.seen, bench.before.fitted, rival.effect, bench.sigma_um).fitted[-1]
+                other = search_constants(bench.aligned, bench.before.fitted, rival.effect, bench.sigma_um).fitted[-1]
                 pair = (step.fitted, other)
                 return [
-                    *plan(bench.seen, bench.before.fitted, pair, bench.sigma_um, limits_of(bench.seen), NEXT_ROWS).rows
+                    *plan(
+                        bench.aligned, bench.before.fitted, pair, bench.sigma_um, limits_of(bench.aligned), NEXT_ROWS
+                    ).rows
                 ]
             except CompdError as error:
                 return [{"measure": step.effect.separated_by, "why": str(error.problems[0].what)}]

@@ -105,7 +105,7 @@ class Everything:
     def __init__(self, whiten: Whitening) -> None:
         self._whiten = whiten
         by_size: dict[int, list[EmpiricalFit]] = {}
-        for description in descriptions(whiten.seen):
+        for description in descriptions(whiten.aligned):
             effect = description.effect()
             for constant in description.grid or (None,):
                 values = whiten(whiten.columns_um(description, effect, constant))

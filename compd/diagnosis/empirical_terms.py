@@ -113,12 +113,12 @@ class EmpiricalTerm:
         }
 
 
-def descriptions(seen: AlignedRecording) -> Iterator[EmpiricalTerm]:
+def descriptions(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     """Everything that is tried on this recording."""
-    usable, _ = seen.usable
-    time_s = seen.rows.time_s[usable]
-    ports = list(_ports(seen))
-    for name, values in _machine_wide(seen):
+    usable, _ = aligned.usable
+    time_s = aligned.rows.time_s[usable]
+    ports = list(_ports(aligned))
+    for name, values in _machine_wide(aligned):
         column = values[usable]
         if not _varies(column):
             continue
@@ -138,38 +138,38 @@ def descriptions(seen: AlignedRecording) -> Iterator[EmpiricalTerm]:
         yield replace(port, covariate="time_s", form="step", constant="start", grid=_starts(time_s))
         if not port.per_link and port.port != "tool":  # a tool that swings looks like an instrument that does
             yield replace(port, covariate="time_s", form="periodic", constant="period", grid=_periods(time_s))
-    if seen.model is None:
+    if aligned.model is None:
         return
     links = [port for port in ports if port.port == "link"]
-    for name, middle, form in _of_links(seen):
+    for name, middle, form in _of_links(aligned):
         for port in links:
             yield replace(port, covariate=name, form=form, middle=middle)
 
 
-def _ports(seen: AlignedRecording) -> Iterator[EmpiricalTerm]:
+def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     """Where descriptions may act: what the reference shows, and of a known machine the links and the tool."""
-    if seen.model is not None:
+    if aligned.model is not None:
         yield EmpiricalTerm("", "", "link", 0.0)
         yield EmpiricalTerm("", "", "link", 0.0, per_link=True)
-    if not seen.of_links:
-        if seen.model is not None:
+    if not aligned.of_links:
+        if aligned.model is not None:
             yield EmpiricalTerm("", "", "tool", 0.0, axes=("x", "y", "z"))
-        yield EmpiricalTerm("", "", "reference", 0.0, axes=tuple("xyz"[axis] for axis in seen.axes))
+        yield EmpiricalTerm("", "", "reference", 0.0, axes=tuple("xyz"[axis] for axis in aligned.axes))
 
 
-def _machine_wide(seen: AlignedRecording) -> Iterator[tuple[str, FloatArray]]:
+def _machine_wide(aligned: AlignedRecording) -> Iterator[tuple[str, FloatArray]]:
     """Measured quantities and the place of the tip."""
-    yield from seen.recording.quantities.items()
-    if np.isfinite(seen.rows.tip_M_mm).all(axis=1).any():
+    yield from aligned.recording.quantities.items()
+    if np.isfinite(aligned.rows.tip_M_mm).all(axis=1).any():
         for axis in range(3):
-            yield f"tip_{'xyz'[axis]}_mm", seen.rows.tip_M_mm[:, axis]
+            yield f"tip_{'xyz'[axis]}_mm", aligned.rows.tip_M_mm[:, axis]
 
 
-def _of_links(seen: AlignedRecording) -> Iterator[tuple[str, float, str]]:
+def _of_links(aligned: AlignedRecording) -> Iterator[tuple[str, float, str]]:
     """Covariates that each link has of its own, their middle and form."""
-    rows = seen.rows
+    rows = aligned.rows
     links: dict[tuple[str, str], set[int]] = {}
-    for name in seen.recording.quantities:
+    for name in aligned.recording.quantities:
         if match := _LINK.match(name):
             links.setdefault((match["what"], match["unit"]), set()).add(int(match["link"]))
     for (what, unit), numbers in links.items():
@@ -179,7 +179,7 @@ def _of_links(seen: AlignedRecording) -> Iterator[tuple[str, float, str]]:
             yield name, float(f"{np.nanmean(values):.3g}"), "linear"
     yield "direction", 0.0, "proportional"
     yield "velocity_mm_per_s", 0.0, "proportional"
-    if {"force_x_N", "force_y_N", "force_z_N"} <= set(seen.recording.quantities):
+    if {"force_x_N", "force_y_N", "force_z_N"} <= set(aligned.recording.quantities):
         yield "axial_force_N", float(f"{np.nanmean(rows.axial_force_N):.3g}"), "linear"
 
 

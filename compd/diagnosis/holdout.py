@@ -21,15 +21,15 @@ class Holdout:
     def said(self) -> str:
         """A sentence for a person."""
         return (
-            f"Sealed until now, {self.after.seen.recording.path}: {self.before.rms_um:.3g} um -> "
+            f"Sealed until now, {self.after.aligned.recording.path}: {self.before.rms_um:.3g} um -> "
             f"{self.after.rms_um:.3g} um, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left)."
         )
 
     def as_json(self) -> dict[str, Any]:
         """Beside the verdict's own keys."""
         return {
-            "recording": str(self.after.seen.recording.path),
-            "sha256": self.after.seen.recording.sha256,
+            "recording": str(self.after.aligned.recording.path),
+            "sha256": self.after.aligned.recording.sha256,
             "residual_rms_um": self.before.rms_um,
             "floor_ratio": self.before.floor_ratio,
             "final_rms_um": self.after.rms_um,
@@ -37,6 +37,6 @@ class Holdout:
         }
 
 
-def opened(found: Diagnosis, seen: AlignedRecording) -> Holdout:
+def opened(found: Diagnosis, aligned: AlignedRecording) -> Holdout:
     """The diagnosis on a recording that it has not seen. Raises CompdError where that lacks what an effect needs."""
-    return Holdout(compare(seen, found.before.fitted), compare(seen, found.after.fitted))
+    return Holdout(compare(aligned, found.before.fitted), compare(aligned, found.after.fitted))

@@ -64,14 +64,14 @@ class Segment:
         return len(self.tip_M_mm)
 
 
-def limits_of(seen: AlignedRecording) -> ProgrammeLimits:
+def limits_of(aligned: AlignedRecording) -> ProgrammeLimits:
     """Of the recording: what was reached there can be reached again."""
-    usable, _ = seen.usable
-    tip = seen.rows.tip_M_mm[usable]
-    quantities = seen.recording.quantities
+    usable, _ = aligned.usable
+    tip = aligned.rows.tip_M_mm[usable]
+    quantities = aligned.recording.quantities
     forces = [np.abs(quantities[f"force_{axis}_N"][usable]) for axis in "xyz" if f"force_{axis}_N" in quantities]
     warm = [v[usable] for name, v in quantities.items() if name.startswith("temperature_")]
-    speed = np.nanmax(np.abs(seen.rows.velocity_mm_per_s[usable]), initial=0.0)
+    speed = np.nanmax(np.abs(aligned.rows.velocity_mm_per_s[usable]), initial=0.0)
     return ProgrammeLimits(
         np.quantile(tip, 0.02, axis=0),
         np.quantile(tip, 0.98, axis=0),
@@ -81,9 +81,9 @@ def limits_of(seen: AlignedRecording) -> ProgrammeLimits:
     )
 
 
-def segments(seen: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Segment]:
+def segments(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Segment]:
     """Programmes that vary one thing each; names : the quantities that the rivals need."""
-    n = seen.rows.links
+    n = aligned.rows.links
     grid = [np.linspace(low, high, PLACES) for low, high in zip(limits.tip_low_M_mm, limits.tip_high_M_mm, strict=True)]
     places = np.stack(np.meshgrid(*grid), axis=-1).reshape(-1, 3)
     middle = (limits.tip_low_M_mm + limits.tip_high_M_mm) / 2
@@ -107,7 +107,7 @@ def segments(seen: AlignedRecording, limits: ProgrammeLimits, names: Sequence[st
         yield _at(middle, n, "a step of temperature, watched", dict.fromkeys(group, watched), times)
     for name in names:
         if not name.startswith(("temperature_", "force_")):
-            column = seen.recording.quantities[name]
+            column = aligned.recording.quantities[name]
             ends = np.array([np.nanmin(column), np.nanmax(column)])
             for place in (middle, *places[:: len(places) // 4]):
                 yield _at(place, n, f"{name} low and high", {name: ends})
@@ -158,7 +158,9 @@ def _together(names: Sequence[str]) -> list[tuple[str, ...]]:
     return [*([links] if links else []), *((name,) for name in names if name not in links)]
 
 
-def rows_of(model: MachineModel, common: Constants, chosen: Sequence[Segment], seen: AlignedRecording) -> Observations:
+def rows_of(
+    model: MachineModel, common: Constants, chosen: Sequence[Segment], aligned: AlignedRecording
+) -> Observations:
     """The segments as rows that effects can see, each a session of its own, with perfect gauges.
 
     Raises RecordingError where a place cannot be reached.
@@ -184,7 +186,7 @@ def rows_of(model: MachineModel, common: Constants, chosen: Sequence[Segment], s
     own = (direction == 0).all(axis=1)
     direction[own] = np.where(starts[:, None], 1.0, np.sign(moved))[own]
     velocity = np.concatenate([one.velocity_mm_per_s for one in chosen])
-    rest = _at_rest(seen)
+    rest = _at_rest(aligned)
     quantities = {
         name: np.concatenate([np.broadcast_to(one.quantities.get(name, value), (len(one),)) for one in chosen])
         for name, value in rest.items()
@@ -202,10 +204,10 @@ def rows_of(model: MachineModel, common: Constants, chosen: Sequence[Segment], s
     return observe(model, common, **arguments)
 
 
-def _at_rest(seen: AlignedRecording) -> dict[str, float]:
+def _at_rest(aligned: AlignedRecording) -> dict[str, float]:
     """Every quantity of the recording where nothing acts: 20 degC, no force, the middle of everything else."""
     found = {}
-    for name, values in seen.recording.quantities.items():
+    for name, values in aligned.recording.quantities.items():
         if name.startswith("temperature_"):
             found[name] = REFERENCE_TEMPERATURE_degC
         else:

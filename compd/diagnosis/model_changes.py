@@ -9,7 +9,7 @@ import numpy as np
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison, compare
 from compd.comparison.fit import FitResult, fit, start
-from compd.comparison.shape_search import search
+from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
@@ -27,7 +27,7 @@ class Change:
     after: Comparison
 
 
-def add(file: ModelFile, declared: Declaration, effect: Effect, seen: AlignedRecording, date: str) -> Change:
+def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording, date: str) -> Change:
     """Add an effect and fit all effects together; its shape constants are searched.
 
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
@@ -40,12 +40,12 @@ def add(file: ModelFile, declared: Declaration, effect: Effect, seen: AlignedRec
                 next_step="`compd effect fit` fits it again",
             )
         )
-    before = compare(seen, file.fitted, file.covariance)
-    found = search(seen, file.fitted, effect, before.floor.by_axis_um)
+    before = compare(aligned, file.fitted, file.covariance)
+    found = search_constants(aligned, file.fitted, effect, before.floor.by_axis_um)
     return _change(replace(file, declared=(*file.declared, declared)), file, found, before, "add", effect.id, date)
 
 
-def remove(file: ModelFile, effect_id: str, seen: AlignedRecording, date: str) -> Change:
+def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str) -> Change:
     """Take an effect out and fit the others again. Raises StateError where the model has it not."""
     names = [one.effect.id for one in file.fitted]
     if effect_id not in names:
@@ -57,18 +57,18 @@ def remove(file: ModelFile, effect_id: str, seen: AlignedRecording, date: str) -
             )
         )
     k = names.index(effect_id)
-    before = compare(seen, file.fitted, file.covariance)
-    found = fit(seen, file.fitted[:k] + file.fitted[k + 1 :], before.floor.by_axis_um)
+    before = compare(aligned, file.fitted, file.covariance)
+    found = fit(aligned, file.fitted[:k] + file.fitted[k + 1 :], before.floor.by_axis_um)
     rest = replace(file, declared=file.declared[:k] + file.declared[k + 1 :])
     return _change(rest, file, found, before, "remove", effect_id, date)
 
 
-def refit(file: ModelFile, seen: AlignedRecording, date: str) -> Change:
+def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
     """Fit all effects again, shape constants as they are. Raises StateError where there are none."""
     if not file.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
-    before = compare(seen, file.fitted, file.covariance)
-    found = fit(seen, [_afresh(one, seen.rows.links) for one in file.fitted], before.floor.by_axis_um)
+    before = compare(aligned, file.fitted, file.covariance)
+    found = fit(aligned, [_afresh(one, aligned.rows.links) for one in file.fitted], before.floor.by_axis_um)
     return _change(file, file, found, before, "fit", "", date)
 
 
@@ -101,11 +101,11 @@ def _afresh(one: FittedEffect, links: int) -> FittedEffect:
 def _change(
     file: ModelFile, old: ModelFile, found: FitResult, before: Comparison, kind: Kind, effect: str, date: str
 ) -> Change:
-    seen = before.seen
-    others = library_pool(seen, list(library().values()), [one.effect.id for one in found.fitted])
-    found = with_disturbances(found, seen, before.floor.by_axis_um, others.candidates)
-    after = compare(seen, found.fitted, found.covariance)
-    recording = seen.recording
+    aligned = before.aligned
+    others = library_pool(aligned, list(library().values()), [one.effect.id for one in found.fitted])
+    found = with_disturbances(found, aligned, before.floor.by_axis_um, others.candidates)
+    after = compare(aligned, found.fitted, found.covariance)
+    recording = aligned.recording
     step = ModelStep(
         kind,
         effect,
@@ -115,7 +115,7 @@ def _change(
         before.rms_um,
         after.rms_um,
         after.floor.um,
-        old.state(seen.rows.links),
+        old.state(aligned.rows.links),
     )
     changed = replace(file, fitted=found.fitted, covariance=np.asarray(found.covariance), steps=(*old.steps, step))
     return Change(changed, before, after)

@@ -73,7 +73,7 @@ class _Parting:
 
 
 def plan(
-    seen: AlignedRecording,
+    aligned: AlignedRecording,
     model: Sequence[FittedEffect],
     pair: tuple[FittedEffect, FittedEffect],
     sigma_um: FloatArray,
@@ -86,28 +86,32 @@ def plan(
     (T-optimality: Atkinson and Fedorov, Biometrika 62 (1975) 57: the rival is refitted on every trial.)
     Raises RecordingError where nothing can be planned.
     """
-    if seen.model is None:
+    if aligned.model is None:
         raise RecordingError(
             Problem(
-                where=str(seen.recording.path),
+                where=str(aligned.recording.path),
                 what="of an external model's machine no measurement can be planned",
                 next_step="write a machine configuration",
             )
         )
-    links = seen.rows.links
+    links = aligned.rows.links
     names = list(dict.fromkeys(name for one in pair for name in quantities(one.effect, links)))
-    programmes = [one for one in segments(seen, limits, names) if len(one) <= rows]
-    fresh = rows_of(seen.model, seen.rows.constants, programmes, seen)
+    programmes = [one for one in segments(aligned, limits, names) if len(one) <= rows]
+    fresh = rows_of(aligned.model, aligned.rows.constants, programmes, aligned)
     ports = {port for one in (*model, *pair) for port in one.effect.ports}
-    by = sensitivities(seen.model, fresh, ports)
+    by = sensitivities(aligned.model, fresh, ports)
 
     def of(one: FittedEffect) -> FloatArray:
         basis, _ = one.effect.basis(fresh, one.shape, None)
         found = columns(one.effect, fresh, basis, by)
-        return (found.link_length if seen.of_links else found.tip)[:, list(seen.axes)] * UM_PER_MM / sigma_um[:, None]
+        return (
+            (found.link_length if aligned.of_links else found.tip)[:, list(aligned.axes)]
+            * UM_PER_MM
+            / sigma_um[:, None]
+        )
 
-    usable, _ = seen.usable
-    old = [seen.columns(one.effect, one.shape) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
+    usable, _ = aligned.usable
+    old = [aligned.columns(one.effect, one.shape) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
     good = usable & np.all([np.isfinite(one).all(axis=(1, 2)) for one in old], axis=0)
     new = [of(one) for one in (*model, *pair)]
     ends = np.cumsum([0, *(len(one) for one in programmes)])

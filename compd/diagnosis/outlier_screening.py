@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.noise_floor import gross_rows, robust_sigma
+from compd.comparison.noise_floor import outlier_rows, robust_sigma
 
 ROUNDS = 12
 # Huber's constant, as in `fit`.
@@ -37,4 +37,4 @@ def outliers(y: FloatArray, columns: Sequence[FloatArray], use: BoolArray, visit
         weights = np.minimum(1.0, (HUBER / np.maximum(distance, HUBER)) ** 2)
     residual = np.full(y.shape, np.nan)
     residual[use] = left
-    return gross_rows(residual, use, visit)
+    return outlier_rows(residual, use, visit)

@@ -28,8 +28,8 @@ class DiagnosisProblem:
 
     def __init__(self, before: Comparison, pool: Pool, outlier: BoolArray | None = None) -> None:
         """outlier : None to find them beside everything that could explain a row."""
-        seen = before.seen
-        self.before, self.seen, self.pool = before, seen, pool
+        aligned = before.aligned
+        self.before, self.aligned, self.pool = before, aligned, pool
         self.sigma_um = before.floor.by_axis_um
         always = _always_um(before) / self.sigma_um[:, None]
         known: BoolArray = np.asarray(np.isfinite(before.residual_um).all(axis=1))
@@ -39,14 +39,14 @@ class DiagnosisProblem:
         self._known, self._always = known, always
         self._y = np.where(known[:, None], before.residual_um, 0.0) / self.sigma_um
         if outlier is None:
-            outlier = outliers(self._y, [always, *self._everything()], known, seen.recording.visit)
+            outlier = outliers(self._y, [always, *self._everything()], known, aligned.recording.visit)
         self.outlier = outlier
         self.rows = known & ~outlier
-        self.whiten = Whitening(seen, self.rows, self.sigma_um)
+        self.whiten = Whitening(aligned, self.rows, self.sigma_um)
         self.evidence = Evidence(
             self._y[self.rows],
-            tuple(_numbered(scheme[self.rows]) for scheme in schemes(seen)),
-            _numbered(blocks_of(seen.recording)[self.rows]),
+            tuple(_numbered(scheme[self.rows]) for scheme in schemes(aligned)),
+            _numbered(blocks_of(aligned.recording)[self.rows]),
             Block(always[self.rows], np.full(always.shape[2], np.inf)),
         )
         self.values = [self.whiten(one.columns_um) for one in pool.candidates]
@@ -54,7 +54,7 @@ class DiagnosisProblem:
     def outliers_beside(self, members: Members, contest: Contest) -> BoolArray:
         """(N,) gross rows beside a set of candidates alone."""
         chosen = [contest.candidates[k].columns_um / self.sigma_um[:, None] for k in members]
-        return outliers(self._y, [self._always, *chosen], self._known, self.seen.recording.visit)
+        return outliers(self._y, [self._always, *chosen], self._known, self.aligned.recording.visit)
 
     def _everything(self) -> list[FloatArray]:
         """One variant of each effect; time and every measured quantity, along each coordinate."""
@@ -62,21 +62,21 @@ class DiagnosisProblem:
         for one in self.pool.candidates:
             first.setdefault(one.name, one)
         columns = [one.columns_um / self.sigma_um[:, None] for one in first.values()]
-        time_s = self.seen.rows.time_s
-        for values in (time_s, time_s**2, *self.seen.recording.quantities.values()):
+        time_s = self.aligned.rows.time_s
+        for values in (time_s, time_s**2, *self.aligned.recording.quantities.values()):
             column = values[self._known]
             if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
                 middle = np.nan_to_num(values - column.mean()) / np.ptp(column)
-                columns.append(middle[:, None, None] * np.eye(len(self.seen.labels)))
+                columns.append(middle[:, None, None] * np.eye(len(self.aligned.labels)))
         return columns
 
 
 def _always_um(before: Comparison) -> FloatArray:
     """(N, m, Q) columns of the model's own numbers and of the instrument's frame."""
-    seen = before.seen
+    aligned = before.aligned
     own: Sequence[FittedEffect] = before.fitted
-    columns = [seen.columns(one.effect, one.shape) * UM_PER_MM for one in own]
-    return np.concatenate([*columns, seen.free_columns * UM_PER_MM], axis=2)
+    columns = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in own]
+    return np.concatenate([*columns, aligned.free_columns * UM_PER_MM], axis=2)
 
 
 def _numbered(values: IntArray) -> IntArray:

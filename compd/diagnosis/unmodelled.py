@@ -22,7 +22,7 @@ INDISTINCT = 1e-10
 
 
 def with_disturbances(
-    found: FitResult, seen: AlignedRecording, sigma_um: FloatArray, candidates: Sequence[Candidate]
+    found: FitResult, aligned: AlignedRecording, sigma_um: FloatArray, candidates: Sequence[Candidate]
 ) -> FitResult:
     """The fit with wider standard errors: by how much its numbers move when two other effects act a little.
 
@@ -38,8 +38,8 @@ def with_disturbances(
             others[one.name] = _whitened(one.columns_um, found, sigma_um)
     if not others or not found.fitted:
         return found
-    own = [seen.columns(one.effect, one.shape) * UM_PER_MM for one in found.fitted]
-    G = _whitened(np.concatenate([*own, seen.free_columns * UM_PER_MM], axis=2), found, sigma_um)
+    own = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in found.fitted]
+    G = _whitened(np.concatenate([*own, aligned.free_columns * UM_PER_MM], axis=2), found, sigma_um)
     size = np.linalg.norm(G, axis=0)
     size[size == 0] = 1.0
     inverse = np.linalg.pinv((G / size).T @ (G / size), rcond=INDISTINCT, hermitian=True)

@@ -97,8 +97,8 @@ class Diagnosis:
         found: dict[str, Any] = {
             "verdict": self.verdict,
             "said": self.said,
-            "recording": str(self.before.seen.recording.path),
-            "sha256": self.before.seen.recording.sha256,
+            "recording": str(self.before.aligned.recording.path),
+            "sha256": self.before.aligned.recording.sha256,
             "noise_floor_um": self.before.floor.um,
             "noise_floor_source": self.before.floor.source,
             "residual_rms_um": self.before.rms_um,
@@ -109,7 +109,7 @@ class Diagnosis:
             "next_measurement": [dict(one) for one in self.next_measurement],
             "final_rms_um": self.after.rms_um,
             "final_floor_ratio": self.after.floor_ratio,
-            "outlier_rows": self.after.seen.recording.row[self.after.outlier].tolist(),
+            "outlier_rows": self.after.aligned.recording.row[self.after.outlier].tolist(),
             "rows_used": int(self.after.used.sum()),
         }
         finite: dict[str, Any] = _finite(found)

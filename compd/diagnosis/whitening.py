@@ -14,15 +14,15 @@ from compd.units import UM_PER_MM
 class Whitening:
     """Columns of a description in standard deviations of the noise, on the rows that count."""
 
-    def __init__(self, seen: AlignedRecording, rows: BoolArray, sigma_um: FloatArray) -> None:
-        self.seen, self._rows, self._sigma_um = seen, rows, sigma_um
+    def __init__(self, aligned: AlignedRecording, rows: BoolArray, sigma_um: FloatArray) -> None:
+        self.aligned, self._rows, self._sigma_um = aligned, rows, sigma_um
 
     def columns_um(self, description: EmpiricalTerm, effect: Effect, constant: float | None) -> FloatArray:
         """(N, m, P): all numbers of the first axis, then of the next."""
         shape = {} if constant is None else {description.constant: constant}
         if description.axes == ("",):
-            return self.seen.columns(effect, shape) * UM_PER_MM
-        factors, _ = effect.basis(self.seen.rows, shape, None)
+            return self.aligned.columns(effect, shape) * UM_PER_MM
+        factors, _ = effect.basis(self.aligned.rows, shape, None)
         factors = factors[:, "xyz".index(description.axes[0])] * UM_PER_MM
         along = self._along(description)
         return np.asarray((along[:, :, :, None] * factors[:, None, None, :]).reshape(*along.shape[:2], -1))
@@ -32,9 +32,9 @@ class Whitening:
         axes = ["xyz".index(axis) for axis in description.axes]
         if description.port == "reference":
             return np.broadcast_to(
-                np.eye(3)[list(self.seen.axes)][:, axes], (len(self.seen.rows), len(self.seen.axes), len(axes))
+                np.eye(3)[list(self.aligned.axes)][:, axes], (len(self.aligned.rows), len(self.aligned.axes), len(axes))
             )
-        return self.seen.sensitivity(["tool"])["tool"].tip[:, list(self.seen.axes)][:, :, axes]
+        return self.aligned.sensitivity(["tool"])["tool"].tip[:, list(self.aligned.axes)][:, :, axes]
 
     def __call__(self, columns_um: FloatArray) -> FloatArray:
         """(R, m, P)."""

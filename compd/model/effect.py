@@ -246,7 +246,7 @@ def deltas(
     return found, after
 
 
-def together(each: Collection[Deltas]) -> Deltas:
+def sum_deltas(each: Collection[Deltas]) -> Deltas:
     """The sum of several effects at each port, in their order."""
     total: Deltas = {}
     for one in each:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effect import Deltas, Effect, Port, by_port, port_size, together
+from compd.model.effect import Deltas, Effect, Port, by_port, port_size, sum_deltas
 from compd.model.frame import Frame, solve_frame
 from compd.model.joint_correction import joint_shortening, link_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix
@@ -223,7 +223,7 @@ def shares(model: MachineModel, rows: Observations, deltas: Mapping[str, Deltas]
     names = list(deltas)
     before = predict(model, rows, {}).tip_mm
     for count, name in enumerate(names, start=1):
-        after = predict(model, rows, together([deltas[one] for one in names[:count]])).tip_mm
+        after = predict(model, rows, sum_deltas([deltas[one] for one in names[:count]])).tip_mm
         found[name] = after - before
         before = after
     return found

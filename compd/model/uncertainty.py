@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas, quantities, together
+from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas, quantities, sum_deltas
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 from compd.model.prediction import Sensitivity, columns, sensitivities
@@ -82,4 +82,4 @@ def _by_quantity(
 
 def _added(effects: Sequence[FittedEffect], rows: Observations, memories: Memories) -> Deltas:
     each, _ = deltas(effects, rows, memories)
-    return together(list(each.values()))
+    return sum_deltas(list(each.values()))

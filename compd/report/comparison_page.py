@@ -25,7 +25,7 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
         ["noise floor", *(f"{one.floor.um:.3g} um ({one.floor.source})" for one in comparisons)],
         ["floor ratio, 1 = at the floor", *(f"{one.floor_ratio:.3g}" for one in comparisons)],
     ]
-    labels = list(dict.fromkeys(label for one in comparisons for label in one.seen.labels))
+    labels = list(dict.fromkeys(label for one in comparisons for label in one.aligned.labels))
     rows += [[f"{label}: rms / 95 % / largest", *(_axis(one, label) for one in comparisons)] for label in labels]
     rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(one) for one in comparisons)])
     sources = list(dict.fromkeys(name for one in comparisons for name in one.sources))
@@ -41,7 +41,7 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
 
 def name_of(comparison: Comparison) -> str:
     """The recording's file, with its folder: `train.csv` alone says nothing."""
-    path = comparison.seen.recording.path.resolve()
+    path = comparison.aligned.recording.path.resolve()
     return f"{path.parent.name}/{path.name}"
 
 
@@ -54,7 +54,7 @@ def nothing_found(one: Comparison) -> str:
 
 def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
     """Write the page for one recording or more."""
-    machine = comparisons[0].seen.recording.machine
+    machine = comparisons[0].aligned.recording.machine
     effects = ", ".join(one.effect.id for one in comparisons[0].fitted) or "none"
     verdict = " ".join(f"{name_of(one)}: {one.verdict}" if len(comparisons) > 1 else one.verdict for one in comparisons)
     panels = [
@@ -65,7 +65,7 @@ def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile
         panels.append(Panel("The model's effects", "Fitted numbers with their standard errors.", numbers))
     for one in comparisons:
         panels += _panels(one, f"{name_of(one)}: " if len(comparisons) > 1 else "")
-    hashes = "; ".join(f"{name_of(one)} sha256 {one.seen.recording.sha256}" for one in comparisons)
+    hashes = "; ".join(f"{name_of(one)} sha256 {one.aligned.recording.sha256}" for one in comparisons)
     write_page(path, f"Model and measurement: {machine}", verdict, panels, f"Effects in the model: {effects}. {hashes}")
 
 
@@ -112,7 +112,7 @@ def ledger_rows(model: Stored) -> list[list[str]]:
 
 def _panels(one: Comparison, prefix: str) -> list[Panel]:
     """The panels of one recording: the same for every recording and model."""
-    found = {covariate.name: covariate for covariate in covariates(one.seen)}
+    found = {covariate.name: covariate for covariate in covariates(one.aligned)}
 
     def named(*begins: str) -> list[str]:
         return [name for name in found if name.startswith(begins)]
@@ -162,7 +162,7 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
 
 def _excluded(one: Comparison) -> PageTable:
     rows = [[why, str(count)] for why, count in one.left_out.items()]
-    numbers = one.seen.recording.row[one.outlier].tolist()
+    numbers = one.aligned.recording.row[one.outlier].tolist()
     if numbers:
         shown = ", ".join(map(str, numbers[:40])) + (f" and {len(numbers) - 40} more" if len(numbers) > 40 else "")
         rows.append([f"beyond all noise: rows {shown}", str(len(numbers))])
@@ -172,21 +172,21 @@ def _excluded(one: Comparison) -> PageTable:
 def _effects(model: ModelFile, one: Comparison) -> PageTable:
     rows = [
         [effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"]]
-        for effect, number in numbers_of(model.fitted, one.seen.rows.links)
+        for effect, number in numbers_of(model.fitted, one.aligned.rows.links)
     ]
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 
 
 def _axis(one: Comparison, label: str) -> str:
-    if label not in one.seen.labels:
+    if label not in one.aligned.labels:
         return "-"
-    size = np.abs(one.residual_um[one.used, one.seen.labels.index(label)])
+    size = np.abs(one.residual_um[one.used, one.aligned.labels.index(label)])
     rms = float(np.sqrt(np.mean(size**2)))
     return f"{rms:.3g} / {np.quantile(size, 0.95):.3g} / {size.max():.3g} um"
 
 
 def _distance(one: Comparison) -> str:
-    if one.seen.of_links or len(one.seen.labels) < 3:
+    if one.aligned.of_links or len(one.aligned.labels) < 3:
         return "-"
     distance = one.distance_um[one.used]
     return f"{np.sqrt(np.mean(distance**2)):.3g} / {np.quantile(distance, 0.95):.3g} / {distance.max():.3g} um"

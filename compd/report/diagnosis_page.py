@@ -22,7 +22,7 @@ from compd.units import unit_of
 
 def write_diagnosis(path: Path, found: Diagnosis, sealed: Sequence[Holdout]) -> None:
     """Write the page; it works offline."""
-    recording = found.before.seen.recording
+    recording = found.before.aligned.recording
     panels = [_falling(found, sealed)]
     for number, step in enumerate(found.steps, start=1):
         panels += _of_step(number, step, found)
@@ -48,7 +48,7 @@ def _falling(found: Diagnosis, sealed: Sequence[Holdout]) -> Panel:
         values.append(first.heldout_rms_um)
         colours.append(COLOURS["quiet"])
     for one in sealed:
-        name = one.after.seen.recording.path.name
+        name = one.after.aligned.recording.path.name
         names += [f"{name}, before", f"{name}, after"]
         values += [one.before.rms_um, one.after.rms_um]
         colours += [COLOURS["quiet"], COLOURS["plain"]]
@@ -86,20 +86,20 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
         Panel(
             f"{effect.id}: the error against what drives it, before",
             "Dots are rows, lines are means.",
-            small_multiples(found.before, drivers, found.before.residual_um, found.before.seen.labels, "error, um"),
+            small_multiples(found.before, drivers, found.before.residual_um, found.before.aligned.labels, "error, um"),
         ),
         Panel(
             f"{effect.id}: the same after",
             "Nothing should be left that follows the driver.",
-            small_multiples(found.after, drivers, found.after.residual_um, found.after.seen.labels, "error, um"),
+            small_multiples(found.after, drivers, found.after.residual_um, found.after.aligned.labels, "error, um"),
         ),
     ]
 
 
 def _drivers(effect: Effect, comparison: Comparison) -> list[Covariate]:
     """What drives an effect, among what can be drawn; place and link lengths where there is nothing else."""
-    every = covariates(comparison.seen)
-    needed = quantities(effect, comparison.seen.rows.links)
+    every = covariates(comparison.aligned)
+    needed = quantities(effect, comparison.aligned.rows.links)
     names = {_name(name) for name in needed}
     found = [one for one in every if one.name in names]
     if "direction" in effect.needs:
@@ -130,10 +130,12 @@ def _against(found: Diagnosis) -> list[Panel]:
     """The rest against what it follows; nothing for what has no picture (each link's own speed or force)."""
     first = found.depends_on[0]
     drawn = {_name(name) for name in (first.covariate, *first.beside)}
-    against = [one for one in covariates(found.after.seen) if one.name in drawn or one.name.split(" of ")[0] in drawn]
+    against = [
+        one for one in covariates(found.after.aligned) if one.name in drawn or one.name.split(" of ")[0] in drawn
+    ]
     if not against:
         return []
-    picture = small_multiples(found.after, against, found.after.residual_um, found.after.seen.labels, "error, um")
+    picture = small_multiples(found.after, against, found.after.residual_um, found.after.aligned.labels, "error, um")
     return [Panel(f"The rest against {_follows(first)}", "Dots are rows, lines are means.", picture)]
 
 

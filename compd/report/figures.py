@@ -32,7 +32,7 @@ def thinned(rows: IntArray, most: int) -> IntArray:
 
 def against(comparison: Comparison, columns: Sequence[Covariate]) -> Figure | PageTable:
     """One small picture per covariate: dots, and each coordinate's mean in twelve classes of equally many rows."""
-    return small_multiples(comparison, columns, comparison.residual_um, comparison.seen.labels, "residual, um")
+    return small_multiples(comparison, columns, comparison.residual_um, comparison.aligned.labels, "residual, um")
 
 
 def at_links(comparison: Comparison) -> Figure | PageTable:
@@ -44,7 +44,7 @@ def at_links(comparison: Comparison) -> Figure | PageTable:
     figure = make_subplots(1, count, shared_yaxes=True, subplot_titles=[f"link {i + 1}" for i in range(count)])
     rows = np.flatnonzero(comparison.used)
     for i in range(count):
-        length_mm = comparison.seen.rows.link_mm[:, i]
+        length_mm = comparison.aligned.rows.link_mm[:, i]
         _dots_and_means(figure, (1, i + 1), length_mm, links_um[:, i], rows, f"link {i + 1}", SERIES_COLOURS[i], False)
         figure.update_xaxes(title_text="length, mm", row=1, col=i + 1)
     return styled(figure, "length, mm", "error of length, um", 340).update_layout(margin={"t": 60})
@@ -143,14 +143,14 @@ def class_means(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     """Residual vectors in the workspace, and how many times they are enlarged."""
-    seen = comparison.seen
-    used = np.flatnonzero(comparison.used & np.isfinite(seen.rows.tip_M_mm).all(axis=1))
-    if seen.of_links or not len(used):
+    aligned = comparison.aligned
+    used = np.flatnonzero(comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1))
+    if aligned.of_links or not len(used):
         return NOT_RECORDED, 1.0
     chosen = thinned(used, ARROWS)
-    tip = seen.rows.tip_M_mm[chosen]
+    tip = aligned.rows.tip_M_mm[chosen]
     vector_um = np.zeros((len(chosen), 3))
-    vector_um[:, list(seen.axes)] = comparison.residual_um[chosen]
+    vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
     typical_mm = max(float(np.sqrt(np.mean((vector_um**2).sum(axis=1)))) / 1e3, 1e-9)
     reach_mm = float(np.ptp(tip, axis=0).max()) or 1.0
     enlarged = 10.0 ** np.floor(np.log10(ARROW_SHARE * reach_mm / typical_mm))
@@ -161,7 +161,7 @@ def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     size_um = np.linalg.norm(vector_um, axis=1)
     hover = [
         f"({a:+.2f}, {b:+.2f}, {c:+.2f}) um, row {row}"
-        for (a, b, c), row in zip(vector_um, seen.recording.row[chosen], strict=True)
+        for (a, b, c), row in zip(vector_um, aligned.recording.row[chosen], strict=True)
     ]
     figure = Figure()
     figure.add_trace(
@@ -206,7 +206,7 @@ def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
 
 def histogram(comparison: Comparison) -> Figure:
     """Each coordinate's residual, and what noise alone would make."""
-    labels = comparison.seen.labels
+    labels = comparison.aligned.labels
     figure = make_subplots(1, len(labels), subplot_titles=list(labels))
     for k, label in enumerate(labels, start=1):
         values = comparison.residual_um[comparison.used, k - 1]
@@ -250,11 +250,11 @@ def histogram(comparison: Comparison) -> Figure:
 
 def workspace(comparison: Comparison) -> Figure | PageTable:
     """Rms residual in cells of the workspace, seen from above, from the front and from the side."""
-    seen = comparison.seen
-    used = comparison.used & np.isfinite(seen.rows.tip_M_mm).all(axis=1)
+    aligned = comparison.aligned
+    used = comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1)
     if not used.any():
         return NOT_RECORDED
-    tip = seen.rows.tip_M_mm[used]
+    tip = aligned.rows.tip_M_mm[used]
     square = (comparison.residual_um[used] ** 2).mean(axis=1)
     views = [("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2)]
     figure = make_subplots(1, 3, subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)

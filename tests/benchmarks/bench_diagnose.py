@@ -33,15 +33,15 @@ def main() -> None:
         path = Path(folder) / "run.csv"
         diagnose(recorded(path, 1, CASES["one effect"]), (), None, effects)  # compiles the kernels
         for name, hidden in CASES.items():
-            seen = recorded(path, 1, hidden, visits=VISITS)
+            aligned = recorded(path, 1, hidden, visits=VISITS)
             wall_s, processor_s = time.perf_counter(), time.process_time()
-            found = diagnose(seen, (), None, effects)
+            found = diagnose(aligned, (), None, effects)
             wall_s, processor_s = time.perf_counter() - wall_s, time.process_time() - processor_s
             rows.append(
                 [
                     name,
                     found.verdict,
-                    str(len(seen.rows)),
+                    str(len(aligned.rows)),
                     f"{wall_s:.2f}",
                     f"{processor_s:.2f}",
                     f"{BUDGET_S / wall_s:.1f}",

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, added_by, observed
+from compd.comparison.aligned_recording import AlignedRecording, added_by, align_recording
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
@@ -84,15 +84,15 @@ def recorded(
     reference = {f"reference_{axis}_mm": np.zeros(count) for axis in "xyz"}
     configuration = load(shipped_configuration("tripod-cmm.yaml"))
     write_recording(path, columns | reference, SIDECAR, overwrite=True)
-    seen = observed(read_recording(path, configuration), configuration)
+    aligned = align_recording(read_recording(path, configuration), configuration)
     fitted = [FittedEffect(LIBRARY[name], np.array(theta), dict(_shape(name))) for name, theta in effects.items()]
-    _, added = added_by(fitted, seen.rows)
-    tip_mm = seen.predicted_mm(added) + 1e-3 * (extra_um + NOISE_UM * rng.standard_normal((count, 3)))
+    _, added = added_by(fitted, aligned.rows)
+    tip_mm = aligned.predicted_mm(added) + 1e-3 * (extra_um + NOISE_UM * rng.standard_normal((count, 3)))
     tip_mm[12 : 12 + 20 * outliers : 20] += 6e-3
     for axis, values in zip("xyz", tip_mm.T, strict=True):
         reference[f"reference_{axis}_mm"] = values
     write_recording(path, columns | reference, SIDECAR, overwrite=True)
-    return observed(read_recording(path, configuration), configuration)
+    return align_recording(read_recording(path, configuration), configuration)
 
 
 def _shape(name: str) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.comparison.aligned_recording import AlignedRecording, added_by, observed
+from compd.comparison.aligned_recording import AlignedRecording, added_by, align_recording
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
@@ -75,7 +75,7 @@ def record(
     configuration: Configuration | None = None,
     axes: str = "xyz",
 ) -> Path:
-    """Write NAME.csv and NAME.yaml: the tip that these gauges and effects make, seen with noise; gauges have theirs."""
+    """Write NAME.csv and NAME.yaml: the tip that these gauges and effects make, with noise; gauges have theirs."""
     configuration = configuration or tripod()
     sidecar = {
         "machine": machine,
@@ -102,9 +102,9 @@ def tips_mm(
     machine: str,
 ) -> Floats:
     """(N, 3) where a perfect reference sees the tip."""
-    seen = _blank(directory, columns, configuration, machine)
-    _, added = added_by(effects, seen.rows)
-    return seen.predicted_mm(added)
+    aligned = _blank(directory, columns, configuration, machine)
+    _, added = added_by(effects, aligned.rows)
+    return aligned.predicted_mm(added)
 
 
 def _blank(
@@ -114,10 +114,10 @@ def _blank(
     nothing = {f"reference_{axis}_mm": np.arange(len(columns["time_s"])) * 1e-3 for axis in "xyz"}
     sidecar = {"machine": machine, "reference": {"quantity": "tool_position", "frame": "machine"}}
     write_recording(path, {**columns, **nothing}, sidecar, overwrite=True)
-    return observed(read_recording(path, configuration), configuration)
+    return align_recording(read_recording(path, configuration), configuration)
 
 
-def seen(path: Path, configuration: Configuration | None = None) -> AlignedRecording:
+def aligned(path: Path, configuration: Configuration | None = None) -> AlignedRecording:
     """The recording on the shipped tripod, or on another machine."""
     configuration = configuration or tripod()
-    return observed(read_recording(path, configuration), configuration)
+    return align_recording(read_recording(path, configuration), configuration)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.comparison.aligned_recording import observed
+from compd.comparison.aligned_recording import align_recording
 from compd.comparison.compare import compare
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.errors import CompdError, RecordingError
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
-from tests.support.measured import SIGMA_UM, Floats, gauges, hidden, record, seen, tips_mm, tripod
+from tests.support.measured import SIGMA_UM, Floats, aligned, gauges, hidden, record, tips_mm, tripod
 from tests.support.paths import SHARED
 
 AT_FLOOR = 1.1
@@ -30,7 +30,7 @@ def shared(*parts: str) -> Path:
 
 @pytest.mark.parametrize("name", ["train.csv", "valid.csv"])
 def test_with_nothing_missing_the_residual_is_the_noise(name: str) -> None:
-    found = compare(seen(shared("recordings", "example-nothing-missing", name)))
+    found = compare(aligned(shared("recordings", "example-nothing-missing", name)))
     assert found.floor_ratio < AT_FLOOR
     assert found.at_floor
     assert found.floor.source == "repeats"
@@ -41,7 +41,7 @@ def test_with_nothing_missing_the_residual_is_the_noise(name: str) -> None:
 
 @pytest.mark.parametrize("case", ["link-expansion", "plate-bending", "not-in-the-library", "elastic-and-backlash"])
 def test_a_missing_cause_is_seen(case: str) -> None:
-    found = compare(seen(shared("recordings", f"example-{case}", "train.csv")))
+    found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
     assert found.floor_ratio > 5
     assert not found.at_floor
     assert found.findings
@@ -56,7 +56,7 @@ def test_a_missing_cause_is_seen(case: str) -> None:
     ],
 )
 def test_words_name_what_the_error_follows(case: str, coordinate: str, covariate: str) -> None:
-    found = compare(seen(shared("recordings", f"example-{case}", "train.csv")))
+    found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
     first = found.findings[0]
     assert (first.coordinate, first.covariate) == (coordinate, covariate)
     assert first.text.startswith(f"{coordinate} error follows {covariate}, ")
@@ -68,12 +68,12 @@ def test_a_hexapod_reaches_the_floor(tmp_path: Path) -> None:
     columns = gauges(300, 5, links=6, joints=len(configuration.wiring.joint))
     columns |= {f"scale_{i}_mm": columns[f"scale_{i}_mm"] / 4 for i in range(1, 7)}
     path = record(tmp_path, columns, machine="hexapod", configuration=configuration)
-    assert compare(seen(path, configuration)).floor_ratio < AT_FLOOR
+    assert compare(aligned(path, configuration)).floor_ratio < AT_FLOOR
 
 
 def test_a_real_machine_with_a_model_of_its_own() -> None:
-    found = compare(observed(read_recording(shared("real", "voron-frame-expansion.csv")), None))
-    assert found.seen.labels == ("z",)
+    found = compare(align_recording(read_recording(shared("real", "voron-frame-expansion.csv")), None))
+    assert found.aligned.labels == ("z",)
     assert found.floor.um == pytest.approx(1.2, abs=0.2)  # repeats scatter less than the declared motor step
     assert found.rms_um > 50
     assert any(one.covariate == "temperature_frame" for one in found.findings)
@@ -83,12 +83,12 @@ def test_a_real_machine_with_a_model_of_its_own() -> None:
 def test_an_instrument_in_a_frame_of_its_own(tmp_path: Path) -> None:
     columns = gauges(300, 2)
     path = record(tmp_path, columns)
-    in_M = compare(seen(path))
+    in_M = compare(aligned(path))
     turned = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()
     moved = _move(path, turned, np.array([1500.0, -320.0, 80.0]), {"quantity": "tool_position", "frame": "instrument"})
-    found = compare(seen(moved))
-    assert found.seen.registration is not None
-    np.testing.assert_allclose(found.seen.registration.rotation, turned.T, atol=1e-6)
+    found = compare(aligned(moved))
+    assert found.aligned.registration is not None
+    np.testing.assert_allclose(found.aligned.registration.rotation, turned.T, atol=1e-6)
     assert found.rms_um == pytest.approx(in_M.rms_um, rel=0.01)
     assert "registration" in found.as_json()
 
@@ -98,8 +98,8 @@ def test_gross_rows_do_not_bend_the_instruments_frame(tmp_path: Path) -> None:
     path = record(tmp_path, columns)
     turned = Rotation.from_rotvec([0.0, 0.1, -0.3]).as_matrix()
     to = {"quantity": "tool_position", "frame": "instrument"}
-    clean = compare(seen(_move(path, turned, np.array([10.0, 20.0, 30.0]), to)))
-    gross = compare(seen(_move(path, turned, np.array([10.0, 20.0, 30.0]), to, gross_mm=3.0)))
+    clean = compare(aligned(_move(path, turned, np.array([10.0, 20.0, 30.0]), to)))
+    gross = compare(aligned(_move(path, turned, np.array([10.0, 20.0, 30.0]), to, gross_mm=3.0)))
     assert gross.outlier.sum() == 3
     assert gross.rms_um == pytest.approx(clean.rms_um, rel=0.02)
 
@@ -118,8 +118,8 @@ def _move(path: Path, turned: Floats, by_mm: Floats, reference: dict[str, object
 
 def test_one_axis_alone(tmp_path: Path) -> None:
     path = record(tmp_path, gauges(300, 6), axes="z")
-    found = compare(seen(path))
-    assert found.seen.labels == ("z",)
+    found = compare(aligned(path))
+    assert found.aligned.labels == ("z",)
     assert found.floor_ratio < AT_FLOOR
     assert list(found.as_json()["residual_rms_xyz_um"]) == ["z"]
 
@@ -138,8 +138,8 @@ def test_links_measured_by_interferometer(tmp_path: Path) -> None:
     reference = {"quantity": "link_length", "sigma_um": 0.1}
     path = tmp_path / "links.csv"
     write_recording(path, {**gone, **lengths}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(seen(path))
-    assert found.seen.labels == ("link 1", "link 3")
+    found = compare(aligned(path))
+    assert found.aligned.labels == ("link 1", "link 3")
     assert found.rms_um == pytest.approx(0.1, rel=0.1)
     assert found.floor_ratio < AT_FLOOR
     assert found.sources["joints"].without_rms_um > 5
@@ -157,8 +157,8 @@ def test_a_ball_plate(tmp_path: Path) -> None:
     path = tmp_path / "balls.csv"
     reference = {"quantity": "ball_plate", "balls": "plate.csv", "sigma_um": SIGMA_UM}
     write_recording(path, {**columns, "ball": np.arange(90.0)}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(seen(path))
-    assert found.seen.registered
+    found = compare(aligned(path))
+    assert found.aligned.registered
     assert found.floor.source == "declared"
     assert found.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
 
@@ -166,14 +166,14 @@ def test_a_ball_plate(tmp_path: Path) -> None:
 def test_attitude_is_compared_too(tmp_path: Path) -> None:
     columns = gauges(60, 9)
     path = record(tmp_path, columns)
-    first = seen(path)
+    first = aligned(path)
     recording = first.recording
     turned = Rotation.from_matrix(first.rows.rotation_M_P) * Rotation.from_rotvec([0.0, 0.0, 20e-6])
     attitude = {f"reference_r{axis}_rad": turned.as_rotvec()[:, k] for k, axis in enumerate("xyz")}
     pose = tmp_path / "pose.csv"
     reference = {"quantity": "tool_pose", "frame": "machine", "sigma_um": SIGMA_UM}
     write_recording(pose, {**recording.columns, **attitude}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(seen(pose)).as_json()
+    found = compare(aligned(pose)).as_json()
     assert found["attitude_rms_urad"] == pytest.approx(20 / np.sqrt(3), rel=1e-3)
     assert found["floor_ratio"] < 1.3
 
@@ -182,14 +182,14 @@ def test_attitude_is_compared_too(tmp_path: Path) -> None:
 def test_one_per_cent_of_gross_rows_moves_nothing(tmp_path: Path, size_um: float) -> None:
     columns = gauges(600, 11)
     path = record(tmp_path, columns)
-    clean = compare(seen(path))
+    clean = compare(aligned(path))
     recording = read_recording(path, tripod())
     spoilt = dict(recording.columns)
     rows = np.arange(30, 600, 100)
     spoilt["reference_y_mm"] = spoilt["reference_y_mm"].copy()
     spoilt["reference_y_mm"][rows] += size_um / 1e3
     write_recording(path, spoilt, {"machine": "tripod-cmm", "reference": _plain()}, overwrite=True)
-    found = compare(seen(path))
+    found = compare(aligned(path))
     assert found.as_json()["outlier_rows"] == (rows + 2).tolist()
     assert found.rms_um == pytest.approx(clean.rms_um, rel=0.01)
     assert found.floor.um == pytest.approx(clean.floor.um, rel=0.03)
@@ -204,7 +204,7 @@ def test_a_rare_load_that_bends_the_machine_is_not_gross(tmp_path: Path) -> None
     columns = gauges(600, 12)
     loaded = np.repeat(np.arange(200) % 4 == 0, 3)
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
-    found = compare(seen(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])))
+    found = compare(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])))
     assert found.outlier.sum() <= 0.03 * 600
     assert not found.at_floor
 
@@ -218,7 +218,7 @@ def test_empty_cells_leave_their_row_out_and_are_counted(tmp_path: Path) -> None
         cells[index] = ""
         lines[row] = ",".join(cells)
     path.write_text("\n".join(lines) + "\n")
-    found = compare(seen(path)).as_json()
+    found = compare(aligned(path)).as_json()
     assert found["rows_used"] == 57
     assert found["rows_excluded"] == 3
     assert found["excluded_by_reason"] == {"scale_2_mm is empty": 3}
@@ -227,19 +227,19 @@ def test_empty_cells_leave_their_row_out_and_are_counted(tmp_path: Path) -> None
 def test_switching_the_joints_off_is_what_unmoved_joints_predict(tmp_path: Path) -> None:
     columns = gauges(60, 14)
     path = record(tmp_path, columns)
-    one = seen(path)
+    one = aligned(path)
     unmoved = {name: np.zeros(60) if name.startswith("joint_") else values for name, values in columns.items()}
     for axis in "xyz":
         unmoved[f"reference_{axis}_mm"] = one.recording.columns[f"reference_{axis}_mm"]
     write_recording(tmp_path / "still.csv", unmoved, {"machine": "tripod-cmm", "reference": _plain()})
-    still = compare(seen(tmp_path / "still.csv"))
+    still = compare(aligned(tmp_path / "still.csv"))
     assert compare(one).sources["joints"].without_rms_um == pytest.approx(still.rms_um, rel=1e-3)
 
 
 def test_an_effect_that_lacks_its_quantity_is_refused_in_words(tmp_path: Path) -> None:
     columns = {name: values for name, values in gauges(30, 15).items() if "temperature_link" not in name}
     with pytest.raises(CompdError, match="needs temperature_link_2_degC"):
-        compare(seen(record(tmp_path, columns)), [hidden("link_expansion", 1.0)])
+        compare(aligned(record(tmp_path, columns)), [hidden("link_expansion", 1.0)])
 
 
 def test_rows_without_a_pose_are_counted_with_the_reason(tmp_path: Path) -> None:
@@ -251,7 +251,7 @@ def test_rows_without_a_pose_are_counted_with_the_reason(tmp_path: Path) -> None
     text[5] = ",".join(cells)
     path.write_text("\n".join(text) + "\n")
     with_configuration = read_recording(path)
-    found = compare(observed(with_configuration, tripod()))
+    found = compare(align_recording(with_configuration, tripod()))
     (reason,) = found.left_out
     assert reason.startswith("no pose: ")
     assert found.used.sum() == 29
@@ -260,4 +260,4 @@ def test_rows_without_a_pose_are_counted_with_the_reason(tmp_path: Path) -> None
 def test_too_few_rows_are_refused(tmp_path: Path) -> None:
     path = record(tmp_path, gauges(4, 17))
     with pytest.raises(RecordingError, match="too few rows"):
-        compare(seen(path))
+        compare(aligned(path))

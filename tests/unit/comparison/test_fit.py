@@ -13,11 +13,11 @@ from compd.comparison.aligned_recording import AlignedRecording, added_by
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, start
 from compd.comparison.prediction_uncertainty import first_order, gauge_noise, monte_carlo
-from compd.comparison.shape_search import search
+from compd.comparison.shape_search import search_constants
 from compd.errors import CompdError
 from compd.model.effect import FittedEffect
 from compd.model.library import library
-from tests.support.measured import SIGMA_UM, gauges, hidden, record, seen
+from tests.support.measured import SIGMA_UM, aligned, gauges, hidden, record
 
 Floats = NDArray[np.float64]
 LIBRARY = library()
@@ -26,7 +26,7 @@ LIBRARY = library()
 @pytest.fixture(scope="module")
 def blank(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
     """A recording whose measured tips the tests replace."""
-    return seen(record(tmp_path_factory.mktemp("fit"), gauges(300, 40)))
+    return aligned(record(tmp_path_factory.mktemp("fit"), gauges(300, 40)))
 
 
 def measured(blank: AlignedRecording, effects: list[FittedEffect], noise_um: Floats) -> AlignedRecording:
@@ -106,7 +106,7 @@ def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> N
     columns = gauges(600, 41)
     loaded = np.repeat(np.arange(200) % 6 == 0, 3)
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
-    found = fit(seen(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
+    found = fit(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
     assert not found.outlier.any()
     assert found.fitted[0].effect.parameters[0].shown(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
 
@@ -124,14 +124,14 @@ def test_a_time_constant_is_searched(tmp_path: Path) -> None:
         steps = np.repeat(np.random.default_rng(i).normal(0, 1.5, 12), 50)
         columns[f"temperature_link_{i}_degC"] = 20 + steps
     truth = hidden("link_expansion_lag", 8.0, tau=1300.0)
-    one = seen(record(tmp_path, columns, [truth]))
-    (found,) = search(one, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
+    one = aligned(record(tmp_path, columns, [truth]))
+    (found,) = search_constants(one, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
     assert found.shape["tau"] == pytest.approx(1300.0, rel=0.05)
     assert found.theta[0] == pytest.approx(8.0, rel=0.02)
 
 
 def test_too_few_rows_for_the_numbers(tmp_path: Path) -> None:
-    one = seen(record(tmp_path, gauges(3, 43)))
+    one = aligned(record(tmp_path, gauges(3, 43)))
     with pytest.raises(CompdError, match="numbers to fit"):
         fit(one, fresh("base_joint_position", "link_zero"))
 

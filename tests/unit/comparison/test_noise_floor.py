@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.comparison.noise_floor import gross_rows, noise_floor, repeat_scatter
+from compd.comparison.noise_floor import noise_floor, outlier_rows, repeat_scatter
 from compd.comparison.prediction_uncertainty import gauge_noise
-from tests.support.measured import GAUGE_SIGMA_UM, gauges, record, seen
+from tests.support.measured import GAUGE_SIGMA_UM, aligned, gauges, record
 
 Floats = NDArray[np.float64]
 UNKNOWN = np.full(3, np.nan)
@@ -94,23 +94,23 @@ def test_the_last_resort_is_an_estimate_and_called_so() -> None:
 def test_rows_beyond_all_noise_are_found_and_others_are_not() -> None:
     values = noisy(5000)
     values[[17, 400, 401]] += [[0, 2, 0], [-3, 0, 0], [0, 0, 900]]
-    assert np.flatnonzero(gross_rows(values, everything(values))).tolist() == [17, 400, 401]
+    assert np.flatnonzero(outlier_rows(values, everything(values))).tolist() == [17, 400, 401]
 
 
 def test_what_a_repeat_confirms_is_not_gross() -> None:
     values = noisy(400)
     values[10:12, 0] += 5  # both rows of one visit
     values[21, 0] += 5  # one row of another
-    assert np.flatnonzero(gross_rows(values, everything(values), pairs(400))).tolist() == [21]
+    assert np.flatnonzero(outlier_rows(values, everything(values), pairs(400))).tolist() == [21]
 
 
 def test_rounded_values_have_no_gross_rows() -> None:
     values = np.round(noisy(1000, 0.3))  # mostly exact zeros: a median of nothing
-    assert not gross_rows(values, everything(values)).any()
+    assert not outlier_rows(values, everything(values)).any()
 
 
 def test_the_gauges_noise_is_their_scatter_within_visits(tmp_path: Path) -> None:
-    found = gauge_noise(seen(record(tmp_path, gauges(900, 30))))
+    found = gauge_noise(aligned(record(tmp_path, gauges(900, 30))))
     np.testing.assert_allclose(found.joint_mm * 1e3, GAUGE_SIGMA_UM, rtol=0.2)
     np.testing.assert_allclose(found.frame_mm * 1e3, GAUGE_SIGMA_UM, rtol=0.2)
     np.testing.assert_allclose(found.scale_mm * 1e3, 1e-3 / np.sqrt(12))  # written to a nanometre, and repeating
@@ -120,6 +120,6 @@ def test_the_gauges_noise_is_their_scatter_within_visits(tmp_path: Path) -> None
 def test_without_repeats_the_last_digit_is_the_least_noise(tmp_path: Path) -> None:
     columns = gauges(300, 31)
     del columns["visit"]
-    found = gauge_noise(seen(record(tmp_path, columns)))
+    found = gauge_noise(aligned(record(tmp_path, columns)))
     np.testing.assert_allclose(found.joint_mm * 1e3, 0.01 / np.sqrt(12))
     assert "lower bound" in found.how

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compd.cli.recording import read_with_machine
-from compd.comparison.aligned_recording import observed
+from compd.comparison.aligned_recording import align_recording
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.holdout import opened
 from compd.diagnosis.verdict import Diagnosis
@@ -82,9 +82,9 @@ def test_nothing_hidden_is_adequate_and_costs_no_search(tmp_path: Path) -> None:
 
 def test_weak_disturbances_are_no_verdict(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    seen = recorded(tmp_path / "still.csv", 4, {})
-    warm = seen.rows.quantities["temperature_tool_degC"] - 20.0
-    wet = seen.rows.quantities["humidity_pct"] - 50.0
+    aligned = recorded(tmp_path / "still.csv", 4, {})
+    warm = aligned.rows.quantities["temperature_tool_degC"] - 20.0
+    wet = aligned.rows.quantities["humidity_pct"] - 50.0
     weak_um = 0.03 * (warm[:, None] * rng.standard_normal(3) + wet[:, None] / 8.0 * rng.standard_normal(3))
     found = diagnosed(tmp_path, {}, seed=4, extra_um=weak_um)
     assert found.verdict == "adequate"
@@ -103,16 +103,16 @@ def test_outliers_are_listed_and_change_nothing(tmp_path: Path) -> None:
 def test_an_effect_of_the_model_is_refitted_and_not_proposed_again(tmp_path: Path) -> None:
     both = {"link_elasticity": (1 / 30,), "scale_expansion": (9.0,)}
     first = diagnosed(tmp_path, {"link_elasticity": both["link_elasticity"]})
-    seen = recorded(tmp_path / "both.csv", 2, both)
-    found = diagnose(seen, first.after.fitted, None, EFFECTS)
+    aligned = recorded(tmp_path / "both.csv", 2, both)
+    found = diagnose(aligned, first.after.fitted, None, EFFECTS)
     assert names(found) == ["scale_expansion"]
     assert "link_elasticity" not in [one.effect for one in found.candidates]
     assert [one.effect.id for one in found.after.fitted] == ["link_elasticity", "scale_expansion"]
 
 
 def test_what_cannot_be_told_apart_is_named_with_the_rows_that_can(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 6, {"tool_offset": (0.5, -0.4, 0.3)})
-    found = diagnose(seen, (), None, EFFECTS)
+    aligned = recorded(tmp_path / "run.csv", 6, {"tool_offset": (0.5, -0.4, 0.3)})
+    found = diagnose(aligned, (), None, EFFECTS)
     (step,) = found.steps
     assert found.verdict == "ambiguous"
     assert {step.effect.id, *(rival.name for rival in step.rivals)} >= {"tool_offset", "link_zero"}
@@ -129,14 +129,14 @@ def test_an_effect_that_needs_an_implausible_number_is_not_named(tmp_path: Path)
 
 
 def test_missing_columns_are_not_testable_and_say_which(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {"link_expansion": (1.5,)})
+    aligned = recorded(tmp_path / "run.csv", 1, {"link_expansion": (1.5,)})
     text = (tmp_path / "run.csv").read_text().replace("force_x_N", "current_x_A")
     (tmp_path / "less.csv").write_text(text)
     (tmp_path / "less.yaml").write_text((tmp_path / "run.yaml").read_text())
     recording, configuration = read_with_machine(tmp_path / "less.csv", None)
-    found = diagnose(observed(recording, configuration), (), None, EFFECTS)
+    found = diagnose(align_recording(recording, configuration), (), None, EFFECTS)
     judged = {one.effect: one for one in found.candidates}
-    assert seen.rows.links == 3
+    assert aligned.rows.links == 3
     assert judged["link_elasticity"].status == "not_testable"
     assert "force_x_N" in judged["link_elasticity"].why
     assert names(found) == ["link_expansion"]
@@ -181,7 +181,7 @@ def test_the_examples(folder: Path | None) -> None:
         pytest.skip("the example recordings (../shared/recordings) are not here")
     answer = json.loads((folder / "answer.json").read_text())
     recording, configuration = read_with_machine(folder / "train.csv", None)
-    found = diagnose(observed(recording, configuration), (), None, EFFECTS)
+    found = diagnose(align_recording(recording, configuration), (), None, EFFECTS)
     assert names(found) == answer["answers"]
     wanted = {"adequate": "adequate", "outside": "unexplained"}.get(answer["kind"], "identified")
     assert found.verdict == wanted
@@ -189,4 +189,4 @@ def test_the_examples(folder: Path | None) -> None:
         assert [one.covariate for one in found.depends_on][:1] == ["humidity_pct"]
         return
     recording, configuration = read_with_machine(folder / "valid.csv", None)
-    assert opened(found, observed(recording, configuration)).after.floor_ratio <= 1.1
+    assert opened(found, align_recording(recording, configuration)).after.floor_ratio <= 1.1

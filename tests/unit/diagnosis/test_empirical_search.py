@@ -24,34 +24,34 @@ EFFECTS = list(LIBRARY.values())
 Cause = Callable[[AlignedRecording], FloatArray]
 
 
-def wet(seen: AlignedRecording) -> FloatArray:
+def wet(aligned: AlignedRecording) -> FloatArray:
     """All links swell with humidity: the tip by the Jacobian's row sums."""
-    by_links = seen.sensitivity(["link"])["link"].tip.sum(axis=2)
-    return by_links * 0.05 * (seen.rows.quantities["humidity_pct"] - 50.0)[:, None]
+    by_links = aligned.sensitivity(["link"])["link"].tip.sum(axis=2)
+    return by_links * 0.05 * (aligned.rows.quantities["humidity_pct"] - 50.0)[:, None]
 
 
-def pressed(seen: AlignedRecording) -> FloatArray:
-    return np.outer(0.08 * (seen.rows.quantities["pressure_hPa"] - 1013.0), (0.3, 0.0, 1.0))
+def pressed(aligned: AlignedRecording) -> FloatArray:
+    return np.outer(0.08 * (aligned.rows.quantities["pressure_hPa"] - 1013.0), (0.3, 0.0, 1.0))
 
 
-def hit(seen: AlignedRecording) -> FloatArray:
-    return np.outer(seen.rows.time_s > 3000.0, (0.8, -0.5, 0.4))
+def hit(aligned: AlignedRecording) -> FloatArray:
+    return np.outer(aligned.rows.time_s > 3000.0, (0.8, -0.5, 0.4))
 
 
-def breathing(seen: AlignedRecording) -> FloatArray:
-    return np.outer(np.sin(2 * np.pi * seen.rows.time_s / 800.0), (0.0, 0.2, 0.7))
+def breathing(aligned: AlignedRecording) -> FloatArray:
+    return np.outer(np.sin(2 * np.pi * aligned.rows.time_s / 800.0), (0.0, 0.2, 0.7))
 
 
-def dragged(seen: AlignedRecording) -> FloatArray:
-    away = np.maximum(0.0, 0.5 + seen.rows.tip_M_mm[:, 0] / 120.0)
+def dragged(aligned: AlignedRecording) -> FloatArray:
+    away = np.maximum(0.0, 0.5 + aligned.rows.tip_M_mm[:, 0] / 120.0)
     return np.outer(away**3, (-0.9, 0.0, 0.3))
 
 
 def caused(path: Path, cause: Cause, effects: dict[str, tuple[float, ...]], seed: int = 1) -> Diagnosis:
     """The diagnosis of a recording on which a cause that nobody knows acts along."""
     still = recorded(path / "still.csv", seed, {})
-    seen = recorded(path / "run.csv", seed, effects, extra_um=cause(still))
-    return diagnose(seen, (), None, EFFECTS)
+    aligned = recorded(path / "run.csv", seed, effects, extra_um=cause(still))
+    return diagnose(aligned, (), None, EFFECTS)
 
 
 @pytest.mark.parametrize(
@@ -83,8 +83,8 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     assert first["port"] == "link"
     assert first["note"] == "a description, not a cause"
     effect = find(first["formula_effect"], "pasted")
-    seen = found.before.seen
-    result = fit(seen, [start(effect, {}, seen.rows.links)], found.before.floor.by_axis_um)
+    aligned = found.before.aligned
+    result = fit(aligned, [start(effect, {}, aligned.rows.links)], found.before.floor.by_axis_um)
     assert result.rms_um < 1.1 * found.before.floor.um
     slope = dict(zip((name.split(".")[1] for name in result.names), result.fitted[0].theta, strict=True))["k"]
     assert slope == pytest.approx(0.05, abs=0.004)
@@ -106,9 +106,9 @@ def test_the_real_frame_needs_two_temperatures() -> None:
     if not path.exists():
         pytest.skip("the real recording (../shared/real) is not here")
     from compd.cli.recording import read_with_machine
-    from compd.comparison.aligned_recording import observed
+    from compd.comparison.aligned_recording import align_recording
 
-    found = diagnose(observed(*read_with_machine(path, None)), (), None, EFFECTS)
+    found = diagnose(align_recording(*read_with_machine(path, None)), (), None, EFFECTS)
     assert found.verdict == "unexplained"
     assert found.steps == ()
     both = [one for one in found.depends_on if one.beside]
@@ -152,11 +152,11 @@ def test_a_column_that_acts_in_one_fold_alone_cannot_be_learned() -> None:
 
 
 def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {})
-    by_session, by_place = schemes(seen)
+    aligned = recorded(tmp_path / "run.csv", 1, {})
+    by_session, by_place = schemes(aligned)
     assert len(np.unique(by_session)) == 4
     assert len(np.unique(by_place)) == SECTORS
-    point, session = seen.recording.point, seen.recording.session
+    point, session = aligned.recording.point, aligned.recording.session
     assert point is not None
     assert session is not None
     for names, fold in ((session, by_session), (point, by_place)):

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from compd.cli.diagnose import diagnose as diagnose_command
 from compd.cli.plan import plan as plan_command
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.shape_search import search
+from compd.comparison.shape_search import search_constants
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, limits_of
 from compd.diagnosis.next_measurement import MeasurementPlan, plan
 from compd.errors import CompdError, RecordingError
@@ -31,21 +31,21 @@ def app() -> typer.Typer:
     return found
 
 
-def rivals(seen: AlignedRecording, *names: str) -> tuple[FittedEffect, FittedEffect]:
-    first, second = (search(seen, (), LIBRARY[name], SIGMA_UM).fitted[-1] for name in names)
+def rivals(aligned: AlignedRecording, *names: str) -> tuple[FittedEffect, FittedEffect]:
+    first, second = (search_constants(aligned, (), LIBRARY[name], SIGMA_UM).fitted[-1] for name in names)
     return first, second
 
 
 def planned(
-    seen: AlignedRecording, names: tuple[str, str], rows: int = 30, limits: ProgrammeLimits | None = None
+    aligned: AlignedRecording, names: tuple[str, str], rows: int = 30, limits: ProgrammeLimits | None = None
 ) -> MeasurementPlan:
-    return plan(seen, (), rivals(seen, *names), SIGMA_UM, limits or limits_of(seen), rows)
+    return plan(aligned, (), rivals(aligned, *names), SIGMA_UM, limits or limits_of(aligned), rows)
 
 
 def test_a_plan_separates_spring_and_contact_by_loads(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
-    limits = limits_of(seen)._replace(force_N=120.0)
-    found = planned(seen, ("link_elasticity", "joint_contact"), 30, limits)
+    aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
+    limits = limits_of(aligned)._replace(force_N=120.0)
+    found = planned(aligned, ("link_elasticity", "joint_contact"), 30, limits)
     assert found.separation > 1.5 * found.before
     assert len(found.rows) <= 30
     loads = np.array([[row[f"force_{axis}_N"] for axis in "xyz"] for row in found.rows])
@@ -54,23 +54,23 @@ def test_a_plan_separates_spring_and_contact_by_loads(tmp_path: Path) -> None:
 
 
 def test_a_plan_separates_backlash_and_friction_by_growing_reversals(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {"friction_hysteresis": (0.8,)})
-    found = planned(seen, ("friction_hysteresis", "backlash"))
+    aligned = recorded(tmp_path / "run.csv", 1, {"friction_hysteresis": (0.8,)})
+    found = planned(aligned, ("friction_hysteresis", "backlash"))
     assert found.separation > found.before
     assert "reversals in growing steps" in {row["purpose"] for row in found.rows}
 
 
 def test_more_rows_separate_more(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 2, {"tool_offset": (0.5, -0.4, 0.3)})
-    few, many = (planned(seen, ("tool_offset", "link_zero"), rows) for rows in (6, 30))
+    aligned = recorded(tmp_path / "run.csv", 2, {"tool_offset": (0.5, -0.4, 0.3)})
+    few, many = (planned(aligned, ("tool_offset", "link_zero"), rows) for rows in (6, 30))
     assert few.before < few.separation < many.separation
 
 
 def test_a_plan_stays_within_its_limits(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
+    aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
     low, high = np.array([-20.0, -15.0, 170.0]), np.array([25.0, 20.0, 200.0])
     limits = ProgrammeLimits(low, high, 30.0, (18.0, 23.0), 0.0)
-    found = planned(seen, ("link_expansion", "link_elasticity"), 40, limits)
+    found = planned(aligned, ("link_expansion", "link_elasticity"), 40, limits)
     for row in found.rows:
         tip = np.array([row[f"tip_{axis}_mm"] for axis in "xyz"])
         assert (low - 1e-3 <= tip).all()
@@ -81,10 +81,10 @@ def test_a_plan_stays_within_its_limits(tmp_path: Path) -> None:
 
 
 def test_a_place_out_of_reach_is_said(tmp_path: Path) -> None:
-    seen = recorded(tmp_path / "run.csv", 1, {})
-    far = limits_of(seen)._replace(tip_high_M_mm=np.array([5000.0, 5000.0, 5000.0]))
+    aligned = recorded(tmp_path / "run.csv", 1, {})
+    far = limits_of(aligned)._replace(tip_high_M_mm=np.array([5000.0, 5000.0, 5000.0]))
     with pytest.raises(RecordingError, match="out of reach"):
-        planned(seen, ("tool_offset", "link_zero"), 10, far)
+        planned(aligned, ("tool_offset", "link_zero"), 10, far)
 
 
 def test_the_plan_command_writes_csv(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.model.effect import Effect, FittedEffect, deltas, together
+from compd.model.effect import Effect, FittedEffect, deltas, sum_deltas
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations, moved
 from compd.model.observe import Movement, constants, observe
@@ -88,7 +88,7 @@ def test_the_tip_is_where_the_workbench_predicts_it(model: MachineModel, effect:
     found, _ = compensate_cmm(machine, values, WarmStart.at_zero(machine))
     rows = seen_as_recording(model, values)
     each, _ = deltas(machine.effects, rows, {})
-    predicted = predict(model, rows, together(list(each.values())))
+    predicted = predict(model, rows, sum_deltas(list(each.values())))
     assert not found.reason.any()
     assert found.tip_M_mm == pytest.approx(predicted.tip_mm, abs=1e-9)
     assert found.link_length_mm == pytest.approx(predicted.link_length_mm, abs=1e-9)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.model.effect import PORTS, Deltas, FittedEffect, Port, delta, deltas, port_size, together
+from compd.model.effect import PORTS, Deltas, FittedEffect, Port, delta, deltas, port_size, sum_deltas
 from compd.model.joint_correction import scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_vector
 from compd.model.kinematics import inverse_kinematics
@@ -125,7 +125,7 @@ def test_shares_add_up() -> None:
     fitted = [FittedEffect(LIBRARY[id_], np.full(len(LIBRARY[id_].columns(3)), 2.0)) for id_ in ids]
     each, _ = deltas(fitted, rows, {})
     found = shares(TRIPOD, rows, each)
-    whole = predict(TRIPOD, rows, together(list(each.values()))).tip_mm - predict(TRIPOD, rows, {}).tip_mm
+    whole = predict(TRIPOD, rows, sum_deltas(list(each.values()))).tip_mm - predict(TRIPOD, rows, {}).tip_mm
     assert list(found) == ids
     np.testing.assert_allclose(sum(found.values()), whole, atol=1e-12)
     alone: Deltas = each["tool_bending"]
@@ -145,7 +145,7 @@ def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
         if model is not HEXAPOD or "revolute_axes" not in effect.needs
     ]
     each, _ = deltas(fitted, rows, {})
-    found = together(list(each.values()))
+    found = sum_deltas(list(each.values()))
     shown = predict(model, rows, found)
     machine = altered(model, rows.joint_mm, rows.frame_mm, found)
     places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
