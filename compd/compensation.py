@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
-from compd.model.apply_effects import EffectInputs, EffectMemory, act, whole, with_all
+from compd.model.apply_effects import EffectInputs, EffectMemory, apply_effects, final, final_array
 from compd.model.frame import Frame, solve_frame
 from compd.model.joint_correction import joint_shortening, link_length_mm, scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix
@@ -114,7 +114,7 @@ def compensate_machine_tool(
     Raises KinematicsError for an attitude asked of a tripod.
     """
     attitude = _attitude(model, target_rotation_B0_rad, warm)
-    wanted = model.arrangement.wanted(model.frame, target_mm)
+    wanted = model.arrangement.target_contact(model.frame, target_mm)
     frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
     nominal = inverse_kinematics(model.mechanism(model.zero.base_joints_M_mm), *wanted, attitude)
     needed = inverse_kinematics(model.mechanism(frame.base_joints_M_mm), *wanted, attitude)
@@ -124,11 +124,13 @@ def compensate_machine_tool(
     reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, needed.reason))
     after = WarmStart(frame.supports_M_mm, needed.origin_M_mm, needed.rotation_M_P, warm.effects)
     found = _Found(frame, needed, wanted, wanted, command, reason)
-    if model.acting:
+    if model.live_effects:
         plain = found
         for _ in range(_LOOKS):
             scale_mm = found.command.scale_setpoint_mm
-            machine, remembered = act(model, _sight(values, scale_mm, frame, needed, wanted), warm.effects, True)
+            machine, remembered = apply_effects(
+                model, _sight(values, scale_mm, frame, needed, wanted), warm.effects, True
+            )
             found = _with_effects(model, plain, machine, attitude)
         after = after._replace(effects=remembered)
     return _result(model, found, warm, after)
@@ -150,23 +152,25 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     nominal = forward_kinematics(
         model.mechanism(model.zero.base_joints_M_mm), zero_mm + values.scale_mm, warm.origin_M_mm, warm.rotation_M_P
     )
-    wanted = model.arrangement.made(nominal)
+    wanted = model.arrangement.contact_at(nominal)
     needed = inverse_kinematics(now, *wanted, nominal.rotation_M_P)
     command = _command(model, nominal, values.scale_mm, needed, shortening_mm)
     reason = np.maximum(
         np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, needed.reason))
     )
     after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P, warm.effects)
-    found = _Found(frame, pose, model.arrangement.made(pose), wanted, command, reason)
-    if model.acting:
-        machine, remembered = act(model, _sight(values, values.scale_mm, frame, pose, found.made), warm.effects, False)
+    found = _Found(frame, pose, model.arrangement.contact_at(pose), wanted, command, reason)
+    if model.live_effects:
+        machine, remembered = apply_effects(
+            model, _sight(values, values.scale_mm, frame, pose, found.made), warm.effects, False
+        )
         corrected = _with_effects(model, found, machine, nominal.rotation_M_P)
         each_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm) + machine.reading_to_length_mm
         there = forward_kinematics(
-            whole(machine.mechanism, now), with_all(each_mm, length_mm), warm.origin_M_mm, warm.rotation_M_P
+            final(machine.mechanism, now), final_array(each_mm, length_mm), warm.origin_M_mm, warm.rotation_M_P
         )
         tool_mm = wanted.tip_M_mm if isinstance(model.arrangement, ToolOnPlate) else wanted.tip_P_mm
-        made = type(model.arrangement)(with_all(machine.tool_mm, tool_mm)).made(there)
+        made = type(model.arrangement)(final_array(machine.tool_mm, tool_mm)).contact_at(there)
         found = corrected._replace(pose=there, made=made, reason=np.maximum(corrected.reason, there.reason))
         after = after._replace(effects=remembered)
     return _result(model, found, warm, after)
@@ -222,7 +226,7 @@ def _with_effects(model: MachineModel, found: _Found, machine: PerturbedMachine,
         model.zero.link_length_mm, each.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
     )
     shares_mm = setpoints_mm - np.concatenate([before.scale_setpoint_mm[None], setpoints_mm[:-1]])
-    ids = [one.effect.id for one in model.acting]
+    ids = [one.effect.id for one in model.live_effects]
     setpoint_mm = setpoints_mm[-1]
     command = _Command(
         before.nominal_scale_mm,
@@ -233,8 +237,8 @@ def _with_effects(model: MachineModel, found: _Found, machine: PerturbedMachine,
     reasons = np.maximum(machine.reason, each.reason)
     worst = reasons.max(axis=0) if reasons.ndim > found.reason.ndim else reasons
     return found._replace(
-        frame=whole(machine.frame, found.frame),
-        pose=whole(each, found.pose),
+        frame=final(machine.frame, found.frame),
+        pose=final(each, found.pose),
         command=command,
         reason=np.maximum(found.reason, worst),
     )

@@ -81,7 +81,7 @@ class ModelFile:
         effects = [
             {
                 "effect": declared if isinstance(declared, str) else dict(declared),
-                "shape": {name: float(value) for name, value in one.shape.items()},
+                "shape": {name: float(value) for name, value in one.constants.items()},
                 "parameters": _numbers(one, links),
             }
             for declared, one in zip(self.declared, _each_its_own(self.fitted, self.covariance), strict=True)
@@ -262,7 +262,7 @@ def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Pro
             )
         )
         return FittedEffect(effect, np.zeros(len(columns)))
-    theta = np.array([column.parameter.fitted(float(values[column.name])) for column in columns])
+    theta = np.array([column.parameter.to_theta(float(values[column.name])) for column in columns])
     shape = {name: float(value) for name, value in (entry.get("shape") or {}).items()}
     absent = [constant.name for constant in effect.constants if constant.name not in shape]
     if absent:
@@ -277,7 +277,7 @@ def _numbers(one: FittedEffect, links: int) -> list[dict[str, Any]]:
     found = []
     for k, column in enumerate(one.effect.columns(links)):
         std = float(np.sqrt(one.covariance[k, k])) if k < len(one.covariance) else float("nan")
-        value, value_std = column.parameter.shown(float(one.theta[k]), std)
+        value, value_std = column.parameter.from_theta(float(one.theta[k]), std)
         found.append(
             {"name": column.name, "value": float(value), "std": float(value_std), "unit": column.parameter.unit}
         )

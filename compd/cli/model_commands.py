@@ -148,7 +148,7 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
         said = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
         table.add_row(effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], said)
     for one in change.file.fitted:
-        for name, value in one.shape.items():
+        for name, value in one.constants.items():
             unit = next(constant.unit for constant in one.effect.constants if constant.name == name)
             table.add_row(one.effect.id, name, f"{value:.5g}", "searched", unit, "")
     console.print(table)

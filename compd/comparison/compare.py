@@ -20,7 +20,7 @@ from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, fir
 from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect
-from compd.model.prediction import pull_back
+from compd.model.prediction import link_residuals
 from compd.units import UM_PER_MM
 
 # A ratio beyond what chance makes of a model at the floor in 97.5 of 100 recordings is above the floor.
@@ -203,7 +203,7 @@ def compare(
     )
     links_um = None
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
-        links_um = pull_back(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
+        links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
         links_um[~known] = np.nan
     turned = aligned.attitude_residual_urad(added)
     return Comparison(

@@ -11,10 +11,10 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
-from compd.model.effect import Deltas, FittedEffect, Port, by_port, sum_deltas
+from compd.model.effect import Deltas, FittedEffect, Port, split_by_port, sum_deltas
 from compd.model.frame import solve_frame
 from compd.model.observations import Observations
-from compd.model.prediction import STEP_MM
+from compd.model.prediction import DIFFERENCE_STEP_MM
 from compd.units import UM_PER_MM
 
 # Standard deviation of an error spread evenly over one step (GUM, F.2.2.1).
@@ -100,7 +100,7 @@ def first_order(
             variance += sensitivity**2 @ noise.at(port) ** 2
     parameters = np.zeros(shape)
     if fitted:
-        G = np.concatenate([aligned.columns(one.effect, one.shape) for one in fitted], axis=2)
+        G = np.concatenate([aligned.columns(one.effect, one.constants) for one in fitted], axis=2)
         parameters = np.sqrt(np.maximum((G @ covariance * G).sum(axis=2), 0.0))
     return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM)
 
@@ -112,9 +112,9 @@ def _base_joints_by_frame(aligned: AlignedRecording) -> FloatArray:
     """
     assert aligned.model is not None
     distances_mm = aligned.model.zero.distances_mm + np.nanmedian(aligned.rows.frame_mm, axis=0)
-    step = STEP_MM * np.eye(9)
+    step = DIFFERENCE_STEP_MM * np.eye(9)
     ends = [solve_frame(aligned.model.frame, distances_mm + signed).base_joints_M_mm for signed in (step, -step)]
-    return np.asarray((ends[0] - ends[1]).reshape(9, -1).T / (2 * STEP_MM))
+    return np.asarray((ends[0] - ends[1]).reshape(9, -1).T / (2 * DIFFERENCE_STEP_MM))
 
 
 def monte_carlo(
@@ -133,7 +133,7 @@ def monte_carlo(
     assert aligned.model is not None
     rng = np.random.default_rng(seed)
     rows = take(aligned.rows, index)
-    bases = [one.effect.basis(aligned.rows, one.shape, None)[0][index] for one in fitted]
+    bases = [one.effect.basis(aligned.rows, one.constants, None)[0][index] for one in fitted]
     theta = np.concatenate([np.zeros(0), *(one.theta for one in fitted)])
     root = _root(covariance)
     predicted = np.empty((trials, len(index), len(aligned.axes)))
@@ -145,7 +145,7 @@ def monte_carlo(
         begin = 0
         for one, basis in zip(fitted, bases, strict=True):
             numbers = drawn[begin : begin + basis.shape[2]]
-            parts.append(by_port(one.effect, rows, basis @ numbers))
+            parts.append(split_by_port(one.effect, rows, basis @ numbers))
             begin += basis.shape[2]
         predicted[trial] = aligned.predicted_mm(sum_deltas(parts), rows)
     return np.asarray(predicted.std(axis=0, ddof=1) * UM_PER_MM)

@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.selection import CONTRADICTION_COSTS, DESCRIPTION_COSTS
-from compd.model.effect import Effect, Shape, missing
+from compd.model.effect import ConstantValues, Effect, unmet_needs
 from compd.units import UM_PER_MM
 
 # A candidate whose columns are unknown in more rows than this would cost all others those rows.
@@ -34,7 +34,7 @@ class Candidate:
 
     name: str
     effect: Effect
-    shape: Shape
+    shape: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
     searched: int
@@ -82,7 +82,7 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
         if why:
             untestable[effect.id] = why
             continue
-        shapes = effect.shapes(aligned.rows)
+        shapes = effect.constant_grid(aligned.rows)
         searched = sum(
             CHOICE_COUNTS if constant.choice else SEARCH_COUNTS
             for constant in effect.constants
@@ -97,8 +97,8 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
     return Pool(tuple(found), untestable)
 
 
-def _candidate(effect: Effect, shape: Shape, aligned: AlignedRecording, searched: int) -> Candidate:
-    limits = np.array([column.parameter.fitted_range for column in effect.columns(aligned.rows.links)])
+def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording, searched: int) -> Candidate:
+    limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
     return Candidate(effect.id, effect, shape, aligned.columns(effect, shape) * UM_PER_MM, limits, searched)
 
 
@@ -108,7 +108,7 @@ def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
         return "fitted along in any case: the reference has a frame of its own"
     if aligned.model is None and effect.live:
         return "acts inside the machine, and of this machine only the model's prediction is known"
-    return "; ".join(problem.what for problem in missing(effect, aligned.rows.available, aligned.rows.links))
+    return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
 
 
 def _silent(variants: Sequence[Candidate], usable: BoolArray) -> str:

@@ -95,7 +95,7 @@ def undo(stored: Stored, date: str, where: str) -> Stored:
 
 
 def _afresh(one: FittedEffect, links: int) -> FittedEffect:
-    return start(one.effect, one.shape, links)
+    return start(one.effect, one.constants, links)
 
 
 def _change(

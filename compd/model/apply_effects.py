@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, Memories, deltas
+from compd.model.effect import Deltas, Memories, deltas_by_effect
 from compd.model.frame import Frame
 from compd.model.kinematics import Mechanism, Pose
 from compd.model.machine import MachineModel
-from compd.model.observations import Motion, Observations, moved
-from compd.model.observe import Movement, rows_at
-from compd.model.prediction import PerturbedMachine, altered
+from compd.model.motion import Motion, Movement, update_motion
+from compd.model.observations import Observations
+from compd.model.observe import observe_at_pose
+from compd.model.prediction import PerturbedMachine, perturb_machine
 
 _Parts = TypeVar("_Parts", Frame, Pose, Mechanism)
 _NOTHING: Memories = {}
@@ -54,7 +55,7 @@ class EffectInputs(NamedTuple):
     tip_M_mm: FloatArray
 
 
-def see(
+def build_observations(
     model: MachineModel, sight: EffectInputs, before: EffectMemory, commanded: bool
 ) -> tuple[Observations, EffectMemory]:
     """The rows that effects see, N = 1 for a single snapshot; and the motion after them, memories as they were.
@@ -70,7 +71,7 @@ def see(
     start[0] = motion is None and not before.memories
     movement, motion = _movement(model, before, commanded, time_s, scale_mm, joint_mm)
     pose = sight.pose
-    rows = rows_at(
+    rows = observe_at_pose(
         model.constants,
         _rows(sight.frame.base_joints_M_mm, count, 2),
         pose._replace(
@@ -90,44 +91,44 @@ def see(
     return rows, EffectMemory(motion, before.memories, commanded)
 
 
-def act(
+def apply_effects(
     model: MachineModel, sight: EffectInputs, before: EffectMemory, commanded: bool
 ) -> tuple[PerturbedMachine, EffectMemory]:
     """The machine as the effects alter it, one after the other, and what they remember.
 
     Every array that an effect alters has one more axis in front, (K, ...): its k-th entry holds effects 0 to k.
     """
-    rows, after = see(model, sight, before, commanded)
-    each, memories = deltas(model.acting, rows, before.memories)
-    added = one_after_another(list(each.values()))
+    rows, after = build_observations(model, sight, before, commanded)
+    each, memories = deltas_by_effect(model.live_effects, rows, before.memories)
+    added = cumulate_deltas(list(each.values()))
     if sight.scale_mm.ndim == 1:
         added = {port: values[:, 0] for port, values in added.items()}
-    machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame)
+    machine = perturb_machine(model, sight.joint_mm, sight.frame_mm, added, sight.frame)
     return machine, after._replace(memories=memories)
 
 
-def kept(remembered: EffectMemory, old: MachineModel, new: MachineModel) -> EffectMemory:
+def carry_over(remembered: EffectMemory, old: MachineModel, new: MachineModel) -> EffectMemory:
     """What of it holds for another model: the motion, and what the very same effects left with the same constants."""
-    before = {one.effect.id: one for one in old.acting}
+    before = {one.effect.id: one for one in old.live_effects}
     memories = {
         name: remembered.memories[name]
-        for name, one in ((one.effect.id, one) for one in new.acting)
-        if name in remembered.memories and before[name].effect is one.effect and before[name].shape == one.shape
+        for name, one in ((one.effect.id, one) for one in new.live_effects)
+        if name in remembered.memories and before[name].effect is one.effect and before[name].constants == one.constants
     }
     return remembered._replace(memories=memories)
 
 
-def whole(each: _Parts, like: _Parts) -> _Parts:
+def final(each: _Parts, like: _Parts) -> _Parts:
     """What `act` has altered, with all effects: `with_all` for every array; `like` is the same without effects."""
-    return type(like)._make(map(with_all, each, like))
+    return type(like)._make(map(final_array, each, like))
 
 
-def with_all(each: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
+def final_array(each: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
     """The last entry where there is one for each effect: one axis more than `like` has."""
     return each[-1] if each.ndim > like.ndim else each
 
 
-def one_after_another(each: Sequence[Deltas]) -> Deltas:
+def cumulate_deltas(each: Sequence[Deltas]) -> Deltas:
     """(K, N, size) per port: what the first k + 1 of K effects add together."""
     found: Deltas = {}
     for k, one in enumerate(each):
@@ -154,7 +155,7 @@ def _movement(
     joint_mm: FloatArray,
 ) -> tuple[Movement, Motion | None]:
     """How the links move at each row, and the motion after the last; unknown where no effect asks."""
-    if not model.watches_motion:
+    if not model.needs_motion:
         unknown = np.full(scale_mm.shape, np.nan)
         return Movement(np.zeros(scale_mm.shape), unknown, np.full(joint_mm.shape, np.nan)), None
     motion = before.motion
@@ -164,7 +165,7 @@ def _movement(
     found = []
     for k, time in enumerate(time_s.tolist()):
         if motion is None or (np.isfinite(scale_mm[k]).all() and np.isfinite(joint_mm[k]).all()):
-            motion = moved(motion, time, scale_mm[k], joint_mm[k])
+            motion = update_motion(motion, time, scale_mm[k], joint_mm[k])
         found.append(motion)
     return Movement(
         np.array([one.direction for one in found]),

@@ -38,10 +38,10 @@ PORTS: dict[Port, str] = {
 # How many values of a parameter there are, and how the n-th is called.
 Per: TypeAlias = Literal["machine", "link", "axis", "link_axis"]
 
-Shape: TypeAlias = Mapping[str, float]
+ConstantValues: TypeAlias = Mapping[str, float]
 # What an effect remembers from row to row; None at the start. Only the effect knows what is in it.
 Memory: TypeAlias = tuple[FloatArray, ...] | None
-Basis: TypeAlias = Callable[[Observations, Shape, Memory], tuple[FloatArray, Memory]]
+Basis: TypeAlias = Callable[[Observations, ConstantValues, Memory], tuple[FloatArray, Memory]]
 
 _WORDS = {
     "force": ("force_x_N", "force_y_N", "force_z_N"),
@@ -82,7 +82,7 @@ class Parameter:
             "link_axis": [f"_{i + 1}{axis}" for i in range(links) for axis in "xyz"],
         }[self.per]
 
-    def shown(self, theta: float, std: float = float("nan")) -> tuple[float, float]:
+    def from_theta(self, theta: float, std: float = float("nan")) -> tuple[float, float]:
         """Value and standard error in `unit`, from the fitted number and its own; to first order."""
         if not self.reciprocal:
             return theta, std
@@ -90,14 +90,14 @@ class Parameter:
             return float("inf"), float("nan")
         return 1.0 / theta, std / theta**2
 
-    def fitted(self, value: float) -> float:
+    def to_theta(self, value: float) -> float:
         """The number that enters the fit, from a value in `unit`."""
         return 1.0 / value if self.reciprocal else value
 
     @property
-    def fitted_range(self) -> tuple[float, float]:
+    def theta_range(self) -> tuple[float, float]:
         """Plausible range of the number that is fitted."""
-        ends = sorted((self.fitted(self.low), self.fitted(self.high)))
+        ends = sorted((self.to_theta(self.low), self.to_theta(self.high)))
         return ends[0], ends[1]
 
 
@@ -173,7 +173,7 @@ class Effect:
             for suffix in parameter.suffixes(links)
         ]
 
-    def shapes(self, rows: Observations) -> list[dict[str, float]]:
+    def constant_grid(self, rows: Observations) -> list[dict[str, float]]:
         """Every combination of shape constants to try on these rows; one, maybe empty, where nothing is searched."""
         found: list[dict[str, float]] = [{}]
         for constant in self.constants:
@@ -192,7 +192,7 @@ class FittedEffect:
 
     effect: Effect
     theta: FloatArray
-    shape: Shape = field(default_factory=dict)
+    constants: ConstantValues = field(default_factory=dict)
     covariance: FloatArray = field(default_factory=lambda: np.full((1, 1), np.nan))
 
 
@@ -217,7 +217,7 @@ def port_size(port: Port, rows: Observations) -> int:
     }[port]
 
 
-def by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> Deltas:
+def split_by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> Deltas:
     """Split axis 1 of (N, sum of sizes, ...) into the effect's ports."""
     if len(effect.ports) == 1:
         return {effect.ports[0]: values}
@@ -225,24 +225,24 @@ def by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> 
     return dict(zip(effect.ports, np.split(values, ends, axis=1), strict=True))
 
 
-def delta(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
+def effect_deltas(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
     """What one effect adds at its ports: (N, size) each, in mm (rad for directions); and its memory after."""
-    basis, memory = fitted.effect.basis(rows, fitted.shape, memory)
+    basis, memory = fitted.effect.basis(rows, fitted.constants, memory)
     # summed column by column: a matrix product may add up differently for one row than for many
     total = np.zeros(basis.shape[:2])
     for column, value in enumerate(fitted.theta):
         total += basis[:, :, column] * value
-    return by_port(fitted.effect, rows, total), memory
+    return split_by_port(fitted.effect, rows, total), memory
 
 
-def deltas(
+def deltas_by_effect(
     fitted: Sequence[FittedEffect], rows: Observations, memories: Memories
 ) -> tuple[dict[str, Deltas], dict[str, Memory]]:
     """What each effect adds, by id, and all memories after. Start with no memories: {}."""
     found: dict[str, Deltas] = {}
     after: dict[str, Memory] = {}
     for one in fitted:
-        found[one.effect.id], after[one.effect.id] = delta(one, rows, memories.get(one.effect.id))
+        found[one.effect.id], after[one.effect.id] = effect_deltas(one, rows, memories.get(one.effect.id))
     return found, after
 
 
@@ -255,7 +255,7 @@ def sum_deltas(each: Collection[Deltas]) -> Deltas:
     return total
 
 
-def quantities(effect: Effect, links: int) -> list[str]:
+def needed_quantities(effect: Effect, links: int) -> list[str]:
     """The measured quantities that the effect needs, by their full names."""
     found: list[str] = []
     for need in effect.needs:
@@ -268,7 +268,7 @@ def quantities(effect: Effect, links: int) -> list[str]:
     return found
 
 
-def missing(effect: Effect, available: Collection[str], links: int) -> list[Problem]:
+def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[Problem]:
     """What the effect needs and does not get; empty where it can be used.
 
     available : names of the quantities that gauges or columns deliver, and of the settings that the machine has
@@ -278,7 +278,7 @@ def missing(effect: Effect, available: Collection[str], links: int) -> list[Prob
         Problem(
             where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
         )
-        for name in quantities(effect, links)
+        for name in needed_quantities(effect, links)
         if name not in available
     ]
     problems += [
@@ -313,15 +313,15 @@ def _gauge_to_add(name: str) -> str:
     return f"wire {gauge} under `wiring: quantities:` as `name: {name}`, or record a column of that name"
 
 
-def memoryless(columns: Callable[[Observations, Shape], FloatArray]) -> Basis:
+def memoryless_basis(columns: Callable[[Observations, ConstantValues], FloatArray]) -> Basis:
     """A basis whose rows stand alone."""
 
-    def basis(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
-        return columns(rows, shape), memory
+    def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
+        return columns(rows, constants), memory
 
     return basis
 
 
-def one_per_link(values: FloatArray) -> FloatArray:
+def columns_per_link(values: FloatArray) -> FloatArray:
     """(N, n) values, each link with a parameter of its own -> (N, n, n)."""
     return np.asarray(values[:, :, None] * np.eye(values.shape[1]))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effect import Deltas, Effect, Port, by_port, port_size, sum_deltas
+from compd.model.effect import Deltas, Effect, Port, port_size, split_by_port, sum_deltas
 from compd.model.frame import Frame, solve_frame
 from compd.model.joint_correction import joint_shortening, link_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix
@@ -20,7 +20,7 @@ from compd.model.transform import to_inner, to_outer
 
 # For derivatives of the frame: its curvature is 1 / 1 m, so that second differences vanish and rounding, 1e-13 mm,
 # stays below 1e-9.
-STEP_MM = 1e-3
+DIFFERENCE_STEP_MM = 1e-3
 
 
 class Prediction(NamedTuple):
@@ -68,7 +68,7 @@ class PerturbedMachine(NamedTuple):
     reason: IntArray
 
 
-def altered(
+def perturb_machine(
     model: MachineModel, joint_mm: FloatArray, frame_mm: FloatArray, deltas: Deltas, unaltered: Frame | None = None
 ) -> PerturbedMachine:
     """The machine as the gauges and `deltas` have it; forward and inverse kinematics both start here.
@@ -99,7 +99,7 @@ def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Predicti
     deltas : as in `altered`; and at the port `reference`, which no machine has.
     A row fails as `solve_frame` and `forward_kinematics` do.
     """
-    machine = altered(model, rows.joint_mm, rows.frame_mm, deltas)
+    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, deltas)
     length_mm = link_length_mm(model.zero.link_length_mm, rows.scale_mm, machine.joint_shortening_mm)
     pose = forward_kinematics(
         machine.mechanism, length_mm + machine.reading_to_length_mm, rows.origin_M_mm, rows.rotation_M_P
@@ -190,19 +190,21 @@ def _closure_by(model: MachineModel, rows: Observations, port: Port) -> FloatArr
     return moved.reshape(count, 6, 3 * n)
 
 
-def columns(effect: Effect, rows: Observations, basis: FloatArray, by: Mapping[Port, Sensitivity]) -> Sensitivity:
+def effect_sensitivity(
+    effect: Effect, rows: Observations, basis: FloatArray, by: Mapping[Port, Sensitivity]
+) -> Sensitivity:
     """The prediction's derivatives by an effect's fitted numbers: (N, 3, P), (N, 3, P), (N, n, P).
 
     basis : (N, sum of port sizes, P), from `effect.basis`.  by : from `sensitivities`, for the effect's ports at least.
     """
-    parts = [(by[port], values) for port, values in by_port(effect, rows, basis).items()]
+    parts = [(by[port], values) for port, values in split_by_port(effect, rows, basis).items()]
     tip, rotation, link_length = (
         sum((sensitivity[i] @ values for sensitivity, values in parts), start=np.zeros(())) for i in range(3)
     )
     return Sensitivity(tip, rotation, link_length)
 
 
-def pull_back(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
+def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
     """The link lengths' errors (N, n), in mm, that would explain residuals (N, 3) at the tip.
 
     link : the sensitivity of the port `link`. For a hexapod, whose attitude is free, the smallest such errors.
@@ -241,11 +243,11 @@ def _points(points: FloatArray, port: Port, deltas: Deltas) -> FloatArray:
 def _base_joints_by(model: MachineModel, rows: Observations, port: Port) -> FloatArray:
     """Derivatives (N, 3 n, 9) of the base joints by the frame's distances or the plate's points."""
     distances_mm = model.zero.distances_mm + rows.frame_mm
-    steps = STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
+    steps = DIFFERENCE_STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
     if port == "frame":
         frame = solve_frame(model.frame, distances_mm + steps[:, None])
     else:
         plates = model.frame.plate_points_M_mm + steps.reshape(18, 1, 3, 3)
         frame = solve_frame(model.frame._replace(plate_points_M_mm=plates), distances_mm)
     ends = frame.base_joints_M_mm.reshape(18, len(rows), -1)
-    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * STEP_MM), 0, 2))
+    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * DIFFERENCE_STEP_MM), 0, 2))

@@ -33,11 +33,11 @@ class ToolOnPlatform:
 
     tool_P_mm: FloatArray
 
-    def wanted(self, frame: FrameGeometry, target_B0_mm: ArrayLike) -> Contact:
+    def target_contact(self, frame: FrameGeometry, target_B0_mm: ArrayLike) -> Contact:
         """The contact that puts the tip on the target (..., 3); it keeps its place on the surface plate."""
         return Contact(to_outer(frame.zero_rotation_M_B, frame.zero_origin_M_mm, target_B0_mm), self.tool_P_mm)
 
-    def made(self, pose: Pose) -> Contact:
+    def contact_at(self, pose: Pose) -> Contact:
         """Where the tip is when the platform is at `pose`."""
         return Contact(to_outer(pose.rotation_M_P, pose.origin_M_mm, self.tool_P_mm), self.tool_P_mm)
 
@@ -51,11 +51,11 @@ class ToolOnPlate:
 
     tool_M_mm: FloatArray
 
-    def wanted(self, frame: FrameGeometry, target_P_mm: ArrayLike) -> Contact:
+    def target_contact(self, frame: FrameGeometry, target_P_mm: ArrayLike) -> Contact:
         """The contact that brings the target (..., 3) on the work to the tool, wherever {B} is."""
         return Contact(self.tool_M_mm, target_P_mm)  # type: ignore[arg-type]
 
-    def made(self, pose: Pose) -> Contact:
+    def contact_at(self, pose: Pose) -> Contact:
         """The place on the work that the tool touches when the platform is at `pose`: R^T (tool - p)."""
         return Contact(self.tool_M_mm, to_inner(pose.rotation_M_P, pose.origin_M_mm, self.tool_M_mm))
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas, quantities, sum_deltas
+from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas_by_effect, needed_quantities, sum_deltas
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
-from compd.model.prediction import Sensitivity, columns, sensitivities
+from compd.model.prediction import Sensitivity, effect_sensitivity, sensitivities
 
 
 class GaugeNoise(NamedTuple):
@@ -39,7 +39,7 @@ def tip_uncertainty_mm(model: MachineModel, rows: Observations, noise: GaugeNois
         ("joint", noise.joint_mm),
         ("frame", noise.frame_mm),
     )
-    ports = {port for one in model.acting for port in one.effect.ports}
+    ports = {port for one in model.live_effects for port in one.effect.ports}
     by = sensitivities(model, rows, {*ports, "scale", "joint", "frame"})
     variance = sum(((by[port].tip ** 2) @ sigma_mm**2 for port, sigma_mm in readings), start=np.zeros((len(rows), 3)))
     variance = variance + _by_parameters(model, rows, by, memories)
@@ -58,8 +58,8 @@ def _by_parameters(
     for one in model.effects:
         end = begin + len(one.theta)
         if one.effect.live:
-            basis, _ = one.effect.basis(rows, one.shape, memories.get(one.effect.id))
-            parts.append(columns(one.effect, rows, basis, by).tip)
+            basis, _ = one.effect.basis(rows, one.constants, memories.get(one.effect.id))
+            parts.append(effect_sensitivity(one.effect, rows, basis, by).tip)
             used += range(begin, end)
         begin = end
     if not parts:
@@ -73,7 +73,7 @@ def _by_quantity(
     model: MachineModel, rows: Observations, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
 ) -> FloatArray:
     """(N, 3) by how many mm the tip moves when one quantity shows more by its standard deviation."""
-    using = [one for one in model.acting if name in quantities(one.effect, model.links)]
+    using = [one for one in model.live_effects if name in needed_quantities(one.effect, model.links)]
     more = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
     before, after = (_added(using, seen, memories) for seen in (rows, more))
     moved = (by[port].tip @ (after[port] - before[port])[:, :, None] for port in after)
@@ -81,5 +81,5 @@ def _by_quantity(
 
 
 def _added(effects: Sequence[FittedEffect], rows: Observations, memories: Memories) -> Deltas:
-    each, _ = deltas(effects, rows, memories)
+    each, _ = deltas_by_effect(effects, rows, memories)
     return sum_deltas(list(each.values()))

@@ -13,7 +13,8 @@ from compd.configuration.crosscheck import DISTANCES
 from compd.configuration.operation import FrameWire
 from compd.model.apply_effects import EffectMemory
 from compd.model.machine import MachineModel
-from compd.model.observe import Movement, observe
+from compd.model.motion import Movement
+from compd.model.observe import observe
 from compd.model.uncertainty import GaugeNoise, tip_uncertainty_mm
 from compd.units import UM_PER_MM
 

@@ -108,7 +108,7 @@ def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> N
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
     found = fit(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
     assert not found.outlier.any()
-    assert found.fitted[0].effect.parameters[0].shown(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
+    assert found.fitted[0].effect.parameters[0].from_theta(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
 
 
 def test_what_the_data_cannot_tell_apart_has_no_error(blank: AlignedRecording) -> None:

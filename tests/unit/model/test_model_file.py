@@ -45,7 +45,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert found.declared == example().declared
     assert found.steps == example().steps
     np.testing.assert_allclose(found.fitted[0].theta, 1 / 28.0, rtol=1e-15)
-    assert dict(found.fitted[1].shape) == {"tau": 1300.0}
+    assert dict(found.fitted[1].constants) == {"tau": 1300.0}
     np.testing.assert_array_equal(found.covariance, example().covariance)
     np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
 
