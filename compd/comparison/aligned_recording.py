@@ -29,7 +29,8 @@ from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
 from compd.model.observe import observe, observe_tip
-from compd.model.prediction import Sensitivity, effect_sensitivity, predict, sensitivities
+from compd.model.prediction import predict
+from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
 from compd.recording.recording import Recording
 

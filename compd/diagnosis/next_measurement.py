@@ -18,7 +18,7 @@ from compd.diagnosis.regression import solve
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect, needed_quantities
 from compd.model.observations import Observations
-from compd.model.prediction import effect_sensitivity, sensitivities
+from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.units import UM_PER_MM
 
 # Rows of one purpose teach less and less; what was measured already keeps its weight.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.model.kinematics import Mechanism
 from compd.model.statics import link_forces
@@ -113,6 +113,16 @@ class Observations:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def select(self, index: IntArray) -> Observations:
+        """The rows of this index (R,), in its order."""
+        chosen: dict[str, Any] = {
+            column.name: getattr(self, column.name)[index]
+            for column in fields(self)
+            if column.name not in ("constants", "quantities")
+        }
+        quantities = {name: values[index] for name, values in self.quantities.items()}
+        return replace(self, **chosen, quantities=quantities)
 
     @property
     def links(self) -> int:

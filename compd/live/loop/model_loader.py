@@ -171,8 +171,7 @@ def try_out(machine: MachineModel, names: tuple[str, ...], where: str) -> None:
         dict.fromkeys(names, np.array(np.nan)),
         0.0,
     )
-    zero = machine.zero.contact
-    target_mm = zero.tip_P_mm if hasattr(machine.arrangement, "tool_M_mm") else zero.tip_M_mm
+    target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
     try:
         _, warm = compensate_cmm(machine, unread, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, unread._replace(time_s=1.0), warm)

@@ -17,7 +17,8 @@ from compd.model.formula.declaration import formula_effect
 from compd.model.formula.evaluator import FUNCTIONS, Formula
 from compd.model.formula.parser import DEEPEST, LONGEST, parse
 from compd.model.library import find
-from compd.model.prediction import effect_sensitivity, predict, sensitivities
+from compd.model.prediction import predict
+from compd.model.sensitivity import effect_sensitivity, sensitivities
 from tests.support.effect_rows import HEXAPOD, TRIPOD, at_zero, rows_of, varied
 
 ALLOWED_NODES = (ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)

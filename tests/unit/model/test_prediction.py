@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.model.effect import PORTS, Deltas, FittedEffect, Port, deltas_by_effect, effect_deltas, port_size, sum_deltas
+from compd.model.effect import PORTS, FittedEffect, Port, deltas_by_effect, effect_deltas, port_size, sum_deltas
 from compd.model.joint_correction import scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_vector
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.prediction import effect_sensitivity, link_residuals, perturb_machine, predict, sensitivities, shares
+from compd.model.prediction import perturb_machine, predict
+from compd.model.sensitivity import effect_sensitivity, link_residuals, sensitivities
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, rows_of, some_shape, varied
@@ -117,20 +118,6 @@ def test_a_residual_pulled_back_leads_to_the_tip_again(model: MachineModel) -> N
         np.testing.assert_allclose(pulled, errors_mm, atol=1e-12)
     else:
         assert (np.linalg.norm(pulled, axis=1) <= np.linalg.norm(errors_mm, axis=1) + 1e-15).all()
-
-
-def test_shares_add_up() -> None:
-    rows = rows_of(TRIPOD, varied(TRIPOD))
-    ids = ["link_expansion", "backlash", "base_joint_position", "tool_bending", "frame_rod_expansion"]
-    fitted = [FittedEffect(LIBRARY[id_], np.full(len(LIBRARY[id_].columns(3)), 2.0)) for id_ in ids]
-    each, _ = deltas_by_effect(fitted, rows, {})
-    found = shares(TRIPOD, rows, each)
-    whole = predict(TRIPOD, rows, sum_deltas(list(each.values()))).tip_mm - predict(TRIPOD, rows, {}).tip_mm
-    assert list(found) == ids
-    np.testing.assert_allclose(sum(found.values()), whole, atol=1e-12)
-    alone: Deltas = each["tool_bending"]
-    by_itself = predict(TRIPOD, rows, alone).tip_mm - rows.tip_M_mm
-    np.testing.assert_allclose(found["tool_bending"], by_itself, rtol=2e-3)
 
 
 @pytest.mark.parametrize("name", MACHINES)
