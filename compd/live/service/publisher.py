@@ -199,7 +199,7 @@ class Publisher:
             return
         self._sessions.discard(session)
         self._selector.unregister(session.connection)
-        self._desk.left(session)
+        self._desk.release(session)
         session.close()
 
     @property
