@@ -1,4 +1,4 @@
-"""The STATUS message: how the whole daemon is doing."""
+"""The STATUS message: machine zero, models, the loop and its timing, sockets, lines and every gauge."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ from compd.readings import Latest
 
 @dataclass(frozen=True)
 class StatusReport:
-    """Looks at everything and changes nothing; called on the publisher's thread."""
+    """Collects the STATUS message from the daemon's parts, of which it changes none; on the publisher's thread.
+
+    Attributes
+    ----------
+    version : the VERSION message, whose keys STATUS repeats.
+    orders, latest, wires, loop, publisher : the daemon's own.
+    packets : the UDP sender, where one is configured.
+    lines : makes the state of every line, by name.
+    """
 
     version: Mapping[str, Any]
     configuration: Configuration
@@ -35,7 +43,7 @@ class StatusReport:
     clock: Clock
 
     def message(self) -> dict[str, Any]:
-        """What is unknown is left out."""
+        """The message as plain data; what is unknown is left out."""
         now_s = self.clock.monotonic()
         published = self.publisher.summary()
         if self.packets is not None:
@@ -48,12 +56,12 @@ class StatusReport:
             "zero": self._zero(),
             "model": self._model(),
             "loop": self.loop.timing.summary(),
-            "realtime": {name: granted._asdict() for name, granted in self.loop.permissions.items()},
+            "realtime": {name: permission._asdict() for name, permission in self.loop.permissions.items()},
             "publisher": published,
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
         }
-        known: dict[str, Any] = _known(message)
+        known: dict[str, Any] = _without_unknown(message)
         return known
 
     def _zero(self) -> dict[str, Any]:
@@ -63,39 +71,39 @@ class StatusReport:
         return {"taken": True, "taken_at": zero.taken_at}
 
     def _model(self) -> dict[str, Any]:
-        """Applied, and shadow if there is one; without their files, which are this computer's business."""
+        """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
         summary = {} if self.orders.models is None else self.orders.models.summary
         return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
-        """Every channel: raw value, before sign and zero, with its age; a stale one says so."""
-        found: list[dict[str, Any]] = []
+        """Every channel: its raw value, before sign and machine zero, and its age (s); or why there is no value."""
+        gauges: list[dict[str, Any]] = []
         stale_after_s = {wire.channel: wire.stale_after_s for wire in self.wires.all_wires}
         meanings = {wire.channel: wire.meaning for wire in self.wires.all_wires}
         for channel, reading in zip(self.latest.channels, self.latest.snapshot(now_s).readings, strict=True):
             age_s = now_s - reading.time_s
-            old = reading.ok and age_s > stale_after_s.get(channel, math.inf)
-            entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if old else reading.quality}
+            stale = reading.ok and age_s > stale_after_s.get(channel, math.inf)
+            entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if stale else reading.quality}
             if channel in meanings:
                 entry["measures"] = meanings[channel]
             if reading.quality is not Quality.NEVER_READ:
                 entry["age_s"] = round(age_s, 4)
-            if reading.ok and not old:
+            if reading.ok and not stale:
                 entry["value"] = round(reading.value, 7)
             if reading.detail:
                 entry["detail"] = reading.detail
-            found.append(entry)
-        return found
+            gauges.append(entry)
+        return gauges
 
 
-def _known(value: Any) -> Any:
-    """Without what is not finite: JSON has no word for it, and absent means unknown."""
+def _without_unknown(value: Any) -> Any:
+    """`value` without the numbers in it that are not finite: JSON has none, and what is absent is unknown."""
     match value:
         case Mapping():
-            pairs = ((str(key), _known(part)) for key, part in value.items())
+            pairs = ((str(key), _without_unknown(part)) for key, part in value.items())
             return {key: part for key, part in pairs if part is not None}
         case list() | tuple():
-            return [_known(part) for part in value]
+            return [_without_unknown(part) for part in value]
         case float() if not math.isfinite(value):
             return None
     return value
