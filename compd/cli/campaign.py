@@ -50,8 +50,8 @@ def campaign(
     from compd.errors import CompdError, Problem
     from compd.recording.writer import write_recording
     from compd.simulation.campaign.plan_reader import read_plan
-    from compd.simulation.campaign.simulated_recording import record
-    from compd.simulation.causes.catalogue import asked, drawn, seal
+    from compd.simulation.campaign.simulated_recording import simulate_recording
+    from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, write_answer
     from compd.simulation.truth.mechanism import Mechanism
 
     configuration = load(config)
@@ -68,17 +68,17 @@ def campaign(
             )
         )
     given = () if plan is None else read_plan(plan, mechanism)
-    wanted = asked(effect or [])
+    wanted = parse_hidden(effect or [])
     if hidden is not None:
-        wanted.append(drawn(hidden, mechanism))
+        wanted.append(draw_hidden(hidden, mechanism))
     plate = path.with_name(f"{path.stem}.plate.csv")
-    recorded = record(configuration, seed, wanted, reference.value, plate.name, other_days, given)
+    recorded = simulate_recording(configuration, seed, wanted, reference.value, plate.name, other_days, given)
     write_recording(path, recorded.columns, recorded.sidecar, overwrite)
     if recorded.balls_M is not None:
         lines = [f"{k},{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(recorded.balls_M, 1)]
         plate.write_text("\n".join(["ball,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
     answer = path.with_name(f"{path.stem}.answer.json")
-    seal(answer, [one.cause for one in recorded.hidden], [one.floors for one in recorded.hidden], recorded.weak, seed)
+    write_answer(answer, recorded.hidden, recorded.weak, seed)
     rows = len(recorded.columns["time_s"])
     said = f"{rows} rows, {len(recorded.columns)} columns"
     if given:

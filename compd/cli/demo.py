@@ -10,9 +10,6 @@ import typer
 if TYPE_CHECKING:
     from compd.demo.session import DemoSession
 
-# Twenty seconds of demo are forty minutes of weather and warm-up.
-SPEEDUP = 120.0
-
 
 def demo(
     config: Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")] = None,
@@ -21,39 +18,27 @@ def demo(
     seed: Annotated[int, typer.Option(help="Weather, joints and targets follow from it.")] = 1,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show what compensation gains."""
-    import tempfile
-
     from rich.console import Console
     from rich.live import Live
 
     from compd.configuration import load
     from compd.configuration.shipped import shipped_configuration
     from compd.demo.page import progress, summarise, verdict, write_demo_page
-    from compd.demo.processes import Command, running
-    from compd.demo.session import run_session
+    from compd.demo.session import SPEEDUP, run_demo
 
     console = Console()
-    config = config or shipped_configuration("tripod-cmm.yaml")
-    configuration = load(config)
+    configuration = load(config or shipped_configuration("tripod-cmm.yaml"))
     console.print(
         f"[bold]{configuration.machine}[/]: {len(configuration.gauges)} gauges on {len(configuration.lines)} lines, "
         f"each speaking its own protocol on a real pty or TCP port; weather {SPEEDUP:g} times faster than real."
     )
-    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
-        directory = Path(temporary)
-        # it stands at machine zero until it is driven, however long the kernels take to compile
-        options = ["--directory", temporary, "--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", "600"]
-        commands = [
-            Command(["simulate", str(config), *options], ready=directory / "control.sock"),
-            Command(["run", str(directory / config.name)], ready=directory / "compd.sock"),
-        ]
-        console.print("Starting the simulated machine and the daemon (the very first start compiles the kernels) ...")
-        with running(commands, log=directory / "output.log"), Live(console=console, refresh_per_second=8) as live:
+    console.print("Starting the simulated machine and the daemon (the very first start compiles the kernels) ...")
+    with Live(console=console, refresh_per_second=8) as live:
 
-            def show(session: DemoSession, elapsed_s: float, setpoint: dict[str, Any]) -> None:
-                live.update(progress(session, elapsed_s, seconds, setpoint))
+        def show(session: DemoSession, elapsed_s: float, setpoint: dict[str, Any]) -> None:
+            live.update(progress(session, elapsed_s, seconds, setpoint))
 
-            session = run_session(configuration, directory, seconds, seed, show)
+        session = run_demo(configuration, seconds, seed, show)
     console.print(summarise(session))
     console.print(verdict(session))
     page.parent.mkdir(parents=True, exist_ok=True)

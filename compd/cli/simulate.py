@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from compd.configuration import Configuration
-    from compd.simulation.campaign.sizing import Sized
+    from compd.simulation.causes.hidden_cause import SizedCause
     from compd.simulation.wires.server import Simulation
 
 LOOK_EVERY_S = 0.25
@@ -63,9 +63,9 @@ def simulate(
     from compd.clock import MonotonicClock
     from compd.configuration import load
     from compd.simulation.campaign.plan_reader import read_plan
-    from compd.simulation.causes.catalogue import seal
+    from compd.simulation.causes.hidden_cause import write_answer
     from compd.simulation.truth.mechanism import Mechanism
-    from compd.simulation.truth.strengths import SEEN
+    from compd.simulation.truth.strengths import FULLY_MEASURED
     from compd.simulation.truth.world import World
     from compd.simulation.wires.server import Simulation
 
@@ -79,7 +79,7 @@ def simulate(
         seed,
         speedup,
         zero_hold,
-        strengths=SEEN if hid else None,
+        strengths=FULLY_MEASURED if hid else None,
         causes=[one.cause for one in hid],
         rows=rows,
     )
@@ -95,7 +95,7 @@ def simulate(
         simulation = Simulation(configuration, world, directory.resolve(), clock)
         stack.callback(simulation.stop)
         if hid:
-            seal(directory / SEALED, [one.cause for one in hid], [one.floors for one in hid], [], seed)
+            write_answer(directory / SEALED, hid, [], seed)
         daemon = simulation.start()
         console.print(_lines(simulation))
         console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
@@ -110,12 +110,12 @@ def simulate(
                     done = True
 
 
-def _hidden(configuration: Configuration, seed: int, number: int) -> Sized:
-    from compd.simulation.campaign.sizing import Sizing
-    from compd.simulation.causes.catalogue import drawn
+def _hidden(configuration: Configuration, seed: int, number: int) -> SizedCause:
+    from compd.simulation.campaign.sizing import CauseSizer
+    from compd.simulation.causes.hidden_cause import draw_hidden
 
-    sizing = Sizing(configuration.geometry, configuration.wiring, seed)
-    return sizing.cause(drawn(number, sizing.mechanism))
+    sizer = CauseSizer(configuration.geometry, configuration.wiring, seed)
+    return sizer.size(draw_hidden(number, sizer.mechanism))
 
 
 def _lines(simulation: Simulation) -> Table:

@@ -28,8 +28,8 @@ def tracker(
     import numpy as np
 
     from compd.client import connect
-    from compd.demo.session import MachineController
     from compd.errors import CompdError, Problem
+    from compd.simulation.wires.control_client import ControlClient
 
     if not out.parent.is_dir():
         raise CompdError(
@@ -38,7 +38,7 @@ def tracker(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     looks, apart_mm, at_rest = [], [], 0
     with (
-        MachineController(simulation / "control.sock") as machine,
+        ControlClient(simulation / "control.sock") as machine,
         connect(simulation / "compd.sock", _ANSWER_TIMEOUT_S) as daemon,
     ):
         typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")

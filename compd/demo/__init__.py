@@ -1,1 +1,1 @@
-"""The main job on a simulated machine, as `compd demo` shows it."""
+"""The main job on a simulated machine: simulation, daemon and controller side by side, as `compd demo` shows it."""

@@ -1,4 +1,4 @@
-"""What the demo sees: a live table, a summary for the terminal, and a page with pictures."""
+"""Views of a demo session: a live table, a summary for the terminal, and a page with pictures."""
 
 from __future__ import annotations
 
@@ -11,17 +11,13 @@ from rich.console import Group, RenderableType
 from rich.progress_bar import ProgressBar
 from rich.table import Table as TerminalTable
 
+from compd.arrays import rms
 from compd.demo.session import KINDS, DemoSession
 from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
 from compd.units import UM_PER_MM
 
 LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}
 KIND_COLOURS = {"none": COLOURS["worst"], "joints": COLOURS["middle"], "full": COLOURS["best"]}
-
-
-def rms(values: list[float]) -> float:
-    """Root of the mean square; nan of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
 
 
 def error_rows(session: DemoSession) -> list[list[str]]:
@@ -47,7 +43,7 @@ LOOP_ROWS = {
 
 
 def timing_rows(session: DemoSession) -> list[list[str]]:
-    """The loop's period and the gauges' ages, as the daemon and its setpoints tell them."""
+    """The loop's period and the gauges' ages, from the daemon's STATUS and its setpoints."""
     loop = session.status.get("loop", {})
     rows = [[label, f"{loop[key]:.4g}"] for key, label in LOOP_ROWS.items() if key in loop]
     ages = [message["age_s"] * 1e3 for message in session.setpoints if "age_s" in message]
@@ -93,10 +89,10 @@ def summarise(session: DemoSession) -> RenderableType:
 
 def verdict(session: DemoSession) -> str:
     """The result in one sentence."""
-    by_kind = {kind: rms([visit.error_um[kind] for visit in session.visits]) for kind in KINDS}
+    rms_um = {kind: rms([visit.error_um[kind] for visit in session.visits]) for kind in KINDS}
     return (
-        f"At {len(session.visits)} points the tip missed its target by {by_kind['none']:.1f} um (rms) without "
-        f"compensation, by {by_kind['joints']:.1f} um with the joints compensated, and by {by_kind['full']:.2f} um "
+        f"At {len(session.visits)} points the tip missed its target by {rms_um['none']:.1f} um (rms) without "
+        f"compensation, by {rms_um['joints']:.1f} um with the joints compensated, and by {rms_um['full']:.2f} um "
         "with joints and frame compensated."
     )
 
@@ -171,12 +167,16 @@ def _sources(session: DemoSession) -> Figure:
 
 def _frame(session: DemoSession) -> Figure:
     figure = Figure()
-    moved = [(m["time_s"], m["frame"]["displacement_M_mm"]) for m in session.setpoints if "frame" in m]
-    start = moved[0][0] if moved else 0.0
+    displacements = [
+        (message["time_s"], message["frame"]["displacement_M_mm"])
+        for message in session.setpoints
+        if "frame" in message
+    ]
+    start_s = displacements[0][0] if displacements else 0.0
     for axis, colour in zip(range(3), ("worst", "plain", "best"), strict=True):
         figure.add_scatter(
-            x=[t - start for t, _ in moved],
-            y=[v[axis] * UM_PER_MM for _, v in moved],
+            x=[time_s - start_s for time_s, _ in displacements],
+            y=[displacement_mm[axis] * UM_PER_MM for _, displacement_mm in displacements],
             name="xyz"[axis],
             mode="lines",
             line={"color": COLOURS[colour]},

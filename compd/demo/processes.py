@@ -1,4 +1,4 @@
-"""Processes that run beside a command: each ready before the next starts, all stopped at the end."""
+"""`compd` commands that run as processes side by side: each ready before the next starts, all stopped at the end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from compd.errors import DaemonError, Problem
 # The first start on a machine compiles the kernels; a slow one needs a minute or two.
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 10.0
-LOOK_EVERY_S = 0.05
+POLL_EVERY_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Command:
 
 
 @contextmanager
-def running(commands: Sequence[Command], log: Path) -> Iterator[None]:
-    """Run `commands`; what they print goes to `log`. Raises DaemonError, with that output, if one does not start."""
+def run_commands(commands: Sequence[Command], log: Path) -> Iterator[None]:
+    """Run `commands` during the block, their output in `log`. Raises DaemonError with it if one does not start."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
         with log.open("wb") as output:
@@ -42,7 +42,7 @@ def running(commands: Sequence[Command], log: Path) -> Iterator[None]:
                     start_new_session=True,
                 )
                 processes.append(process)
-                _wait(command, process, log)
+                _wait_until_ready(command, process, log)
             yield
     finally:
         for process in reversed(processes):
@@ -55,10 +55,10 @@ def running(commands: Sequence[Command], log: Path) -> Iterator[None]:
                 process.wait()
 
 
-def _wait(command: Command, process: subprocess.Popen[bytes], log: Path) -> None:
-    end = time.monotonic() + START_TIMEOUT_S
+def _wait_until_ready(command: Command, process: subprocess.Popen[bytes], log: Path) -> None:
+    end_s = time.monotonic() + START_TIMEOUT_S
     while not command.ready.exists():
-        if process.poll() is not None or time.monotonic() > end:
+        if process.poll() is not None or time.monotonic() > end_s:
             raise DaemonError(
                 Problem(
                     where=f"compd {' '.join(command.arguments)}",
@@ -66,4 +66,4 @@ def _wait(command: Command, process: subprocess.Popen[bytes], log: Path) -> None
                     next_step="read what it printed:\n" + log.read_text(errors="replace")[-8000:],
                 )
             )
-        time.sleep(LOOK_EVERY_S)
+        time.sleep(POLL_EVERY_S)

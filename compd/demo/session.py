@@ -1,15 +1,14 @@
-"""What happens during the demo: a controller sends targets, drives to the setpoints, and looks where the tip is."""
+"""The demo's session: a controller sends targets to the daemon, drives to its setpoints, and asks for the true tip."""
 
 from __future__ import annotations
 
-import json
 import math
-import socket
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +17,29 @@ from scipy.spatial.transform import Rotation
 from compd.client import Client, connect
 from compd.configuration import Configuration
 from compd.configuration.geometry import ToolOnPlatformSettings
-from compd.errors import DaemonError, Problem
+from compd.demo.processes import Command, run_commands
+from compd.simulation.wires.control_client import ControlClient
 
+# Kinds of compensation: of nothing, of the joints, of joints and frame.
 KINDS = ("none", "joints", "full")
+# Twenty seconds of demo are forty minutes of weather and warm-up.
+SPEEDUP = 120.0
+# Longer than the kernels take to compile: the machine stands at machine zero until it is driven.
+ZERO_HOLD_S = 600.0
 SETPOINT_RATE_HZ = 50.0
-# At rest for as long as the slowest gauge needs to be read anew, and a little more.
+# Rest at a target: a little longer than the slowest gauge needs to be read anew.
 DWELL_S = 0.5
-# The links follow the setpoint's last micrometres all the time; nearer than this they are there.
+# Distance from the setpoint within which the links have arrived: they follow its last micrometres all the time.
 ARRIVED_MM = 0.005
-# Taking machine zero looks at the gauges for a second.
+# Taking machine zero averages the gauges for a second.
 ANSWER_TIMEOUT_S = 15.0
-# The targets: a box around machine zero that every shipped machine reaches.
+# Half edges of the box of targets about machine zero, within reach of every shipped machine.
 REACH_MM = (60.0, 60.0, 40.0)
 
 
 @dataclass(frozen=True)
-class Visit:
-    """One target, looked at when the machine is at rest there.
+class DemoVisit:
+    """One target, with the machine at rest there.
 
     time_s : since the start. target_mm : in {M}, or on the work in {P} with the tool on the plate.
     error_um : distance of the true tip from the target, by kind of compensation.
@@ -49,36 +54,34 @@ class Visit:
 
 @dataclass
 class DemoSession:
-    """Everything that the demo saw."""
+    """All visits and setpoints of a demo, and the daemon's STATUS at its end."""
 
     machine: str
-    visits: list[Visit] = field(default_factory=list)
+    visits: list[DemoVisit] = field(default_factory=list)
     setpoints: list[dict[str, Any]] = field(default_factory=list)
     status: dict[str, Any] = field(default_factory=dict)
 
 
-class MachineController:
-    """The simulated machine's own controller: drives to scale values, and the truth about its tip."""
+Watcher = Callable[["DemoSession", float, dict[str, Any]], None]
 
-    def __init__(self, path: Path) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.connect(str(path))
-        self._lines = self._socket.makefile("rb")
 
-    def __enter__(self) -> Self:
-        return self
+def run_demo(configuration: Configuration, seconds: float, seed: int, on_change: Watcher) -> DemoSession:
+    """Start the simulated machine and the daemon for it, run a session of `seconds`, stop both.
 
-    def __exit__(self, *_: object) -> None:
-        self._lines.close()
-        self._socket.close()
-
-    def ask(self, message_class: str, **values: Any) -> dict[str, Any]:
-        """One request, one answer; DaemonError for an ERROR."""
-        self._socket.sendall(json.dumps({"class": message_class, **values}).encode() + b"\n")
-        answer: dict[str, Any] = json.loads(self._lines.readline())
-        if answer.get("class") == "ERROR":
-            raise DaemonError(Problem(where="simulated machine", what=str(answer.get("text")), value=message_class))
-        return answer
+    seed : of weather, joints and targets. on_change : see `run_session`. Raises DaemonError where one does not start.
+    """
+    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
+        directory = Path(temporary)
+        options = ["--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", str(ZERO_HOLD_S)]
+        commands = [
+            Command(
+                ["simulate", str(configuration.path), "--directory", temporary, *options],
+                ready=directory / "control.sock",
+            ),
+            Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
+        ]
+        with run_commands(commands, log=directory / "output.log"):
+            return run_session(configuration, directory, seconds, seed, on_change)
 
 
 def run_session(
@@ -86,14 +89,17 @@ def run_session(
     directory: Path,
     seconds: float,
     seed: int,
-    on_change: Callable[[DemoSession, float, dict[str, Any]], None],
+    on_change: Watcher,
 ) -> DemoSession:
-    """Visit random targets for `seconds`; `on_change(session, elapsed_s, setpoint)` after every setpoint."""
+    """Visit random targets for `seconds` with the machine and daemon whose sockets are in `directory`.
+
+    on_change : called as on_change(session, elapsed_s, setpoint) after every setpoint.
+    """
     session = DemoSession(configuration.machine)
     random = np.random.default_rng(seed)
     tool_moves = isinstance(configuration.geometry.tool, ToolOnPlatformSettings)
     with (
-        MachineController(directory / "control.sock") as machine,
+        ControlClient(directory / "control.sock") as machine,
         connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer,
         connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon,
     ):
@@ -130,14 +136,14 @@ def run_session(
 
 
 def wait_for_gauges(observer: Client, setpoints: Iterator[dict[str, Any]]) -> None:
-    """Return once every gauge reads well; `setpoints` gives the pace."""
+    """Return once every gauge's quality is ok; asks once per setpoint."""
     for _ in setpoints:
         if all(gauge["quality"] == "ok" for gauge in observer.status()["gauges"]):
             return
 
 
-def _visit(machine: MachineController, elapsed_s: float, target_mm: NDArray[Any], setpoint: dict[str, Any]) -> Visit:
-    """Where the tip would be, now, for each kind of command; only the last is really driven to."""
+def _visit(machine: ControlClient, elapsed_s: float, target_mm: NDArray[Any], setpoint: dict[str, Any]) -> DemoVisit:
+    """Tip errors that the commands of each kind of compensation would have now; the machine is at the last."""
     full = np.array(setpoint["scale_setpoint_mm"])
     none = full - np.array(setpoint["correction_mm"])
     commands = {"none": none, "joints": none + np.array(setpoint["sources_mm"]["joints"]), "full": full}
@@ -145,17 +151,18 @@ def _visit(machine: MachineController, elapsed_s: float, target_mm: NDArray[Any]
     for kind in KINDS:
         answer = machine.ask("TIP_FOR", scale_mm=commands[kind].tolist())
         error_um[kind] = float(np.linalg.norm(np.array(answer["tip_mm"]) - target_mm)) * 1e3
-    return Visit(elapsed_s, tuple(target_mm.tolist()), error_um, setpoint)
+    return DemoVisit(elapsed_s, tuple(target_mm.tolist()), error_um, setpoint)
 
 
 def _next_target(configuration: Configuration, random: np.random.Generator) -> NDArray[Any]:
-    """In {M}; on the work, in {P}, with the tool on the plate."""
+    """(3,) random target in {M}, or on the workpiece in {P} with the tool on the plate."""
     tool = configuration.geometry.tool
     zero = np.array(tool.zero_tip_M_mm if isinstance(tool, ToolOnPlatformSettings) else tool.zero_tip_P_mm)
     return np.asarray(zero + random.uniform(-1.0, 1.0, 3) * REACH_MM)
 
 
 def _in_B0(configuration: Configuration, tip_M_mm: NDArray[Any]) -> NDArray[Any]:
+    """(3,) the place in {B0} of a place in {M}."""
     base = configuration.geometry.base
     rotation = Rotation.from_rotvec(base.rotation_B0_in_M_rad)
     return np.asarray(rotation.inv().apply(tip_M_mm - np.array(base.origin_B0_in_M_mm)))

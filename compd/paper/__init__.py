@@ -1,1 +1,5 @@
-"""The experiments of the paper (T. Oiwa), again, on the simulated machine."""
+"""The experiments of the paper (T. Oiwa, figures 18, 20 and 21), reproduced on the simulated machine.
+
+Each experiment is a module with `run` (the measurement), `reductions` and `panels` (its evaluation) and `reproduce`
+(all of it, ready for print and page). Nothing is tuned to hit the paper's numbers.
+"""

@@ -9,10 +9,11 @@ from plotly.graph_objects import Figure
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.paper.reduction import Readings, Reduction
+from compd.paper.gauge_log import GaugeLog
+from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, styled
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
-from compd.simulation.truth.touch import touch
+from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
 
@@ -23,37 +24,44 @@ KIND_COLOURS = {"without compensation": "worst", "with compensation": "best"}
 
 
 @dataclass(frozen=True)
-class Drift:
-    """time_h : (N,). change_um : by kind, (N, 3) of the ball's measured place since the first. frame_degC : (N,)."""
+class DriftResult:
+    """time_h, frame_degC : (N,). change_um : by kind, (N, 3) change of the ball's measured place since the first."""
 
     time_h: FloatArray
     change_um: dict[str, FloatArray]
     frame_degC: FloatArray
 
 
-def run(configuration: Configuration, seed: int) -> Drift:
-    """The machine tours its points between the measurements, every ten minutes for ten hours."""
+def run(configuration: Configuration, seed: int) -> DriftResult:
+    """Measure the ball every ten minutes for ten hours after switch-on; the machine tours its points in between."""
     world = World(configuration.geometry, configuration.wiring, seed)
     rng = np.random.default_rng([seed, 21])
     machine = world.mechanism
     ball = machine.tip0_M if machine.tip_frame == "M" else machine.tip0_P
-    readings, time_h, frame_degC = Readings(), [], []
+    gauge_log, time_h, frame_degC = GaugeLog(), [], []
     for _ in range(int(HOURS * HOUR_S / EVERY_S) + 1):
-        touch(world, noisy(ball, TRACKER_SIGMA_UM, rng))
-        readings.read(world)
+        probe_ball(world, noisy(ball, TRACKER_SIGMA_UM, rng))
+        gauge_log.read(world)
         time_h.append(world.time_s / HOUR_S)
         frame_degC.append(world.sense("temperature_frame_degC"))
-        world.tour()
+        world.start_tour()
         world.advance(EVERY_S)
     change_um = {}
     for kind, compensated in zip(KIND_COLOURS, (False, True), strict=True):
-        places = readings.tips_mm(configuration, joints=compensated, frame=compensated)
+        places = gauge_log.tips_mm(configuration, joints=compensated, frame=compensated)
         change_um[kind] = (places - places[0]) * UM_PER_MM
-    return Drift(np.array(time_h), change_um, np.array(frame_degC))
+    return DriftResult(np.array(time_h), change_um, np.array(frame_degC))
 
 
-def reductions(found: Drift) -> list[Reduction]:
-    without, full = found.change_um.values()
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+    """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
+    result = run(configuration, seed)
+    return Reproduction("Figure 21: a ball on the surface plate during warm-up", reductions(result), panels(result))
+
+
+def reductions(result: DriftResult) -> list[Reduction]:
+    """Peak-to-peak change of each coordinate, z first; figure 21 states no numbers."""
+    without, full = result.change_um.values()
     stated = ("change of x", "change of y", "change of z")
     paper = ("x and y: so small because the frame is axisymmetric", "x and y: so small", "decreases; no number")
     return [
@@ -64,14 +72,16 @@ def reductions(found: Drift) -> list[Reduction]:
     ]
 
 
-def panels(found: Drift) -> list[Panel]:
+def panels(result: DriftResult) -> list[Panel]:
+    """Change of z, of x and y, and the frame's temperature by time, as in figure 21."""
+
     def change(axes: str) -> Figure:
         figure = Figure()
-        for kind, change_um in found.change_um.items():
+        for kind, change_um in result.change_um.items():
             for axis in axes:
                 dash = {"x": "dot", "y": "dash", "z": "solid"}[axis]
                 figure.add_scatter(
-                    x=found.time_h,
+                    x=result.time_h,
                     y=change_um[:, "xyz".index(axis)],
                     mode="lines+markers",
                     name=kind if axes == "z" else f"{axis}, {kind}",
@@ -81,7 +91,7 @@ def panels(found: Drift) -> list[Panel]:
         return styled(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
 
     warm = Figure()
-    warm.add_scatter(x=found.time_h, y=found.frame_degC, mode="lines", line={"color": COLOURS["plain"]})
+    warm.add_scatter(x=result.time_h, y=result.frame_degC, mode="lines", line={"color": COLOURS["plain"]})
     return [
         Panel("Z of the ball", "The ball stands still on the surface plate; what changes is the machine.", change("z")),
         Panel(

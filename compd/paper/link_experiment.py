@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from plotly.graph_objects import Figure
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
 from compd.machine_builder import joint_weights
-from compd.paper.reduction import Readings, Reduction, rms
+from compd.paper.gauge_log import GaugeLog
+from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, styled
-from compd.simulation.causes.catalogue import build
+from compd.simulation.causes.catalogue import build_cause
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import INTERFEROMETER_SIGMA_UM, noisy
 from compd.simulation.truth.mechanism import Mechanism
@@ -25,20 +26,23 @@ from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
 
 LINK = 0
-# A steel tube and screw: handbook expansion, and the stiffness of a screw drive of this size.
+# Link without the device: expansion of steel (handbook), compliance of a screw drive of this size.
 TUBE_PPM_PER_K = 11.0
 TUBE_UM_PER_N = 1 / 30.0
-# Loads on the tip along the link, up and down twice; N.
+# Loads on the tip along the link, N: up, down and back to zero, in steps of 10 N.
 LOADS_N = np.concatenate([np.linspace(0, 60, 7), np.linspace(50, -60, 12), np.linspace(-50, 0, 6)])
 LOAD_S = 10.0
-# A lamp beside the link: a few kelvin in two hours, cooling afterwards.
+# A lamp beside the link, a few kelvin in two hours.
 LAMP_W = 4.0
 WARM_S, WARM_STEP_S = 7200.0, 240.0
 
 
 @dataclass(frozen=True)
-class Bed:
-    """Differences scale less interferometer, um. Loading (N,): cold and warm; warming (K,)."""
+class LinkDifferences:
+    """Length change by the gauges less that by the interferometer, um.
+
+    axial_N, cold_um, warm_um : (N,) by load, before and after warming. link_degC, warming_um : (K,) while warming.
+    """
 
     axial_N: FloatArray
     cold_um: FloatArray
@@ -48,23 +52,30 @@ class Bed:
 
 
 @dataclass(frozen=True)
-class Experiment:
-    without: Bed
-    compensated: Bed
+class LinkResult:
+    """without : scale bolted to the link, no comparators. compensated : with the paper's device."""
+
+    without: LinkDifferences
+    compensated: LinkDifferences
 
 
-def run(configuration: Configuration, seed: int) -> Experiment:
+def run(configuration: Configuration, seed: int) -> LinkResult:
+    """Load and warm the link with and without the paper's device (figures 3, 5 and 18)."""
     mechanism = Mechanism(configuration.geometry)
     bolted = [
-        build("link_expansion", TUBE_PPM_PER_K, mechanism, seed),
-        build("link_elasticity", TUBE_UM_PER_N, mechanism, seed),
+        build_cause("link_expansion", TUBE_PPM_PER_K, mechanism, seed),
+        build_cause("link_elasticity", TUBE_UM_PER_N, mechanism, seed),
     ]
-    return Experiment(
-        _bed(configuration, seed, bolted, compensated=False), _bed(configuration, seed, [], compensated=True)
+    return LinkResult(
+        _measure_link(configuration, seed, bolted, compensated=False),
+        _measure_link(configuration, seed, [], compensated=True),
     )
 
 
-def _bed(configuration: Configuration, seed: int, causes: list[Cause], *, compensated: bool) -> Bed:
+def _measure_link(
+    configuration: Configuration, seed: int, causes: list[Cause], *, compensated: bool
+) -> LinkDifferences:
+    """Loading, warming, loading again. compensated : equation (1) with the joint comparators, else the scale alone."""
     world = World(configuration.geometry, configuration.wiring, seed, causes=causes)
     rng = np.random.default_rng([seed, 18])
     weights = joint_weights(configuration.wiring, world.mechanism.links)[LINK]
@@ -75,14 +86,14 @@ def _bed(configuration: Configuration, seed: int, causes: list[Cause], *, compen
 
     def difference_um(time_s: float) -> float:
         """The gauges' change of the link's length less the interferometer's."""
-        world.carry(still, machine.posture0, time_s, 0.0)
-        readings = Readings()
-        readings.read(world)
-        seen_mm = readings.scale_mm[0][LINK]
+        world.advance_to(still, machine.posture0, time_s, 0.0)
+        gauge_log = GaugeLog()
+        gauge_log.read(world)
+        gauge_mm = gauge_log.scale_mm[0][LINK]
         if compensated:
-            seen_mm -= float(weights @ readings.joint_mm[0])  # equation (1)
+            gauge_mm -= float(weights @ gauge_log.joint_mm[0])  # equation (1)
         true_mm = noisy(world.link_change_mm()[[LINK]], INTERFEROMETER_SIGMA_UM, rng)[0]
-        return (seen_mm - float(true_mm)) * UM_PER_MM
+        return (gauge_mm - float(true_mm)) * UM_PER_MM
 
     def loading() -> tuple[FloatArray, FloatArray]:
         axial, differences = [], []
@@ -100,41 +111,52 @@ def _bed(configuration: Configuration, seed: int, causes: list[Cause], *, compen
         warming_um.append(difference_um(WARM_STEP_S))
         link_degC.append(world.sense(f"temperature_link_{LINK + 1}_degC"))
     _, warm_um = loading()
-    return Bed(axial_N, cold_um, warm_um, np.array(link_degC), np.array(warming_um))
+    return LinkDifferences(axial_N, cold_um, warm_um, np.array(link_degC), np.array(warming_um))
 
 
-def reductions(found: Experiment) -> list[Reduction]:
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+    """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
+    result = run(configuration, seed)
+    return Reproduction("Figure 18: scale unit against laser interferometer", reductions(result), panels(result))
+
+
+def reductions(result: LinkResult) -> list[Reduction]:
+    """Peak-to-peak differences under load and while warming, and the rms of all; figure 18 states no numbers."""
     return [
         Reduction(
             "difference under load, peak to peak",
-            float(np.ptp(found.without.cold_um)),
-            float(np.ptp(found.compensated.cold_um)),
+            float(np.ptp(result.without.cold_um)),
+            float(np.ptp(result.compensated.cold_um)),
             "considerably decreases; no number",
         ),
         Reduction(
             "difference while warming up, peak to peak",
-            float(np.ptp(found.without.warming_um)),
-            float(np.ptp(found.compensated.warming_um)),
+            float(np.ptp(result.without.warming_um)),
+            float(np.ptp(result.compensated.warming_um)),
             "decreases; no number",
         ),
         Reduction(
             "difference, load and warmth, rms",
-            rms([*found.without.cold_um, *found.without.warm_um]),
-            rms([*found.compensated.cold_um, *found.compensated.warm_um]),
+            rms([*result.without.cold_um, *result.without.warm_um]),
+            rms([*result.compensated.cold_um, *result.compensated.warm_um]),
             "-",
         ),
     ]
 
 
-def panels(found: Experiment) -> list[Panel]:
+def panels(result: LinkResult) -> list[Panel]:
+    """Difference by axial force, and by the link's temperature."""
     load, warmth = Figure(), Figure()
-    for name, bed, colour in (("without", found.without, "worst"), ("with compensation", found.compensated, "best")):
+    for name, differences, colour in (
+        ("without", result.without, "worst"),
+        ("with compensation", result.compensated, "best"),
+    ):
         for state, differences_um, symbol in (
-            ("20 degC", bed.cold_um, "circle"),
-            ("warm", bed.warm_um, "diamond-open"),
+            ("20 degC", differences.cold_um, "circle"),
+            ("warm", differences.warm_um, "diamond-open"),
         ):
             load.add_scatter(
-                x=bed.axial_N,
+                x=differences.axial_N,
                 y=differences_um,
                 name=f"{name}, {state}",
                 mode="lines+markers",
@@ -142,7 +164,11 @@ def panels(found: Experiment) -> list[Panel]:
                 marker={"symbol": symbol, "size": 7},
             )
         warmth.add_scatter(
-            x=bed.link_degC, y=bed.warming_um, name=name, mode="lines+markers", line={"color": COLOURS[colour]}
+            x=differences.link_degC,
+            y=differences.warming_um,
+            name=name,
+            mode="lines+markers",
+            line={"color": COLOURS[colour]},
         )
     return [
         Panel(

@@ -8,22 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 from plotly.graph_objects import Figure
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
-from compd.paper.reduction import Readings, Reduction, rms
+from compd.paper.gauge_log import GaugeLog
+from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, styled
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, ball_plate_mm, noisy
-from compd.simulation.truth.touch import touch
+from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
 
-# One ball takes a person half a minute; the whole plate is measured twice, there and back.
+# Time that a person takes per ball; rounds over the whole plate, there and back.
 PER_BALL_S = 30.0
 ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Distances:
+class PlateResult:
     """The 136 distances between 17 balls. nominal_mm : (136,). Errors (136,), um, measured less certified."""
 
     nominal_mm: FloatArray
@@ -32,29 +33,29 @@ class Distances:
     full_um: FloatArray
 
 
-def run(configuration: Configuration, seed: int) -> Distances:
-    """Machine zero is taken cold, and the plate measured at once, while the machine warms up."""
+def run(configuration: Configuration, seed: int) -> PlateResult:
+    """Measure the plate while the machine warms up, from machine zero at 20 degC (figures 19 and 20)."""
     world = World(configuration.geometry, configuration.wiring, seed)
     rng = np.random.default_rng([seed, 20])
     machine = world.mechanism
     balls = ball_plate_mm(machine.tip0_M if machine.tip_frame == "M" else machine.tip0_P)
     there = range(len(balls))
     order = [*there, *reversed(there)] * (ROUNDS // 2)
-    readings = Readings()
+    gauge_log = GaugeLog()
     for ball in order:
-        touch(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        probe_ball(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
         world.advance(PER_BALL_S)
-        touch(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
-        readings.read(world)
+        probe_ball(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        gauge_log.read(world)
     pairs = np.array(list(itertools.combinations(there, 2)))
     nominal_mm = _distances(balls, pairs)
 
     def errors_um(*, joints: bool, frame: bool) -> FloatArray:
-        tips = readings.tips_mm(configuration, joints=joints, frame=frame)
+        tips = gauge_log.tips_mm(configuration, joints=joints, frame=frame)
         places = np.array([tips[np.array(order) == ball].mean(axis=0) for ball in there])
         return (_distances(places, pairs) - nominal_mm) * UM_PER_MM
 
-    return Distances(
+    return PlateResult(
         nominal_mm,
         errors_um(joints=False, frame=False),
         errors_um(joints=True, frame=False),
@@ -62,23 +63,31 @@ def run(configuration: Configuration, seed: int) -> Distances:
     )
 
 
-def reductions(found: Distances) -> list[Reduction]:
-    without = rms(found.without_um)
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+    """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
+    result = run(configuration, seed)
+    return Reproduction("Figure 20: distances between the balls of a 3D ball plate", reductions(result), panels(result))
+
+
+def reductions(result: PlateResult) -> list[Reduction]:
+    """Errors of the distances; figure 20 states 32 % less by compensation of the joints."""
+    without = rms(result.without_um)
     return [
-        Reduction("distances, rms, joints compensated", without, rms(found.joints_um), "32 % by the joints"),
-        Reduction("distances, largest, joints compensated", *_largest(found.without_um, found.joints_um), "-"),
-        Reduction("distances, rms, joints and frame compensated", without, rms(found.full_um), "-"),
+        Reduction("distances, rms, joints compensated", without, rms(result.joints_um), "32 % by the joints"),
+        Reduction("distances, largest, joints compensated", *_largest(result.without_um, result.joints_um), "-"),
+        Reduction("distances, rms, joints and frame compensated", without, rms(result.full_um), "-"),
     ]
 
 
-def panels(found: Distances) -> list[Panel]:
+def panels(result: PlateResult) -> list[Panel]:
+    """Error of each distance by its length, as in figure 20."""
     figure = Figure()
     for name, errors_um, colour, symbol in (
-        ("without compensation", found.without_um, "worst", "circle-open"),
-        ("joints compensated", found.joints_um, "best", "circle"),
+        ("without compensation", result.without_um, "worst", "circle-open"),
+        ("joints compensated", result.joints_um, "best", "circle"),
     ):
         figure.add_scatter(
-            x=found.nominal_mm,
+            x=result.nominal_mm,
             y=errors_um,
             name=name,
             mode="markers",
@@ -97,6 +106,7 @@ def panels(found: Distances) -> list[Panel]:
 
 
 def _distances(places_mm: FloatArray, pairs: np.ndarray[tuple[int, int], np.dtype[np.int_]]) -> FloatArray:
+    """(pairs,) distances between places (balls, 3)."""
     return np.asarray(np.linalg.norm(places_mm[pairs[:, 0]] - places_mm[pairs[:, 1]], axis=1))
 
 

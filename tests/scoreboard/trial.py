@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 from compd.cli.main import app
 from compd.configuration import load
 from compd.recording.writer import write_recording
-from compd.simulation.campaign.simulated_recording import record
-from compd.simulation.causes.catalogue import HiddenCause, seal
+from compd.simulation.campaign.simulated_recording import simulate_recording
+from compd.simulation.causes.hidden_cause import HiddenCause, write_answer
 from tests.scoreboard.cases import Case
 from tests.support.paths import ROOT
 
@@ -63,15 +63,9 @@ def run(case: Case, campaigns: Path) -> dict[str, Any]:
 
 def hide(case: Case, hidden: list[HiddenCause], directory: Path, name: str, other_days: int) -> list[HiddenCause]:
     """A campaign with these causes in it, and how strong each became; NAME.answer.json is for the scorer."""
-    recorded = record(load(CONFIG), case.seed, hidden, other_days=other_days)
+    recorded = simulate_recording(load(CONFIG), case.seed, hidden, other_days=other_days)
     write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar, overwrite=True)
-    seal(
-        directory / f"{name}.answer.json",
-        [one.cause for one in recorded.hidden],
-        [one.floors for one in recorded.hidden],
-        recorded.weak,
-        case.seed,
-    )
+    write_answer(directory / f"{name}.answer.json", recorded.hidden, recorded.weak, case.seed)
     return [HiddenCause(one.cause.id, one.cause.strength) for one in recorded.hidden]
 
 

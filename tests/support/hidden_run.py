@@ -22,8 +22,9 @@ import yaml
 
 from compd.client import connect
 from compd.configuration.document import read
-from compd.demo.processes import Command, running
-from compd.demo.session import ARRIVED_MM, MachineController, wait_for_gauges
+from compd.demo.processes import Command, run_commands
+from compd.demo.session import ARRIVED_MM, wait_for_gauges
+from compd.simulation.wires.control_client import ControlClient
 from tests.support.hidden_visits import Visit
 from tests.support.simulated import TRIPOD
 
@@ -70,7 +71,7 @@ class HiddenRun:
 
     configuration: Path
     directory: Path
-    machine: MachineController
+    machine: ControlClient
     said: list[str] = field(default_factory=list)
 
     @property
@@ -169,8 +170,8 @@ def hidden_run(directory: Path, *options: str) -> Iterator[HiddenRun]:
         Command(["run", str(machine / config.name)], ready=machine / "compd.sock"),
     ]
     with ExitStack() as stack:
-        stack.enter_context(running(commands, log=directory / "output.log"))
-        run = HiddenRun(config, machine, stack.enter_context(MachineController(machine / "control.sock")))
+        stack.enter_context(run_commands(commands, log=directory / "output.log"))
+        run = HiddenRun(config, machine, stack.enter_context(ControlClient(machine / "control.sock")))
         run.zero()
         yield run
 

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from compd.client import Client, connect
-from compd.demo.processes import Command, running
-from compd.demo.session import MachineController, wait_for_gauges
+from compd.demo.processes import Command, run_commands
+from compd.demo.session import wait_for_gauges
+from compd.simulation.wires.control_client import ControlClient
 from tests.support.paths import ROOT
 
 RATE_HZ = 50.0
@@ -28,7 +29,7 @@ class Chain:
     """A running machine and daemon."""
 
     directory: Path
-    machine: MachineController
+    machine: ControlClient
     daemon: Client
     setpoints: Iterator[Setpoint]
 
@@ -77,8 +78,8 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
         Command(["run", str(directory / "tripod-cmm.yaml")], ready=directory / "compd.sock"),
     ]
     with (
-        running(commands, log=directory / "output.log"),
-        MachineController(directory / "control.sock") as machine,
+        run_commands(commands, log=directory / "output.log"),
+        ControlClient(directory / "control.sock") as machine,
         connect(directory / "compd.sock", PATIENCE_S) as daemon,
     ):
         chain = Chain(directory, machine, daemon, daemon.watch(RATE_HZ))

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 import pytest
 import yaml
 
-from compd.simulation.causes.catalogue import CAUSES, drawn
+from compd.simulation.causes.catalogue import CAUSES
+from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
 from tests.scoreboard.scoring import follows
 from tests.support.hidden_run import HiddenRun, hidden_run, told
@@ -126,7 +127,7 @@ def test_every_live_cause_is_run_by_the_first_number_that_hides_it() -> None:
     machine = Mechanism(tripod())
     first: dict[str, int] = {}
     for number in range(NUMBERS):
-        cause, _, floors = drawn(number, machine)
+        cause, _, floors = draw_hidden(number, machine)
         if cause not in NOT_LIVE and floors >= PLAIN_FLOORS:
             first.setdefault(cause, number)
     assert sorted((*QUICK, *ONE, *OUTSIDE, *LEFT_OUT)) == sorted(first.values())

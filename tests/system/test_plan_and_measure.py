@@ -22,7 +22,7 @@ from compd.errors import CompdError
 from compd.recording.reader import read_recording
 from compd.simulation.campaign.plan_reader import read_plan
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.stages import SETTLED_S
+from compd.simulation.truth.plan_motion import SETTLED_S
 from compd.simulation.truth.world import World
 from compd.simulation.wires.server import Simulation
 from tests.support.planned_measurements import plan_file, straight_down, thin

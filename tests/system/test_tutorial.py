@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pytest
 
 from compd.client import connect
-from compd.demo.processes import Command, running
+from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
 from tests.support.paths import ROOT
 from tests.support.simulated import run_directory
@@ -88,7 +88,7 @@ def run_all(directory: Path) -> None:
             words = [str(ROOT / word) if word.startswith("config/") else word for word in words]
             if shown.beside and words[1] in READY:
                 command = Command(words[1:], ready=machine / READY[words[1]])
-                stack.enter_context(running([command], directory / f"{number}.log"))
+                stack.enter_context(run_commands([command], directory / f"{number}.log"))
             elif shown.beside:
                 stack.enter_context(beside(words, directory))
             else:

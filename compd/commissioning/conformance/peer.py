@@ -9,7 +9,7 @@ from typing import Any
 from compd.commissioning.conformance.faults import NONE, Fault, Piece
 from compd.gauge import Channel
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
-from compd.simulation.wires.modbus_slaves import Slaves
+from compd.simulation.wires.modbus_slaves import ModbusSlaves
 
 # Where a gauge does not say what it can show, by unit.
 RANGES = {"mm": (-0.9, 0.9), "degC": (5.0, 45.0), "N": (-50.0, 50.0), "hPa": (950.0, 1050.0), "pct": (10.0, 90.0)}
@@ -47,7 +47,7 @@ class Peer:
     def __init__(self, simulator: Callable[..., Any], options: Any, truth: Truth, over_tcp: bool) -> None:
         device = simulator(options, truth.sense)
         registers = isinstance(device, SimulatedRegisterDevice)
-        self._device: Slaves | SimulatedByteDevice = Slaves([device], over_tcp) if registers else device
+        self._device: ModbusSlaves | SimulatedByteDevice = ModbusSlaves([device], over_tcp) if registers else device
         self.replies = 0
         self.longest = 0  # bytes of the longest reply
         self._truth = truth

@@ -1,1 +1,1 @@
-"""Measuring campaigns on the simulated machine, without wires and without waiting."""
+"""PlanMotion campaigns on the simulated machine, without wires and without waiting."""

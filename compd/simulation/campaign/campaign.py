@@ -1,4 +1,4 @@
-"""A measuring campaign on the simulated machine, without wires and without waiting: rows of a recording."""
+"""A measuring campaign on the simulated machine, computed without wires or real time: rows of a recording."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.closure import Posture
 from compd.simulation.truth.instruments import Kind, noisy
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
+from compd.simulation.truth.probing import PROBING_STEP_S, probing_steps_mm
 from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.touch import TOUCH_STEP_S, approach, posture_at_scales
+from compd.simulation.truth.workspace import posture_at_scales
 from compd.simulation.truth.world import World
 
-# Between sessions time passes in steps, for causes that remember.
+# Longest step in which time passes between sessions, for causes with a memory.
 LONGEST_WAIT_S = 300.0
 
 
@@ -49,9 +50,9 @@ class Campaign:
         outlier_share: float = 0.0,
         balls_M: FloatArray | None = None,
     ) -> None:
-        """`seed`: joints and noise follow from it. `sigma_um`: of the reference, 0 for the truth itself.
+        """seed : of joints and noise. sigma_um : of the reference, 0 for the truth itself.
 
-        `balls_M`: (points, 3) mm, for a ball plate the balls that are touched at the plan's points.
+        balls_M : (points, 3) mm, for a ball plate: the balls that are probed at the plan's points.
         """
         weather = plan.weather
         self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
@@ -59,7 +60,7 @@ class Campaign:
         self._mechanism = self._world.mechanism
         self._plan = plan
         self._rng = np.random.default_rng([seed, 2, plan.number])
-        self._notes = RowLog(self._world, wiring, self._rng, reference, sigma_um, outlier_share)
+        self._log = RowLog(self._world, wiring, self._rng, reference, sigma_um, outlier_share)
         self._sigma_um, self._outlier_share = sigma_um, outlier_share
         self._balls_M = balls_M
         self._direction = np.ones(self._mechanism.links)
@@ -67,7 +68,7 @@ class Campaign:
         self._visit = 0
 
     def run(self) -> LoggedRows:
-        """Raises KinematicsError where a point cannot be reached."""
+        """All rows of the plan. Raises KinematicsError where a point cannot be reached."""
         session = self._plan.items[0].session
         for item in self._plan.items:
             if item.session != session:
@@ -79,46 +80,46 @@ class Campaign:
             self._world.force_M_N = item.force_M_N
             if item.kind == "visit":
                 self._go_to(item)
-                self._note(item, item.point)
+                self._add_row(item, item.point)
                 if item.repeated:
                     self._stay(REPEAT_AFTER_S)
-                    self._note(item, item.point)
+                    self._add_row(item, item.point)
             else:
                 self._pass(item)
-        return self._notes.rows
+        return self._log.rows
 
-    # --- moving ---------------------------------------------------------------------------------------
+    # --- motion ---------------------------------------------------------------------------------------
 
     def _wait_until(self, time_s: float) -> None:
         while time_s - self._world.time_s > 1e-9:
             self._stay(min(time_s - self._world.time_s, LONGEST_WAIT_S))
 
     def _stay(self, time_s: float) -> None:
-        self._world.carry(self._world.scale_mm, self._world.posture, time_s, 0.0)
+        self._world.advance_to(self._world.scale_mm, self._world.posture, time_s, 0.0)
 
     def _go_to(self, item: CampaignItem) -> None:
-        """Arrive and settle; a visit's row is written before the next one sets out."""
+        """Move to the item's point, rest, and with a ball plate probe its ball."""
         self._visit += 1
         guess = self._postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
         if self._balls_M is not None:
             ball_M = noisy(self._balls_M[item.point - 1], self._sigma_um, self._rng, self._outlier_share)
-            for scale_mm in approach(self._world, ball_M, guess):
-                self._move(scale_mm, guess, TOUCH_STEP_S)
+            for scale_mm in probing_steps_mm(self._world, ball_M, guess):
+                self._move(scale_mm, guess, PROBING_STEP_S)
 
     def _move(self, scale_mm: FloatArray, guess: Posture, time_s: float) -> None:
         moved = scale_mm - self._world.scale_mm
         self._direction = np.where(moved != 0, np.sign(moved), self._direction)
         travel_s = Move(self._world.scale_mm, scale_mm).duration_s
-        self._world.carry(scale_mm, guess, max(time_s, travel_s), travel_s)
+        self._world.advance_to(scale_mm, guess, max(time_s, travel_s), travel_s)
 
     def _pass(self, item: CampaignItem) -> None:
-        """Out towards another point and half the way back, with rows at rest and at constant speed."""
+        """Move PASS_MM towards another point and half of it back, with rows at rest and at constant speed."""
         start = self._world.scale_mm
         way = self._plan.points_mm[item.towards - 1] - start
         out = way * min(1.0, PASS_MM / np.abs(way).max())
         self._visit += 1
-        self._note(item, None)
+        self._add_row(item, None)
         for end in (start + out, start + out / 2):
             move = Move(self._world.scale_mm, end, item.speed_mm_per_s)
             self._direction = np.sign(end - self._world.scale_mm)
@@ -128,10 +129,10 @@ class Campaign:
             before_s = 0.0
             for time_s in [*times.tolist(), move.duration_s + 0.1]:
                 step_s = time_s - before_s
-                self._world.carry(move.position_mm(time_s), self._world.posture, step_s, step_s)
+                self._world.advance_to(move.position_mm(time_s), self._world.posture, step_s, step_s)
                 before_s = time_s
                 self._visit += 1
-                self._note(item, None)
+                self._add_row(item, None)
 
-    def _note(self, item: CampaignItem, point: int | None) -> None:
-        self._notes.add(item.session, self._visit, point, self._direction)
+    def _add_row(self, item: CampaignItem, point: int | None) -> None:
+        self._log.add(item.session, self._visit, point, self._direction)

@@ -1,4 +1,4 @@
-"""What a measuring campaign does when: sessions, visits, passes, loads, heat. Drawn once, run on any machine."""
+"""The schedule of a measuring campaign: sessions, visits, passes, loads, heat and weather, all from a seed."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.tour import tour_points_mm
 from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.weather import WorkshopWeather
+from compd.simulation.truth.workspace import draw_points_mm
 
 SESSIONS = 4
 POINTS = 48
 VISITS_PER_SESSION = 96
-# Three times a session a pass out and one half the way back, with rows on the move: reversals, and speed.
+# A pass goes out and half the way back, with rows on the move: it shows reversals and the influence of speed.
 PASSES_PER_SESSION = 3
 PASS_MM = 24.0
 PASS_SPEEDS_MM_PER_S = (2.0, 5.0, 10.0, 20.0)
@@ -26,13 +26,13 @@ PASS_ROW_EVERY_S = 0.2
 VISIT_S = 25.0
 REPEAT_AFTER_S = 2.0
 REPEAT_SHARE = 0.25
-# Between sessions the machine is switched off, and links are as warm as the room again.
+# Time between sessions; the machine is switched off, and its links cool down to the room.
 GAP_S = 4 * 3600.0
 HEATS_PER_SESSION = 3
 LOADED_SHARE = 0.45
-# Loads on the tip, N: sideways either way, down and a little up.
+# Range of loads on the tip, N, in {M}.
 LOAD_LOW_N, LOAD_HIGH_N = np.array([-30.0, -30.0, -60.0]), np.array([30.0, 30.0, 10.0])
-# Upper ends of the heat that is drawn: drives at work, electronics, cabinet, a spindle, sun and lamps; W.
+# Upper limits of random heat, W: drives, electronics, cabinet, platform (a spindle), tool, lamps and sun.
 DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0, 0.2, 60.0
 
 
@@ -40,7 +40,7 @@ DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0,
 class CampaignItem:
     """A visit to a point (1-based), or a pass from there towards another one.
 
-    start_s : when the machine sets out. repeated : a second row at once. heat : what is switched on now.
+    start_s : when the machine sets out. repeated : a second row at the same visit. heat : sources that are on.
     """
 
     kind: Literal["visit", "pass"]
@@ -56,7 +56,10 @@ class CampaignItem:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """items in time's order; points_mm: (points, n) scale values; weather: of all its sessions; number: which days."""
+    """A campaign's items in order of time.
+
+    number : of the campaign on the same machine. points_mm : (points, n) scale values. weather : of all sessions.
+    """
 
     number: int
     items: tuple[CampaignItem, ...]
@@ -64,7 +67,7 @@ class CampaignPlan:
     weather: WorkshopWeather
 
     def thinned(self, keep_one_in: int) -> CampaignPlan:
-        """The same days with fewer items, as many of each kind."""
+        """The same campaign with one item of every `keep_one_in` of each kind."""
         kinds = {"visit": 0, "pass": 0}
         kept = []
         for item in self.items:
@@ -74,7 +77,7 @@ class CampaignPlan:
         return CampaignPlan(self.number, tuple(kept), self.points_mm, self.weather)
 
 
-def plan(
+def draw_campaign_plan(
     mechanism: Mechanism,
     seed: int,
     number: int = 0,
@@ -82,10 +85,13 @@ def plan(
     points_mm: FloatArray | None = None,
     passes: int = PASSES_PER_SESSION,
 ) -> CampaignPlan:
-    """`number`: other days on the same machine. `points_mm`: other points than drawn ones, as scale values."""
+    """Plan number `number` for the machine of `seed`.
+
+    points_mm : (points, n) scale values to use instead of random points. passes : per session.
+    """
     rng = np.random.default_rng([seed, 1, number])
     if points_mm is None:
-        points_mm = tour_points_mm(mechanism, rng, POINTS)
+        points_mm = draw_points_mm(mechanism, rng, POINTS)
     session_s = (VISITS_PER_SESSION + passes) * VISIT_S
     starts_s = [session * (session_s + GAP_S) for session in range(SESSIONS)]
     weather = WorkshopWeather(starts_s, session_s, rng)
@@ -98,7 +104,7 @@ def plan(
 
 
 def switched_off(links: int) -> Heat:
-    """What a machine gives off between sessions."""
+    """Heat between sessions: none."""
     return Heat(np.zeros(links), 0.0, np.zeros(COLUMNS), 0.0, 0.0, 0.0)
 
 
@@ -129,11 +135,11 @@ def _session(
 
 
 def _order(points: int, count: int, rng: np.random.Generator) -> list[int]:
-    """count + 1 points, 1-based: all of them in a new order again and again, none twice in a row."""
+    """count + 1 point numbers from 1: random permutations one after the other, none twice in a row."""
     order: list[int] = []
     while len(order) <= count:
-        turn = (rng.permutation(points) + 1).tolist()
-        order += turn[1:] + turn[:1] if order and turn[0] == order[-1] else turn
+        cycle = (rng.permutation(points) + 1).tolist()
+        order += cycle[1:] + cycle[:1] if order and cycle[0] == order[-1] else cycle
     return order[: count + 1]
 
 

@@ -1,7 +1,7 @@
-"""The file of a planned measurement, as `compd plan` writes it: read, and checked against the machine.
+"""Reader of planned measurements as `compd plan` writes them, checked against the machine.
 
-One row per measurement, a header, `.` decimal, UTF-8: where the tool's tip is to be in {M}, what is held meanwhile,
-from which side each link comes, how fast it passes. A time that does not rise begins a new programme.
+CSV with a header, `.` decimal, UTF-8, one row per measurement: the tip's place in {M}, held quantities, direction of
+approach of each link, speed. A time that is not later than the last row's begins a new programme.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from compd.errors import CompdError, KinematicsError, Problem
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow
-from compd.simulation.truth.tour import STROKE_SHARE
 from compd.simulation.truth.warm_up import PARTS
+from compd.simulation.truth.workspace import STROKE_SHARE
 
 TIP = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 NEEDED = ("time_s", *TIP)
 SPEED = "speed_mm_per_s"
-# What can be held by heaters and coolers in a laboratory, by a climate chamber and by a loading device; pressure: the
-# lowest and highest at sea level on record (WMO).
+# Ranges, by unit, that heaters and coolers, a climate chamber and a loading device can hold; pressure: the lowest and
+# highest at sea level on record (WMO).
 _RANGES = {"degC": (0.0, 60.0), "hPa": (870.0, 1085.0), "pct": (0.0, 100.0), "N": (-1000.0, 1000.0)}
 _AGAIN = "`compd plan` writes such a file"
 
 
-def quantities(links: int) -> tuple[str, ...]:
-    """What the simulated machine can hold for a measurement, by name with unit."""
+def holdable_quantities(links: int) -> tuple[str, ...]:
+    """Names, with unit, of the quantities that the simulated machine can hold."""
     places = ("room", *(f"link_{i}" for i in range(1, links + 1)), *PARTS)
     return (
         *(f"temperature_{place}_degC" for place in places),
@@ -45,7 +45,7 @@ def quantities(links: int) -> tuple[str, ...]:
 
 
 def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None = None) -> tuple[PlannedRow, ...]:
-    """The rows of a plan for this machine. measured : the quantities that gauges are wired to; None = every one.
+    """The planned rows for this machine. measured : quantities that gauges are wired to; None: all.
 
     Raises CompdError with everything that is wrong with the file.
     """
@@ -53,20 +53,20 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
 
 
 class _PlanReader:
-    """One pass over one file; every finding with line and column."""
+    """One pass over one file that collects every problem, with line and column."""
 
     def __init__(self, path: Path, mechanism: Mechanism, measured: Collection[str] | None) -> None:
         self._path, self._mechanism = path, mechanism
         self._problems: list[Problem] = []
         self._approaches = tuple(f"approach_{i}" for i in range(1, mechanism.links + 1))
-        self._held = quantities(mechanism.links)
-        self._measured = self._held if measured is None else measured
+        self._holdable = holdable_quantities(mechanism.links)
+        self._measured = self._holdable if measured is None else measured
 
     def rows(self) -> tuple[PlannedRow, ...]:
         header, lines = self._lines()
         self._check_header(header)
         places: dict[tuple[float, ...], int] = {}
-        found: list[PlannedRow] = []
+        rows: list[PlannedRow] = []
         before_s = math.inf
         for line, cells in lines:
             values = self._numbers(line, header, cells)
@@ -74,7 +74,7 @@ class _PlanReader:
             scale_mm = self._scale_mm(line, place)
             time_s = values.get("time_s", math.nan)
             row = PlannedRow(
-                len(found) + 1,
+                len(rows) + 1,
                 dict(zip(header, cells, strict=False)).get("purpose", ""),
                 places.setdefault(place, len(places) + 1),
                 not time_s > before_s,
@@ -82,21 +82,21 @@ class _PlanReader:
                 scale_mm,
                 np.array([values.get(name, 0.0) for name in self._approaches]),
                 values.get(SPEED, 0.0),
-                {name: values[name] for name in self._held if name in values},
+                {name: values[name] for name in self._holdable if name in values},
             )
             self._check_way(line, row)
-            found.append(row)
+            rows.append(row)
             before_s = time_s
         if header and not lines:
-            self._fault("", "has no row", allowed="a header and at least one row", next_step=_AGAIN)
+            self._report("", "has no row", allowed="a header and at least one row", next_step=_AGAIN)
         if self._problems:
             raise CompdError(self._problems)
-        return tuple(found)
+        return tuple(rows)
 
     # --- the file -------------------------------------------------------------------------------------
 
     def _lines(self) -> tuple[list[str], list[tuple[int, list[str]]]]:
-        """The header, and every other row that is not empty with its line."""
+        """The header, and every further row that is not empty, with its line number."""
         try:
             with self._path.open(encoding="utf-8-sig", newline="") as stream:
                 reader = csv.reader(stream)
@@ -121,12 +121,12 @@ class _PlanReader:
         return lines[0][1], lines[1:]
 
     def _check_header(self, header: Sequence[str]) -> None:
-        known = ("row", "purpose", *NEEDED, *self._held, *self._approaches, SPEED)
+        known = ("row", "purpose", *NEEDED, *self._holdable, *self._approaches, SPEED)
         for name in dict.fromkeys(header):
             if header.count(name) > 1:
-                self._fault(f":1 column {name}", "is there twice", next_step="delete one")
-            if name in self._held and name not in self._measured:
-                self._fault(
+                self._report(f":1 column {name}", "is there twice", next_step="delete one")
+            if name in self._holdable and name not in self._measured:
+                self._report(
                     f":1 column {name}",
                     "no gauge of this machine measures it: no recording will tell",
                     name,
@@ -137,15 +137,15 @@ class _PlanReader:
                 continue
             close = difflib.get_close_matches(name, known, n=1)
             step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
-            self._fault(f":1 column {name}", "is nothing that this machine can be told", name, ", ".join(known), step)
+            self._report(f":1 column {name}", "is nothing that this machine can be told", name, ", ".join(known), step)
         for name in NEEDED:
             if name not in header:
-                self._fault(f":1 column {name}", "is missing", allowed=", ".join(NEEDED), next_step=_AGAIN)
+                self._report(f":1 column {name}", "is missing", allowed=", ".join(NEEDED), next_step=_AGAIN)
 
     def _numbers(self, line: int, header: Sequence[str], cells: Sequence[str]) -> dict[str, float]:
         """Values by column, nan where a cell is wrong."""
         if len(cells) != len(header):
-            self._fault(
+            self._report(
                 f":{line}",
                 "has not as many cells as the header",
                 str(len(cells)),
@@ -154,7 +154,7 @@ class _PlanReader:
             )
         values = {}
         for name, cell in zip(header, cells, strict=False):
-            if name in (*NEEDED, *self._held, *self._approaches, SPEED):
+            if name in (*NEEDED, *self._holdable, *self._approaches, SPEED):
                 values[name] = self._number(f":{line} column {name}", name, cell)
         return values
 
@@ -167,11 +167,11 @@ class _PlanReader:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            self._fault(place, "is no number" if cell else "is empty", cell, allowed, "write a number")
+            self._report(place, "is no number" if cell else "is empty", cell, allowed, "write a number")
             return math.nan
         if not low <= value <= high or (name in self._approaches and value not in (-1, 0, 1)):
             what = "is faster than this machine's drives" if name == SPEED and value > high else "is out of range"
-            self._fault(place, what, cell, allowed, "change the row, or give `compd plan` the limit")
+            self._report(place, what, cell, allowed, "change the row, or give `compd plan` the limit")
             return math.nan
         return value
 
@@ -185,7 +185,7 @@ class _PlanReader:
     # --- the machine ----------------------------------------------------------------------------------
 
     def _scale_mm(self, line: int, tip: Sequence[float]) -> FloatArray:
-        """(n,) for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where that is not known."""
+        """(n,) scale values for a tip in {M}, attitude of machine zero, parts as drawn; nan for an invalid place."""
         nowhere = np.full(self._mechanism.links, math.nan)
         if not all(map(math.isfinite, tip)):
             return nowhere
@@ -195,7 +195,7 @@ class _PlanReader:
             posture = None
         scale_mm = nowhere if posture is None else self._mechanism.lengths(posture) - self._mechanism.lengths0_mm
         if not self._within_stroke(scale_mm):
-            self._fault(
+            self._report(
                 f":{line} column {', '.join(TIP)}",
                 "this machine cannot reach the place",
                 ", ".join(f"{value:g}" for value in tip),
@@ -207,16 +207,16 @@ class _PlanReader:
 
     def _check_way(self, line: int, row: PlannedRow) -> None:
         if row.on_the_move and not row.approach.any():
-            self._fault(
+            self._report(
                 f":{line} column approach_1 ...",
                 "a row on the move needs a direction",
                 "0",
                 "-1 or 1 for the links that move",
                 "write it, or speed_mm_per_s 0",
             )
-        ways = [row.turning_mm, row.end_mm]
-        if all(np.isfinite(one).all() for one in ways) and not all(map(self._within_stroke, ways)):
-            self._fault(
+        ends = [row.turning_mm, row.end_mm]
+        if all(np.isfinite(end_mm).all() for end_mm in ends) and not all(map(self._within_stroke, ends)):
+            self._report(
                 f":{line} column approach_1 ...",
                 "there is no room to come from this side",
                 ", ".join(f"{value:g}" for value in row.approach),
@@ -231,7 +231,7 @@ class _PlanReader:
         stroke_mm = STROKE_SHARE * float(self._mechanism.lengths0_mm.min())
         return f"links within {stroke_mm:.0f} mm of machine zero"
 
-    def _fault(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+    def _report(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         self._problems.append(
             Problem(where=f"{self._path}{place}", what=what, value=value, allowed=allowed, next_step=next_step)
         )

@@ -1,4 +1,4 @@
-"""What is written down in a campaign: the gauges' readings and the reference's, row by row."""
+"""Rows of a simulated campaign: readings of the gauges and of the reference, by column of a recording."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import Wiring
-from compd.simulation.truth.apparent import Apparent
+from compd.simulation.truth.indicated_tip import IndicatedTip
 from compd.simulation.truth.instruments import Kind, noisy
 from compd.simulation.truth.world import World
 
@@ -18,10 +18,10 @@ UM = 1e-3
 
 @dataclass
 class LoggedRows:
-    """What was written down, by column of a recording; `apparent_mm`: where the gauges take the tip to be."""
+    """Values by column of a recording. indicated_mm, reference_mm : (3,) per row, tip by the gauges and true."""
 
     columns: dict[str, list[float]] = field(default_factory=dict)
-    apparent_mm: list[FloatArray] = field(default_factory=list)
+    indicated_mm: list[FloatArray] = field(default_factory=list)
     reference_mm: list[FloatArray] = field(default_factory=list)
 
     def add(self, values: Mapping[str, float]) -> None:
@@ -29,13 +29,13 @@ class LoggedRows:
             self.columns.setdefault(name, []).append(value)
 
     def error_um(self) -> float:
-        """Root mean square per coordinate of what the reference shows beyond the gauges."""
-        wrong = np.array(self.reference_mm) - np.array(self.apparent_mm)
-        return float(np.sqrt(np.mean(wrong**2)) / UM)
+        """Root mean square per coordinate of true less indicated tip; for a log without reference noise."""
+        error_mm = np.array(self.reference_mm) - np.array(self.indicated_mm)
+        return float(np.sqrt(np.mean(error_mm**2)) / UM)
 
 
 class RowLog:
-    """Looks at a machine that somebody else moves."""
+    """Reads gauges and reference of a world that the campaign moves."""
 
     def __init__(
         self,
@@ -46,50 +46,53 @@ class RowLog:
         sigma_um: float,
         outlier_share: float,
     ) -> None:
-        """`sigma_um`: of the reference, 0 for the truth itself; then it is also noted what the gauges make of it."""
+        """sigma_um : of the reference; 0 for the truth itself, and then the indicated tip is logged as well."""
         self._world, self._rng = world, rng
         self._reference, self._sigma_um, self._outlier_share = reference, sigma_um, outlier_share
-        self._apparent = Apparent(world.mechanism, wiring) if sigma_um == 0 else None
+        self._indicated = IndicatedTip(world.mechanism, wiring) if sigma_um == 0 else None
         self.rows = LoggedRows()
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
-        """A row. direction : (n,) in which each link moved last. Not measured: the gauges alone are read."""
+        """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""
         world = self._world
-        shown = {name: world.sense(name) for name in world.names}
+        readings = {name: world.sense(name) for name in world.names}
         links = range(1, world.mechanism.links + 1)
-        joints = [name for name in shown if name.startswith("joint_")]
-        frames = [name for name in shown if name.startswith("frame_")]
-        others = [name for name in shown if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
+        joints = [name for name in readings if name.startswith("joint_")]
+        frames = [name for name in readings if name.startswith("frame_")]
+        others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
         self.rows.add(
             {
                 "time_s": round(world.time_s, 6),
                 "session": session,
                 "point": np.nan if point is None else point,
                 "visit": visit,
-                **{f"scale_{i}_mm": shown[f"scale_{i}"] for i in links},
-                **{f"{name}_um": shown[name] / UM for name in (*joints, *frames)},
-                **{name: round(shown[name], 3) for name in others},
+                **{f"scale_{i}_mm": readings[f"scale_{i}"] for i in links},
+                **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
+                **{name: round(readings[name], 3) for name in others},
                 **{f"approach_{i}": direction[i - 1] for i in links},
-                **(self._measured(point) if measured else dict.fromkeys(self._names(), np.nan)),
+                **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
         )
-        if self._apparent is not None:
-            self.rows.apparent_mm.append(self._apparent.tip(shown, world.posture))
-            self.rows.reference_mm.append(world.shown_mm())
+        if self._indicated is not None:
+            self.rows.indicated_mm.append(self._indicated.solve(readings, world.posture))
+            self.rows.reference_mm.append(world.reference_tip_mm())
 
-    def _names(self) -> list[str]:
-        """The reference's columns."""
+    def _reference_columns(self) -> list[str]:
+        """Names of the reference's columns."""
         if self._reference == "ball_plate":
             return ["ball"]
         if self._reference == "interferometer":
             return [f"reference_link_{i}_mm" for i in range(1, self._world.mechanism.links + 1)]
         return [f"reference_{axis}_mm" for axis in "xyz"]
 
-    def _measured(self, point: int | None) -> dict[str, float]:
+    def _reference_values(self, point: int | None) -> dict[str, float]:
+        """One noisy measurement by column."""
         if self._reference == "ball_plate":
             return {"ball": np.nan if point is None else point}
         if self._reference == "interferometer":
             changes = noisy(self._world.link_change_mm(), self._sigma_um, self._rng, self._outlier_share)
-            return {name: round(value, 6) for name, value in zip(self._names(), changes.tolist(), strict=True)}
-        tip = noisy(self._world.shown_mm(), self._sigma_um, self._rng, self._outlier_share)
-        return {name: round(value, 6) for name, value in zip(self._names(), tip.tolist(), strict=True)}
+            return {
+                name: round(value, 6) for name, value in zip(self._reference_columns(), changes.tolist(), strict=True)
+            }
+        tip = noisy(self._world.reference_tip_mm(), self._sigma_um, self._rng, self._outlier_share)
+        return {name: round(value, 6) for name, value in zip(self._reference_columns(), tip.tolist(), strict=True)}

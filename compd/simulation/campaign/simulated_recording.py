@@ -1,4 +1,4 @@
-"""A whole recording from the simulated machine: its columns, what its sidecar says, and what was hidden."""
+"""A complete recording of a simulated campaign: columns, sidecar, and the causes that were hidden."""
 
 from __future__ import annotations
 
@@ -11,104 +11,104 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.simulation.campaign.campaign import Campaign
-from compd.simulation.campaign.campaign_plan import CampaignPlan, plan
+from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.campaign.planned_campaign import PlannedCampaign
-from compd.simulation.campaign.sizing import Sized, Sizing
-from compd.simulation.causes.catalogue import HiddenCause
+from compd.simulation.campaign.sizing import CauseSizer
+from compd.simulation.causes.hidden_cause import HiddenCause, SizedCause
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import SIGMA_UM, Kind, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.planned_row import PlannedRow
-from compd.simulation.truth.strengths import SEEN
+from compd.simulation.truth.strengths import FULLY_MEASURED
 
 OUTLIER_SHARE = 0.01
 QUANTITY = {"tracker": "tool_position", "interferometer": "link_length", "ball_plate": "ball_plate"}
 
 
 @dataclass(frozen=True)
-class Recorded:
+class SimulatedRecording:
     """columns : by name with unit, (N,). sidecar : for NAME.yaml. balls_M : (17, 3) of the ball plate, or None.
 
-    hidden, weak : the causes at work, asked for and not; a scorer's business.
+    hidden : the causes asked for. weak : disturbances in addition. Both for the answer file only.
     """
 
     columns: Mapping[str, Sequence[float]]
     sidecar: Mapping[str, Any]
     balls_M: FloatArray | None
-    hidden: tuple[Sized, ...]
+    hidden: tuple[SizedCause, ...]
     weak: tuple[Cause, ...]
 
     @property
     def reference_columns(self) -> list[str]:
-        """What the instrument showed; nan where only the gauges were read."""
+        """Names of the reference's coordinates; their values are nan where only the gauges were read."""
         return [name for name in self.columns if name.startswith("reference_")]
 
 
-def record(
+def simulate_recording(
     configuration: Configuration,
     seed: int,
     hidden: Sequence[HiddenCause],
     reference: Kind = "tracker",
     plate_file: str = "",
     other_days: int = 0,
-    given: Sequence[PlannedRow] = (),
-) -> Recorded:
-    """One campaign. `seed`: machine and parts; `other_days`: another campaign on the same machine.
+    planned_rows: Sequence[PlannedRow] = (),
+) -> SimulatedRecording:
+    """Run one campaign.
 
-    `plate_file`: the ball plate's file, beside the recording. `given`: measure these rows, on the same machine, and
-    nothing else; not with a ball plate, whose balls are where they are.
+    seed : of machine, parts and noise. other_days : number of another campaign on the same machine.
+    plate_file : name of the ball plate's file, for the sidecar. planned_rows : measure these rows instead of a drawn
+    plan; not with a ball plate, whose balls have fixed places.
     """
     geometry, wiring = configuration.geometry, configuration.wiring
-    sizing = Sizing(geometry, wiring, seed)
-    sized = tuple(sizing.cause(one) for one in hidden)
-    weak = sizing.weak([one.id for one in hidden], np.random.default_rng([seed, 3]))
-    causes = [*(one.cause for one in sized), *weak]
+    sizer = CauseSizer(geometry, wiring, seed)
+    sized = tuple(sizer.size(cause) for cause in hidden)
+    weak = sizer.weak_disturbances([cause.id for cause in hidden], np.random.default_rng([seed, 3]))
+    causes = [*(cause.cause for cause in sized), *weak]
     sigma_um = SIGMA_UM[reference]
     campaign: Campaign | PlannedCampaign
     balls_M = None
-    if given:
+    if planned_rows:
         campaign = PlannedCampaign(
             geometry,
             wiring,
-            given,
+            planned_rows,
             seed,
             other_days,
-            SEEN,
+            FULLY_MEASURED,
             causes,
             reference=reference,
             sigma_um=sigma_um,
             outlier_share=OUTLIER_SHARE,
         )
     else:
-        balls_M, days = _days(sizing.mechanism, reference, seed, other_days)
+        balls_M, days = _days(sizer.mechanism, reference, seed, other_days)
         campaign = Campaign(
             geometry,
             wiring,
             days,
             seed,
-            SEEN,
+            FULLY_MEASURED,
             causes,
             reference=reference,
             sigma_um=sigma_um,
             outlier_share=OUTLIER_SHARE,
             balls_M=balls_M,
         )
-    says: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": sigma_um}
+    reference_block: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": sigma_um}
     if reference == "tracker":
-        says["frame"] = "machine"
+        reference_block["frame"] = "machine"
     if balls_M is not None:
-        says["balls"] = plate_file
-    return Recorded(
-        campaign.run().columns, {"machine": configuration.machine, "reference": says}, balls_M, sized, tuple(weak)
-    )
+        reference_block["balls"] = plate_file
+    sidecar = {"machine": configuration.machine, "reference": reference_block}
+    return SimulatedRecording(campaign.run().columns, sidecar, balls_M, sized, tuple(weak))
 
 
 def _days(mechanism: Mechanism, reference: Kind, seed: int, number: int) -> tuple[FloatArray | None, CampaignPlan]:
-    """The plan; with a ball plate its points are the balls, and there is no pass on the move."""
+    """Balls (17, 3) or None, and the plan. With a ball plate the plan's points are the balls, without passes."""
     if reference != "ball_plate":
-        return None, plan(mechanism, seed, number)
+        return None, draw_campaign_plan(mechanism, seed, number)
     balls_M = ball_plate_mm(mechanism.tip0_M)
     turn_rad = np.zeros(3)
     postures = [mechanism.posture_at(ball_M, turn_rad) for ball_M in balls_M]
     points_mm = np.array([mechanism.lengths(posture) - mechanism.lengths0_mm for posture in postures])
-    return balls_M, plan(mechanism, seed, number, points_mm=points_mm, passes=0)
+    return balls_M, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0)

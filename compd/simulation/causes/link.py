@@ -1,88 +1,115 @@
-"""Causes that make a link longer or shorter than scale and comparators tell."""
+"""Causes in the links: changes of a link's length that neither its scale nor its joint comparators measure."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.simulation.truth.cause import PPM, UM, Cause, CauseInputs, Interval, Values, parts
+from compd.simulation.truth.cause import PPM, UM, Cause, CauseInputs, Interval, unit_rms_scatter
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import LINK_PIECES, WarmUp
 
-# The rod inside a link's tube: this share of it has touch with the tube at once, the rest behind the lag.
-QUICK_SHARE = 0.1
-# A tube gives in proportion to its length, its screw and bearings do not.
+# Share of the rod's heat exchange by contact with the tube, without delay; the rest is by radiation and air.
+CONTACT_SHARE = 0.1
+# Share of the link's compliance that is the tube's and grows with its length; screw and bearings have the rest.
 TUBE_SHARE = 0.3
-# Light preload of a ball between its two seats: it keeps the contact closed, no more.
+# Preload of a ball between its two seats: just enough to keep both contacts closed.
 PRELOAD_N = 2.0
-# A link's length at which sag is stated: that of an ordinary machine of this size.
+# Length for which the sag's strength is stated: that of an ordinary machine of this size.
 SAG_LENGTH_MM = 500.0
+BISECTIONS = 60
 
 
 class LinkExpansion(Cause):
-    """Rods and scale carrier of one material, warm along the link as the link is: every piece grows by its own."""
+    """Thermal expansion of rods and scale carrier: extension_i = alpha L_i mean over the link's pieces (T - 20 degC).
 
-    id, unit, most = "link_expansion", "ppm/K", 23.0
+    Strength: alpha (steel 11, aluminium 23 ppm/K).
+    """
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        return np.asarray(self.strength * PPM * now.link_mm * now.warm.link_pieces_K.mean(axis=1))
+    id = "link_expansion"
+    unit = "ppm/K"
+    max_strength = 23.0
+
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        return np.asarray(self.strength * PPM * inputs.link_mm * inputs.warm.link_pieces_K.mean(axis=1))
 
 
 class LinkExpansionLag(Cause):
-    """The rods hang free in the tube and follow its temperature by radiation and air: late, piece by piece."""
+    """Thermal expansion of rods that hang free in the tube and follow its temperature late, by radiation and air.
 
-    id, unit, most = "link_expansion_lag", "ppm/K", 23.0
+    tau dT_rod/dt = T_tube - T_rod for each piece; extension_i = alpha L_i mean(0.9 T_rod + 0.1 T_tube), over 20 degC.
+    Strength: alpha. The lag tau is drawn between 240 and 1500 s.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
+    id = "link_expansion_lag"
+    unit = "ppm/K"
+    max_strength = 23.0
+
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
         self.tau_s = float(np.exp(rng.uniform(np.log(240.0), np.log(1500.0))))
-        self._tube_K: FloatArray = np.zeros((machine.links, LINK_PIECES))
-        self._rod_K: FloatArray = np.zeros((machine.links, LINK_PIECES))
+        self._tube_K: FloatArray = np.zeros((mechanism.links, LINK_PIECES))
+        self._rod_K: FloatArray = np.zeros((mechanism.links, LINK_PIECES))
 
-    def pass_time(self, travel: Interval, warm: WarmUp) -> None:
-        """Exact for a tube that warms up evenly over the time."""
+    def pass_time(self, interval: Interval, warm: WarmUp) -> None:
+        """Exact solution for a tube temperature that changes linearly over the interval."""
         tube_K = warm.link_pieces_K
-        steps = travel.weather_s / self.tau_s
+        steps = interval.weather_s / self.tau_s
         if steps > 0:
             ramp = -np.expm1(-steps) / steps
             self._rod_K = tube_K + (self._rod_K - self._tube_K) * np.exp(-steps) - (tube_K - self._tube_K) * ramp
         self._tube_K = tube_K
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        rods_K = (1 - QUICK_SHARE) * self._rod_K + QUICK_SHARE * self._tube_K
-        return np.asarray(self.strength * PPM * now.link_mm * rods_K.mean(axis=1))
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        rods_K = (1 - CONTACT_SHARE) * self._rod_K + CONTACT_SHARE * self._tube_K
+        return np.asarray(self.strength * PPM * inputs.link_mm * rods_K.mean(axis=1))
 
 
 class LinkElasticity(Cause):
-    """Tube and screw between the comparators stretch. Strength: what they give at machine zero; stated: stiffness."""
+    """Axial compliance of tube and screw between the comparators.
 
-    id, unit, least, most, reciprocal = "link_elasticity", "N/um", 0.005, 0.2, True
+    extension_i = c (0.7 + 0.3 L_i/L0_i) F_i - c F0_i, F the axial force and F0, L0 force and length at machine zero.
+    Strength: the compliance c in um/N; stated as the stiffness 1/c in N/um.
+    """
+
+    id = "link_elasticity"
+    unit = "N/um"
+    min_strength = 0.005
+    max_strength = 0.2
+    stated_as_reciprocal = True
 
     @property
-    def values(self) -> Values:
-        """N/um, as stiffness is stated."""
+    def values(self) -> tuple[float, ...]:
+        """Stiffness, N/um."""
         return (1 / self.strength,) if self.strength else (float("inf"),)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        length = now.link_mm / self.machine.lengths0_mm
-        gives = self.strength * UM * (1 - TUBE_SHARE + TUBE_SHARE * length)
-        return np.asarray(gives * now.axial_N - self.strength * UM * now.axial0_N)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        length = inputs.link_mm / self.mechanism.lengths0_mm
+        compliance_mm_per_N = self.strength * UM * (1 - TUBE_SHARE + TUBE_SHARE * length)
+        return np.asarray(compliance_mm_per_N * inputs.axial_N - self.strength * UM * inputs.axial0_N)
 
 
 class JointContact(Cause):
-    """A ball between two seats, lightly preloaded: each seat is a Hertzian contact, F = (approach / c)^(3/2)."""
+    """Hertzian contact of a preloaded ball between two seats, in line with the link.
 
-    id, unit, least, most = "joint_contact", "um/N^(2/3)", 0.01, 1.0
+    Each seat: F = (a / c)^(3/2) for the approach a (K. L. Johnson, Contact Mechanics, 1985, equation (4.23)).
+    extension_i = a(F_i) - a(F0_i), a solved by bisection. Strength: c.
+    """
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        return np.asarray(self._approach_mm(now.axial_N) - self._approach_mm(now.axial0_N))
+    id = "joint_contact"
+    unit = "um/N^(2/3)"
+    min_strength = 0.01
+    max_strength = 1.0
+
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        return np.asarray(self._approach_mm(inputs.axial_N) - self._approach_mm(inputs.axial0_N))
 
     def _approach_mm(self, force_N: FloatArray) -> FloatArray:
-        """Where the force of the one seat less that of the other is `force_N`; by bisection."""
+        """(n,) displacement at which the forces of the two seats differ by `force_N`."""
         contact = max(self.strength * UM, 1e-12)
         closed = contact * PRELOAD_N ** (2 / 3)
         low, high = np.zeros_like(force_N), np.full_like(force_N, contact * (np.abs(force_N).max() + 4) ** (2 / 3))
-        for _ in range(60):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
             load = (np.maximum(closed + middle, 0) / contact) ** 1.5 - (np.maximum(closed - middle, 0) / contact) ** 1.5
             short = load < np.abs(force_N)
@@ -91,34 +118,36 @@ class JointContact(Cause):
 
 
 class LinkSag(Cause):
-    """Own weight bows a leaning link, and the chord is shorter than the arc that rods and scale follow.
+    """Bending of a leaning link under its own weight: the chord is shorter than the arc that rods and scale follow.
 
-    Evenly loaded beam on two supports: half the slope's square over the length is 17 q^2 l^7 / (40320 (E I)^2),
-    q the weight per length across the link. The strength is that of a level link of 500 mm.
+    Evenly loaded beam on two supports (Roark's Formulas for Stress and Strain, table 8.1): half the integral of the
+    squared slope is 17 q^2 L^7 / (40320 (E I)^2), q the weight per length across the link.
+    Strength: the shortening of a level link of 500 mm.
     """
 
-    id, unit, most = "link_sag", "um", 20.0
+    id = "link_sag"
+    unit = "um"
+    max_strength = 20.0
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        across_squared = 1 - now.directions_M[:, 2] ** 2
-        return np.asarray(-self.strength * UM * across_squared * (now.link_mm / SAG_LENGTH_MM) ** 7)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        across_squared = 1 - inputs.directions_M[:, 2] ** 2
+        return np.asarray(-self.strength * UM * across_squared * (inputs.link_mm / SAG_LENGTH_MM) ** 7)
 
 
 class LinkZero(Cause):
-    """Machine zero was adjusted a little off: every link by its own amount."""
+    """Wrong length of each link at machine zero: extension_i = z_i, constant; strength: root mean square of the z_i."""
 
-    id, unit, most, signed = "link_zero", "um", 50.0, True
+    id = "link_zero"
+    unit = "um"
+    max_strength = 50.0
+    signed = True
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
-        self._um = strength * parts(rng, machine.links)
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
+        self.part_strengths = strength * unit_rms_scatter(rng, mechanism.links)
 
-    @property
-    def values(self) -> Values:
-        return tuple(self._um.tolist())
-
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        return np.asarray(UM * self._um)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        return np.asarray(UM * self.part_strengths)
 
 
 CAUSES = (LinkExpansion, LinkExpansionLag, LinkElasticity, JointContact, LinkSag, LinkZero)

@@ -1,91 +1,126 @@
-"""Causes that the effect library does not have: whoever diagnoses these must name none of its effects."""
+"""Causes for which the effect library has no effect: a diagnosis of these must name none of its effects."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.simulation.truth.cause import UM, Cause, CauseInputs, Values, parts
+from compd.simulation.truth.cause import UM, Cause, CauseInputs, unit_rms_scatter
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.weather import MIDDLE_HUMIDITY_pct, STANDARD_PRESSURE_hPa
 
-# A cable comes taut this far from machine zero; its drag is stated this much farther.
+# A cable comes taut at this distance from machine zero; its drag is stated this much farther out.
 TAUT_AT_MM = 10.0
 STATED_AFTER_MM = 100.0
 
 
 class HumiditySwelling(Cause):
-    """Links of carbon fibre take up water from the air and grow, all alike."""
+    """Swelling of carbon fibre links in humid air: extension_i = s (h - 50 %) L_i / L0_i. Strength: s."""
 
-    id, unit, most, in_library, follows = "humidity_swelling", "um/pct", 0.5, False, ("humidity_pct",)
+    id = "humidity_swelling"
+    unit = "um/pct"
+    max_strength = 0.5
+    in_library = False
+    covariates = ("humidity_pct",)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        wetter_pct = now.humidity_pct - MIDDLE_HUMIDITY_pct
-        return np.asarray(self.strength * UM * wetter_pct * now.link_mm / self.machine.lengths0_mm)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        over_middle_pct = inputs.humidity_pct - MIDDLE_HUMIDITY_pct
+        return np.asarray(self.strength * UM * over_middle_pct * inputs.link_mm / self.mechanism.lengths0_mm)
 
 
 class PlateSwelling(Cause):
-    """Granite whose top face takes up water bows upwards; the tip over its middle stands lower."""
+    """Swelling of the granite's top face in humid air bows the plate upwards: the tip stands lower over its middle.
 
-    id, unit, most, in_library, follows = "plate_swelling", "um/pct", 0.5, False, ("humidity_pct",)
+    shift_z = -s (h - 50 %) (1 - r^2 / R^2), r the tip's and R the plate points' distance from the middle.
+    Strength: s, the rise of the middle.
+    """
 
-    def reference(self, now: CauseInputs) -> FloatArray:
-        plate = self.machine.plate0_M - self.machine.plate0_M.mean(axis=0)
-        share = 1 - (now.tip_M[:2] ** 2).sum() / (plate[:, :2] ** 2).sum(axis=1).mean()
-        return np.array([0.0, 0.0, -self.strength * UM * (now.humidity_pct - MIDDLE_HUMIDITY_pct) * share])
+    id = "plate_swelling"
+    unit = "um/pct"
+    max_strength = 0.5
+    in_library = False
+    covariates = ("humidity_pct",)
+
+    def reference_shift(self, inputs: CauseInputs) -> FloatArray:
+        plate = self.mechanism.plate0_M - self.mechanism.plate0_M.mean(axis=0)
+        share = 1 - (inputs.tip_M[:2] ** 2).sum() / (plate[:, :2] ** 2).sum(axis=1).mean()
+        return np.array([0.0, 0.0, -self.strength * UM * (inputs.humidity_pct - MIDDLE_HUMIDITY_pct) * share])
 
 
 class AirPressure(Cause):
-    """Sealed bellows around the links push on the platform as the weather's pressure changes."""
+    """Sealed bellows around the links act as pistons: extension_i = -s (p - 1013.25 hPa). Strength: s."""
 
-    id, unit, most, in_library, follows = "air_pressure", "um/hPa", 0.5, False, ("pressure_hPa",)
+    id = "air_pressure"
+    unit = "um/hPa"
+    max_strength = 0.5
+    in_library = False
+    covariates = ("pressure_hPa",)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        pressed = -self.strength * UM * (now.pressure_hPa - STANDARD_PRESSURE_hPa)
-        return np.full(self.machine.links, pressed)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        extension_mm = -self.strength * UM * (inputs.pressure_hPa - STANDARD_PRESSURE_hPa)
+        return np.full(self.mechanism.links, extension_mm)
 
 
 class CableDrag(Cause):
-    """A cable from the wall hangs slack; it comes taut as the platform goes away along x, and drags at the tool."""
+    """Pull of a cable that hangs slack near machine zero and comes taut where the tip is more than 10 mm towards +x.
 
-    id, unit, most, in_library, follows = "cable_drag", "um", 20.0, False, ("position",)
+    shift = s max(0, x - x0 - 10 mm) / 100 mm along (-1, 0, 0.3). Strength: s.
+    """
 
-    def tool(self, now: CauseInputs) -> FloatArray:
-        away = max(0.0, float(now.tip_M[0] - self.machine.tip0_M[0]) - TAUT_AT_MM) / STATED_AFTER_MM
-        return self.strength * UM * away * np.array([-1.0, 0.0, 0.3])
+    id = "cable_drag"
+    unit = "um"
+    max_strength = 20.0
+    in_library = False
+    covariates = ("position",)
+
+    def tool_shift(self, inputs: CauseInputs) -> FloatArray:
+        taut = max(0.0, float(inputs.tip_M[0] - self.mechanism.tip0_M[0]) - TAUT_AT_MM) / STATED_AFTER_MM
+        return self.strength * UM * taut * np.array([-1.0, 0.0, 0.3])
 
 
 class CollisionStep(Cause):
-    """The tool was hit once, and has been elsewhere since."""
+    """Step of the tip's place at a collision, at a time drawn between 5000 and 40000 s.
 
-    id, unit, most, signed, in_library, follows = "collision_step", "um", 50.0, True, False, ("time_s",)
+    Strength: root mean square of the step's three components.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
+    id = "collision_step"
+    unit = "um"
+    max_strength = 50.0
+    signed = True
+    in_library = False
+    covariates = ("time_s",)
+
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
         self.hit_s = float(rng.uniform(5000.0, 40000.0))
-        self._um = strength * parts(rng, 3)
+        self.part_strengths = strength * unit_rms_scatter(rng, 3)
 
-    @property
-    def values(self) -> Values:
-        return tuple(self._um.tolist())
-
-    def tool(self, now: CauseInputs) -> FloatArray | float:
-        return UM * self._um if now.time_s >= self.hit_s else 0.0
+    def tool_shift(self, inputs: CauseInputs) -> FloatArray | float:
+        return UM * self.part_strengths if inputs.time_s >= self.hit_s else 0.0
 
 
 class RoomBreathing(Cause):
-    """Ventilation switches on and off; the floor, and with it the instrument's stand, goes up and down."""
+    """Ventilation that switches on and off moves the floor, and with it the instrument's stand, periodically.
 
-    id, unit, most, in_library, follows = "room_breathing", "um", 10.0, False, ("time_s",)
+    shift = s (sin(2 pi t / T + phi) - sin phi) along (0.3, 0, 1). Strength: s, the amplitude; the period T is drawn
+    between 600 and 1500 s.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
+    id = "room_breathing"
+    unit = "um"
+    max_strength = 10.0
+    in_library = False
+    covariates = ("time_s",)
+
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
         self.period_s = float(rng.uniform(600.0, 1500.0))
         self._phase_rad = rng.uniform(0, 2 * np.pi)
 
-    def reference(self, now: CauseInputs) -> FloatArray:
-        turn = 2 * np.pi * now.time_s / self.period_s
-        wave = np.sin(turn + self._phase_rad) - np.sin(self._phase_rad)
+    def reference_shift(self, inputs: CauseInputs) -> FloatArray:
+        phase_rad = 2 * np.pi * inputs.time_s / self.period_s
+        wave = np.sin(phase_rad + self._phase_rad) - np.sin(self._phase_rad)
         return np.asarray(self.strength * UM * wave * np.array([0.3, 0.0, 1.0]))
 
 

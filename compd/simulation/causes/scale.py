@@ -1,4 +1,4 @@
-"""Causes between a linear scale's number and the length that it stands for."""
+"""Causes in the linear scales: errors between a scale's reading and the length that it stands for."""
 
 from __future__ import annotations
 
@@ -7,154 +7,181 @@ from collections import deque
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.simulation.truth.cause import PPM, UM, Cause, CauseInputs, Interval, Values, alike, parts
+from compd.simulation.truth.cause import PPM, UM, Cause, CauseInputs, Interval, uniform_scatter, unit_rms_scatter
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import LINK_PIECES, WarmUp
 
 MS = 1e-3
-# Without a period in the drawing: that of the usual exposed scale.
-USUAL_PERIOD_MM = 0.020
-# Elements of an Iwan chain: enough that the loop is smooth.
+# Signal period of the usual exposed scale, where the drawing states none.
+DEFAULT_PERIOD_MM = 0.020
+# Elements of the Iwan chain; the hysteresis loop has so many corners per branch.
 SLIDERS = 8
 
 
 class ScaleGain(Cause):
-    """The tape was stretched in its mount, or ruled by a long ruling engine: each scale by its own share."""
+    """Wrong scale factor of the graduation: stretched in mounting, or a long-range error of the ruling engine.
 
-    id, unit, most, signed = "scale_gain", "ppm", 50.0, True
+    extension_i = g_i s_i, with one g_i per scale; strength: root mean square of the g_i.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
-        self._ppm = strength * parts(rng, machine.links)
+    id = "scale_gain"
+    unit = "ppm"
+    max_strength = 50.0
+    signed = True
 
-    @property
-    def values(self) -> Values:
-        return tuple(self._ppm.tolist())
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
+        self.part_strengths = strength * unit_rms_scatter(rng, mechanism.links)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        return np.asarray(PPM * self._ppm * now.scale_mm)
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        return np.asarray(PPM * self.part_strengths * inputs.scale_mm)
 
 
 class ScaleExpansion(Cause):
-    """The tape grows with the tube that it is glued to, from where it is pinned in the tube's middle.
+    """Thermal expansion of the scale tape, which follows the tube that it is glued to; pinned in the tube's middle.
 
-    What counts is the tube's temperature over the travelled part: from the middle to where the head is.
+    extension_i = alpha s_i (T_i - 20 degC), T_i the mean of the tube's temperatures at its middle and at the reading
+    head. Strength: alpha (steel 11, glass 8, aluminium 23 ppm/K).
     """
 
-    id, unit, most = "scale_expansion", "ppm/K", 23.0
+    id = "scale_expansion"
+    unit = "ppm/K"
+    max_strength = 23.0
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        pieces_K = now.warm.link_pieces_K
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        pieces_K = inputs.warm.link_pieces_K
         middle = LINK_PIECES // 2
-        head = middle + np.clip(now.scale_mm / now.link_mm * LINK_PIECES, -middle, middle)
-        at = np.arange(LINK_PIECES)
-        head_K = np.array([np.interp(h, at, K) for h, K in zip(head, pieces_K, strict=True)])
+        head = middle + np.clip(inputs.scale_mm / inputs.link_mm * LINK_PIECES, -middle, middle)
+        places = np.arange(LINK_PIECES)
+        head_K = np.array([np.interp(place, places, K) for place, K in zip(head, pieces_K, strict=True)])
         mean_K = (pieces_K[:, middle] + head_K) / 2
-        return np.asarray(self.strength * PPM * now.scale_mm * mean_K)
+        return np.asarray(self.strength * PPM * inputs.scale_mm * mean_K)
 
 
 class ScaleCyclic(Cause):
-    """Two signals that are not quite sine and cosine, interpolated as if they were (Heydemann 1981)."""
+    """Interpolation error within the signal period p: offset, amplitude and phase errors of the quadrature signals.
 
-    id, unit, most = "scale_cyclic", "um", 2.0
+    The scale shows p/(2 pi) atan2((1 + r) sin(phi + q/2) + b, cos(phi - q/2) + a), phi = 2 pi s/p
+    (P. L. M. Heydemann, Applied Optics 20, 1981, 3382). Strength: amplitude of the first harmonic in um, which fixes
+    sqrt(a^2 + b^2); r and q (second harmonic) are at most half of that.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
-        self._period_mm = machine.geometry.scale_signal_period_mm or USUAL_PERIOD_MM
-        # an offset of 1 part of the amplitude errs by p / 2 pi; strength is the first harmonic's amplitude
-        part = strength * UM * 2 * np.pi / self._period_mm
-        angle = rng.uniform(0, 2 * np.pi, machine.links)
-        self._offsets = part * np.array([np.cos(angle), np.sin(angle)])
-        self._unequal = 0.5 * part * rng.uniform(-1, 1, machine.links)
-        self._skew_rad = 0.5 * part * rng.uniform(-1, 1, machine.links)
+    id = "scale_cyclic"
+    unit = "um"
+    max_strength = 2.0
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        phase = 2 * np.pi * now.scale_mm / self._period_mm
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
+        self._period_mm = mechanism.geometry.scale_signal_period_mm or DEFAULT_PERIOD_MM
+        # An offset of 1 of the amplitude causes an error of p / (2 pi).
+        offset = strength * UM * 2 * np.pi / self._period_mm
+        angle = rng.uniform(0, 2 * np.pi, mechanism.links)
+        self._offsets = offset * np.array([np.cos(angle), np.sin(angle)])
+        self._unequal = 0.5 * offset * rng.uniform(-1, 1, mechanism.links)
+        self._skew_rad = 0.5 * offset * rng.uniform(-1, 1, mechanism.links)
+
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        phase = 2 * np.pi * inputs.scale_mm / self._period_mm
         cosine = np.cos(phase - self._skew_rad / 2) + self._offsets[0]
         sine = (1 + self._unequal) * np.sin(phase + self._skew_rad / 2) + self._offsets[1]
-        shown = np.arctan2(sine, cosine)
-        wrong_rad = (shown - phase + np.pi) % (2 * np.pi) - np.pi
-        return np.asarray(-wrong_rad * self._period_mm / (2 * np.pi))
+        error_rad = (np.arctan2(sine, cosine) - phase + np.pi) % (2 * np.pi) - np.pi
+        return np.asarray(-error_rad * self._period_mm / (2 * np.pi))
 
 
 class GaugeLatency(Cause):
-    """Scale displays and comparators average: what they show is where things were a moment ago."""
+    """Delay of scale displays and joint comparators, which average: the reading at t is the value at t - tau.
 
-    id, unit, most, in_motion = "gauge_latency", "ms", 50.0, True
+    Strength: tau. The history of scale and comparator values is interpolated linearly.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
+    id = "gauge_latency"
+    unit = "ms"
+    max_strength = 50.0
+    only_in_motion = True
+
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
         self._time_s = 0.0
-        self._scale: deque[tuple[float, FloatArray]] = deque([(0.0, np.zeros(machine.links))])
+        self._scale: deque[tuple[float, FloatArray]] = deque([(0.0, np.zeros(mechanism.links))])
         self._joint: deque[tuple[float, FloatArray]] = deque()
 
-    def pass_time(self, travel: Interval, warm: WarmUp) -> None:
-        self._scale.append((self._time_s, travel.start_mm))
-        self._scale.append((self._time_s + travel.travel_s, travel.end_mm))
-        self._time_s += travel.time_s
+    def pass_time(self, interval: Interval, warm: WarmUp) -> None:
+        self._scale.append((self._time_s, interval.start_mm))
+        self._scale.append((self._time_s + interval.travel_s, interval.end_mm))
+        self._time_s += interval.time_s
         for history in (self._scale, self._joint):
             while len(history) > 2 and history[1][0] <= self._time_s - self.strength * MS:
                 history.popleft()
 
-    def scale_seen(self, scale_mm: FloatArray) -> FloatArray:
+    def scale_reading_mm(self, scale_mm: FloatArray) -> FloatArray:
         return self._delayed(self._scale, scale_mm)
 
-    def joint_seen(self, joint_mm: FloatArray) -> FloatArray:
-        seen = self._delayed(self._joint, joint_mm)
+    def joint_reading_mm(self, joint_mm: FloatArray) -> FloatArray:
+        delayed_mm = self._delayed(self._joint, joint_mm)
         self._joint.append((self._time_s, joint_mm))
-        return seen
+        return delayed_mm
 
-    def _delayed(self, history: deque[tuple[float, FloatArray]], now_mm: FloatArray) -> FloatArray:
+    def _delayed(self, history: deque[tuple[float, FloatArray]], present_mm: FloatArray) -> FloatArray:
+        """(m,) values `strength` ago; `present_mm`: (m,) values now."""
         times = np.array([time_s for time_s, _ in history] + [self._time_s])
-        values = np.array([value for _, value in history] + [now_mm])
-        then_s = self._time_s - self.strength * MS
-        return np.array([np.interp(then_s, times, column) for column in values.T])
+        values = np.array([value for _, value in history] + [present_mm])
+        past_s = self._time_s - self.strength * MS
+        return np.array([np.interp(past_s, times, column) for column in values.T])
 
 
 class Backlash(Cause):
-    """Play between scale and link: the link stays behind until the play is taken up, the whole way of it."""
+    """Play between scale and link: on reversal the link stays behind until the play is taken up.
 
-    id, unit, least, most = "backlash", "um", 0.1, 20.0
+    extension' = clip(extension - ds, -b_i/2, +b_i/2): a play operator (A. Visintin, Differential Models of Hysteresis,
+    1994) on the scale position s. Strength: the play b; each link has 0.75 to 1.25 of it.
+    """
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
-        self._play_mm = strength * UM * alike(rng, machine.links)
-        self._behind_mm: FloatArray = np.zeros(machine.links)
+    id = "backlash"
+    unit = "um"
+    min_strength = 0.1
+    max_strength = 20.0
 
-    @property
-    def values(self) -> Values:
-        return tuple((self._play_mm / UM).tolist())
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
+        self._play_mm = strength * UM * uniform_scatter(rng, mechanism.links)
+        self.part_strengths = self._play_mm / UM
+        self._extension_mm: FloatArray = np.zeros(mechanism.links)
 
-    def pass_time(self, travel: Interval, warm: WarmUp) -> None:
-        half = self._play_mm / 2
-        self._behind_mm = np.clip(self._behind_mm - (travel.end_mm - travel.start_mm), -half, half)
+    def pass_time(self, interval: Interval, warm: WarmUp) -> None:
+        half_mm = self._play_mm / 2
+        self._extension_mm = np.clip(self._extension_mm - (interval.end_mm - interval.start_mm), -half_mm, half_mm)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        return self._behind_mm
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        return self._extension_mm
 
 
 class FrictionHysteresis(Cause):
-    """Friction bends what carries the scale: an Iwan chain of springs that begin to slide one after another.
+    """Friction bends the scale's mount: an Iwan chain of springs that begin to slide one after another.
 
-    The distances from unbent to sliding lie evenly between 0 and twice the mean (W. D. Iwan, J. Appl. Mech.
-    33, 1966, 893): the loop is round, where one spring's would have a corner.
+    Spring k slides at the deflection y_k = d (2k + 1)/m, k = 0 .. m - 1, that is, evenly between 0 and 2 d (W. D. Iwan,
+    J. Appl. Mech. 33, 1966, 893); extension = -strength * mean(bent_k / y_k). Strength: half the height of the
+    saturated loop; the mean sliding distance d is drawn between 3 and 30 mm.
     """
 
-    id, unit, least, most, signed = "friction_hysteresis", "um", 0.1, 5.0, True
+    id = "friction_hysteresis"
+    unit = "um"
+    min_strength = 0.1
+    max_strength = 5.0
+    signed = True
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        super().__init__(strength, machine, rng)
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
         self.distance_mm = float(np.exp(rng.uniform(np.log(3.0), np.log(30.0))))
         share = (2 * np.arange(SLIDERS) + 1) / SLIDERS
         self._yield_mm = self.distance_mm * share[:, None]
-        self._bent_mm: FloatArray = np.zeros((SLIDERS, machine.links))
+        self._bent_mm: FloatArray = np.zeros((SLIDERS, mechanism.links))
 
-    def pass_time(self, travel: Interval, warm: WarmUp) -> None:
-        moved = travel.end_mm - travel.start_mm
-        self._bent_mm = np.clip(self._bent_mm + moved, -self._yield_mm, self._yield_mm)
+    def pass_time(self, interval: Interval, warm: WarmUp) -> None:
+        moved_mm = interval.end_mm - interval.start_mm
+        self._bent_mm = np.clip(self._bent_mm + moved_mm, -self._yield_mm, self._yield_mm)
 
-    def link_mm(self, now: CauseInputs) -> FloatArray:
-        # stiff springs slide early: each carries the same force when it slides
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        # stiff springs slide early, so that each carries the same force when it slides
         return np.asarray(-self.strength * UM * (self._bent_mm / self._yield_mm).mean(axis=0))
 
 

@@ -1,4 +1,8 @@
-"""A physical cause that the drawing and the gauges know nothing of: what it feels, and what it displaces."""
+"""The protocol of a physical cause: which quantities it depends on, and which displacements it adds.
+
+A cause is an error source that neither the drawing nor the gauges account for. The equilibrium adds the displacements
+of all causes to the parts before it closes the mechanism; nothing computes a tip error directly.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +19,20 @@ from compd.simulation.truth.warm_up import WarmUp
 PPM = 1e-6
 UM = 1e-3
 URAD = 1e-6
-Values = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class CauseInputs:
-    """The machine at one instant, nearly in equilibrium: what a cause can feel.
+    """State of the machine at one instant, from which causes compute their displacements.
 
-    scale_mm, link_mm : (n,) what the scales stand at, and how long the links are.
-    directions_M : (n, 3) from base to platform.
-    axial_N, axial0_N : (n,) link forces with the weight, now and at machine zero, tension positive.
-    force_M_N : (3,) load on the tip. tip_M : (3,) mm. posture : of the platform.
-    time_s : weather's seconds since the machine was switched on.
+    It is the first of two passes of the equilibrium: micrometres that forces and causes add are not in it yet.
+
+    scale_mm, link_mm : (n,) true scale positions; link lengths between joint centres.
+    directions_M : (n, 3) unit vectors from base to platform joint.
+    axial_N, axial0_N : (n,) link forces including the platform's weight, now and at machine zero; tension positive.
+    force_M_N : (3,) external load on the tip. tip_M : (3,) tip, mm. posture : (4, 3) of the platform.
+    warm : temperatures of all bodies. time_s : seconds since switch-on, in weather time.
+    pressure_hPa, humidity_pct : of the air.
     """
 
     scale_mm: FloatArray
@@ -45,9 +51,10 @@ class CauseInputs:
 
 @dataclass(frozen=True)
 class Interval:
-    """What happened between two instants: the links went straight from start to end, and stood there.
+    """Time between two instants, in which the links went straight from start to end and then stood still.
 
-    travel_s of time_s were spent moving; weather_s is time_s as weather and warm-up count it.
+    start_mm, end_mm : (n,) scale positions. travel_s : part of time_s that was spent moving.
+    weather_s : time_s in weather time (multiplied by the world's speedup).
     """
 
     start_mm: FloatArray
@@ -58,81 +65,99 @@ class Interval:
 
 
 class Cause:
-    """One cause. What it does not touch stays as it is; a displacement is added where the part sits.
+    """Base class of all causes. Methods that a subclass does not override add nothing.
 
-    id, unit : of the strength. least, most : the smallest and largest that are plausible, either way where `signed`.
-    reciprocal : whether a person states 1/strength: a stiffness, where the cause needs what gives.
-    in_library : whether the effect library has it, under the same id; if not, `follows` says what it depends on.
-    in_motion : whether it acts on the move alone.
+    Class attributes
+    ----------------
+    id : name, as in `--effect`. unit : of the strength as a person states it.
+    min_strength, max_strength : plausible range of the strength's magnitude; `signed`: either sign is plausible.
+    stated_as_reciprocal : a person states 1/strength (a stiffness), the cause computes with strength (a compliance).
+    in_library : the effect library has an effect of the same id. If not, `covariates` names the recorded quantities
+        by which the cause can be described.
+    only_in_motion : no effect while the machine is at rest.
+
+    Attributes
+    ----------
+    strength : in `unit` (its reciprocal where `stated_as_reciprocal`). mechanism : the machine as drawn.
+    part_strengths : strength of every single part (link, coordinate), any shape, in `unit`.
     """
 
     id: ClassVar[str]
     unit: ClassVar[str]
-    most: ClassVar[float]
-    least: ClassVar[float] = 0.0
-    reciprocal: ClassVar[bool] = False
+    max_strength: ClassVar[float]
+    min_strength: ClassVar[float] = 0.0
+    stated_as_reciprocal: ClassVar[bool] = False
     signed: ClassVar[bool] = False
     in_library: ClassVar[bool] = True
-    follows: ClassVar[tuple[str, ...]] = ()
-    in_motion: ClassVar[bool] = False
+    covariates: ClassVar[tuple[str, ...]] = ()
+    only_in_motion: ClassVar[bool] = False
 
-    def __init__(self, strength: float, machine: Mechanism, rng: np.random.Generator) -> None:
-        """`rng`: for what differs from part to part; the same seed gives the same parts at every strength."""
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        """`rng`: for scatter from part to part. The same seed gives the same parts at every strength."""
         self.strength = strength
-        self.machine = machine
+        self.mechanism = mechanism
+        self.part_strengths: FloatArray = np.array([strength])
+
+    @classmethod
+    def applies_to(cls, mechanism: Mechanism) -> bool:
+        """Whether this machine has the part that the cause acts on."""
+        return True
 
     @property
-    def values(self) -> Values:
-        """The strength, or that of every part of its own, in `unit`."""
-        return (self.strength,)
+    def values(self) -> tuple[float, ...]:
+        """`part_strengths`, flat."""
+        return tuple(self.part_strengths.ravel().tolist())
 
-    def pass_time(self, travel: Interval, warm: WarmUp) -> None:
-        """Only causes with a memory care; `warm` is as at the end."""
+    def pass_time(self, interval: Interval, warm: WarmUp) -> None:
+        """Update the memory of a cause that has one; `warm`: temperatures at the interval's end."""
 
     # --- displacements, mm ------------------------------------------------------------------------------
 
-    def link_mm(self, now: CauseInputs) -> FloatArray | float:
-        """(n,) by which the joints of each link are farther apart than scale and comparators tell."""
+    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray | float:
+        """(n,) true change of each link's length that scale and joint comparators do not measure."""
         return 0.0
 
-    def base_M(self, now: CauseInputs) -> FloatArray | float:
-        """(n, 3) of the base joints."""
+    def base_shift_M(self, inputs: CauseInputs) -> FloatArray | float:
+        """(n, 3) displacement of the base joint centres in {M}."""
         return 0.0
 
-    def platform_P(self, now: CauseInputs) -> FloatArray | float:
-        """(n, 3) of the platform joints."""
+    def platform_shift_P(self, inputs: CauseInputs) -> FloatArray | float:
+        """(n, 3) displacement of the platform joint centres in {P}."""
         return 0.0
 
-    def axes_P(self, axes_P: FloatArray) -> FloatArray:
-        """The revolute axes, (3, 3); once, when the machine is built."""
+    def tilted_axes_P(self, axes_P: FloatArray) -> FloatArray:
+        """(3, 3) revolute axes in {P} after this cause. Called once, when the machine is built."""
         return axes_P
 
-    def tool(self, now: CauseInputs) -> FloatArray | float:
-        """(3,) of the tip against what carries the tool: in {P} on the platform, in {M} on the plate."""
+    def tool_shift(self, inputs: CauseInputs) -> FloatArray | float:
+        """(3,) displacement of the tip against what carries the tool: in {P} on the platform, in {M} on the plate."""
         return 0.0
 
-    def reference(self, now: CauseInputs) -> FloatArray | float:
-        """(3,) in {M}: by how much a reference instrument that stands on the plate shows another place."""
+    def reference_shift(self, inputs: CauseInputs) -> FloatArray | float:
+        """(3,) error, in {M}, of a reference instrument that stands on the surface plate."""
         return 0.0
 
-    # --- what gauges make of what is there, mm --------------------------------------------------------------
+    # --- gauge errors: true value -> value that the gauge measures, mm --------------------------------------
 
-    def scale_seen(self, scale_mm: FloatArray) -> FloatArray:
+    def scale_reading_mm(self, scale_mm: FloatArray) -> FloatArray:
+        """(n,) linear scales."""
         return scale_mm
 
-    def joint_seen(self, joint_mm: FloatArray) -> FloatArray:
+    def joint_reading_mm(self, joint_mm: FloatArray) -> FloatArray:
+        """(k,) joint comparators, in the wiring's order."""
         return joint_mm
 
-    def frame_seen(self, frame_mm: FloatArray, warm: WarmUp) -> FloatArray:
+    def frame_reading_mm(self, frame_mm: FloatArray, warm: WarmUp) -> FloatArray:
+        """(9,) frame comparators t1 t2 t3 u1 .. u6."""
         return frame_mm
 
 
-def parts(rng: np.random.Generator, *shape: int) -> FloatArray:
-    """Parts that differ: normal, of root mean square 1."""
+def unit_rms_scatter(rng: np.random.Generator, *shape: int) -> FloatArray:
+    """Normally distributed values of this shape, scaled to a root mean square of exactly 1."""
     values = rng.standard_normal(shape)
     return np.asarray(values / np.sqrt(np.mean(values**2)))
 
 
-def alike(rng: np.random.Generator, count: int) -> FloatArray:
-    """(count,) parts of one kind: 1, give or take a quarter."""
+def uniform_scatter(rng: np.random.Generator, count: int) -> FloatArray:
+    """(count,) factors of nominally equal parts: uniform between 0.75 and 1.25."""
     return rng.uniform(0.75, 1.25, count)

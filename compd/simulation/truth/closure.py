@@ -19,28 +19,28 @@ from compd.errors import KinematicsError, Problem
 # (4, 3): the platform's origin in {M}, mm, and its x, y, z axes in {M}.
 Posture = NDArray[np.float64]
 
-# Far below every physical cause (nm), far above rounding at 1 m (1e-13 mm).
+# Tolerance: far below every physical cause (nm), far above rounding at 1 m (1e-13 mm).
 CLOSED_MM = 1e-11
 MOST_ITERATIONS = 25
-# Newton that has gone this far will not come back.
+# Newton's method has diverged.
 LOST_MM = 1e5
-# An axis error at the platform's radius counts as the millimetres that it displaces there.
+# Weights errors of the axes: as the millimetres that they displace at this radius.
 PLATFORM_RADIUS_MM = 100.0
 _FIRST, _SECOND = np.triu_indices(3)
 
 
 def homogeneous(points_P: FloatArray) -> FloatArray:
-    """(..., 3) places in {P}, mm -> (..., 4): times a posture they give the places in {M}."""
+    """(..., 3) places in {P}, mm -> (..., 4) rows; rows @ posture are the places in {M}."""
     return np.concatenate([np.ones((*points_P.shape[:-1], 1)), points_P], axis=-1)
 
 
 def direction_rows(axes_P: FloatArray) -> FloatArray:
-    """(..., 3) directions in {P} -> (..., 4): times a posture they give the directions in {M}."""
+    """(..., 3) directions in {P} -> (..., 4) rows; rows @ posture are the directions in {M}."""
     return np.concatenate([np.zeros((*axes_P.shape[:-1], 1)), axes_P], axis=-1)
 
 
 class Closure:
-    """A 3-SPR tripod (three revolute axes) or a 6-UPS hexapod (none)."""
+    """Closure of a 3-SPR tripod (three revolute axes) or a 6-UPS hexapod (none)."""
 
     def __init__(self, axes_P: FloatArray) -> None:
         """`axes_P`: (3, 3) unit vectors of the revolute joints, or (0, 3)."""
@@ -49,7 +49,7 @@ class Closure:
     def by_lengths(self, base_M: FloatArray, joints_P: FloatArray, lengths_mm: FloatArray, guess: Posture) -> Posture:
         """The posture in which the links have these lengths.
 
-        base_M, joints_P: (n, 3) joint centres, mm; lengths_mm: (n,). Newton from `guess`; raises
+        base_M, joints_P : (n, 3) joint centres, mm. lengths_mm : (n,). Newton's method from `guess`; raises
         KinematicsError where the links cannot meet.
         """
         rows = homogeneous(joints_P)
@@ -63,7 +63,7 @@ class Closure:
     def by_tip(
         self, base_M: FloatArray, joints_P: FloatArray, tip_P: FloatArray, tip_M: FloatArray, guess: Posture
     ) -> Posture:
-        """Tripod only: the posture that brings the platform's place `tip_P` to `tip_M`, (3,) mm each."""
+        """Tripod only: the posture in which the place `tip_P` of the platform is at `tip_M`, (3,) mm each."""
         rows = homogeneous(joints_P)
         tip_row = homogeneous(tip_P)
         gradient = np.einsum("k,cd->ckd", tip_row, np.eye(3)).reshape(3, 12)
@@ -77,7 +77,9 @@ class Closure:
     def forces(
         self, posture: Posture, base_M: FloatArray, joints_P: FloatArray, loads: Sequence[tuple[FloatArray, FloatArray]]
     ) -> tuple[FloatArray, FloatArray]:
-        """Forces that carry `loads`, pairs of a force in {M}, N, and its place in {P}, mm.
+        """Link forces in static equilibrium with `loads`, pairs of a force in {M}, N, and its place in {P}, mm.
+
+        Solves gradient(constraints)^T multipliers = generalised load.
 
         Returns axial (n,), N, tension positive, and (n, 3) the lateral force in {M}, N, that each link's
         base ball takes from the link (tripod: along its revolute axis; hexapod: none).
@@ -96,18 +98,18 @@ class Closure:
     def _joints(
         self, posture: Posture, base_M: FloatArray, rows: FloatArray
     ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-        """Link lengths and their gradients; link components along the revolute axes and theirs."""
+        """Link lengths (n,) and gradient (n, 12); link components along the revolute axes (r,) and gradient (r, 12)."""
         links_M = rows @ posture - base_M
         lengths = np.sqrt((links_M * links_M).sum(axis=1))
         along = (rows[:, :, None] * (links_M / lengths[:, None])[:, None, :]).reshape(-1, 12)
         axes_M = self._axes @ posture
-        held = links_M[: len(axes_M)]
-        across = rows[: len(axes_M), :, None] * axes_M[:, None, :] + self._axes[:, :, None] * held[:, None, :]
-        return (lengths, along), ((held * axes_M).sum(axis=1), across.reshape(-1, 12))
+        hinged_M = links_M[: len(axes_M)]
+        across = rows[: len(axes_M), :, None] * axes_M[:, None, :] + self._axes[:, :, None] * hinged_M[:, None, :]
+        return (lengths, along), ((hinged_M * axes_M).sum(axis=1), across.reshape(-1, 12))
 
 
 def _rigidity(posture: Posture) -> tuple[FloatArray, FloatArray]:
-    """Departure of the axes from a right-angled unit triad, as mm at the platform's radius; gradients."""
+    """Departure of the axes from an orthonormal triad (6,), as mm at the platform's radius; gradient (6, 12)."""
     axes = posture[1:]
     departure = (axes @ axes.T - np.eye(3))[_FIRST, _SECOND]
     gradient = np.zeros((6, 4, 3))
@@ -120,6 +122,7 @@ def _rigidity(posture: Posture) -> tuple[FloatArray, FloatArray]:
 def _newton(
     equations: Callable[[Posture], tuple[FloatArray, FloatArray]], guess: Posture, what: str, wanted: FloatArray
 ) -> Posture:
+    """The posture at which `equations`, together with rigidity, vanish. `what`, `wanted`: for the error's text."""
     posture = guess
     for _ in range(MOST_ITERATIONS):
         error, gradient = equations(posture)
@@ -130,7 +133,7 @@ def _newton(
             break
         if largest_mm < CLOSED_MM:
             if np.linalg.det(posture[1:]) < 0:
-                break  # a mirror image: no rigid platform can get there
+                break  # the mirror image, which a rigid platform cannot reach
             return posture
         try:
             step = np.linalg.solve(np.concatenate([gradient, rigid]), residual)

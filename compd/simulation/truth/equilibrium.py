@@ -1,4 +1,4 @@
-"""Where everything is: parts displaced by heat, forces and causes, and the closure that they leave."""
+"""Static equilibrium of the machine: parts displaced by heat, forces and causes, then the mechanism's closure."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ from compd.simulation.truth.strengths import Strengths
 from compd.simulation.truth.warm_up import WarmUp
 from compd.simulation.truth.weather import Weather
 
-# A platform that leans more than 60 degrees from its attitude at machine zero has hit something.
+# Cosine of the largest tilt of the platform from its attitude at machine zero, 60 degrees.
 LEAST_UPRIGHT = 0.5
 
 
 @dataclass(frozen=True)
-class Settled:
-    """The machine in equilibrium at one instant; mm, N.
+class EquilibriumState:
+    """True state of the machine at one instant; mm, N.
 
-    link_mm : (n,) true distances of each link's joint centres, as equation (1) means them.
-    axial_N : (n,) link forces beyond those at machine zero, tension positive.
-    shown : (3,) where a reference instrument without noise shows the tip; in {P} with the tool on the plate.
+    scale_mm : (n,). posture : (4, 3) of the platform. supports_M, plate_M : (3, 3).
+    link_mm : (n,) true distances between each link's joint centres, the l of equation (1).
+    axial_N : (n,) link forces less those at machine zero, tension positive.
+    tip_M, tip_P : (3,). shown : (3,) tip as a reference instrument without noise shows it, in the mechanism's
+    `tip_frame`.
     """
 
     scale_mm: FloatArray
@@ -44,7 +46,7 @@ class Settled:
 
 
 class Equilibrium:
-    """Solves for `Settled`; knows the parts, and asks warm-up and weather how they are."""
+    """Solver for the state at given scale values, with the present temperatures, weather and causes."""
 
     def __init__(
         self,
@@ -60,41 +62,45 @@ class Equilibrium:
         self._causes, self._warm, self._weather = causes, warm, weather
         axes_P = mechanism.axes_P
         for cause in causes:
-            axes_P = cause.axes_P(axes_P)
+            axes_P = cause.tilted_axes_P(axes_P)
         self._closure = Closure(axes_P)
         self._axial0_N, self._lateral0_M = self._forces(
             mechanism.posture0, mechanism.joints0_M, mechanism.joints_P, np.zeros(3)
         )
 
-    def settle(self, scale_mm: FloatArray, guess: Posture, force_M_N: FloatArray) -> Settled:
-        """Twice round: forces and joint angles hardly depend on the micrometres that they cause.
+    def solve(self, scale_mm: FloatArray, guess: Posture, force_M_N: FloatArray) -> EquilibriumState:
+        """State at scale values (n,) under the load (3,) on the tip; `guess`: a posture near by.
+
+        Two passes: first closure and forces with thermal displacements alone, then all displacements that follow from
+        them. Forces and joint angles change by parts per million in between, so that no third pass is needed.
 
         Raises KinematicsError where the links cannot meet.
         """
-        s, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
-        stretch = s.support_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
-        joints_P = machine.joints_P * (1 + s.platform_expansion_ppm_per_K * PPM * warm.over_reference_K("platform"))
-        # the rods between the balls and the scale (paper, figure 5) lie within the links
-        rods_mm = s.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
+        strengths, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
+        stretch = strengths.support_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
+        platform = strengths.platform_expansion_ppm_per_K * PPM * warm.over_reference_K("platform")
+        joints_P = machine.joints_P * (1 + platform)
+        # rods between the balls and the scale (paper, figure 5) are part of the link
+        rods_mm = strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
         lengths_mm = machine.lengths0_mm + scale_mm + rods_mm
 
         supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
         base_M = machine.base_joints_M(supports_M, stretch)
         posture = self._closure.by_lengths(base_M, joints_P, lengths_mm, guess)
         platform_M = homogeneous(joints_P) @ posture
-        weighed_N, weighed_lateral_M = self._forces(posture, base_M, joints_P, force_M_N)
-        axial_N, lateral_M = weighed_N - self._axial0_N, weighed_lateral_M - self._lateral0_M
+        total_N, total_lateral_M = self._forces(posture, base_M, joints_P, force_M_N)
+        axial_N, lateral_M = total_N - self._axial0_N, total_lateral_M - self._lateral0_M
 
         pull_M = np.zeros((3, 3))
         directions_M = link_directions(base_M, platform_M)
         np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
         supports_M = self._frame.supports_M(warm, pull_M)
         balls = self._joints.balls(posture, base_M, platform_M, axial_N, lateral_M)
-        now = CauseInputs(
+        inputs = CauseInputs(
             scale_mm,
             lengths_mm,
             directions_M,
-            weighed_N,
+            total_N,
             self._axial0_N,
             force_M_N,
             self._tip(posture)[0],
@@ -108,13 +114,15 @@ class Equilibrium:
             lengths_mm
             + balls.base_along_mm
             - balls.platform_along_mm
-            + _sum((cause.link_mm(now) for cause in causes), machine.links)
+            + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
         )
         posture = self._closure.by_lengths(
             machine.base_joints_M(supports_M, stretch)
             + balls.base_across_M
-            + _sum((cause.base_M(now) for cause in causes), machine.links, 3),
-            joints_P + balls.platform_across_P + _sum((cause.platform_P(now) for cause in causes), machine.links, 3),
+            + _sum((cause.base_shift_M(inputs) for cause in causes), machine.links, 3),
+            joints_P
+            + balls.platform_across_P
+            + _sum((cause.platform_shift_P(inputs) for cause in causes), machine.links, 3),
             link_mm,
             posture,
         )
@@ -127,13 +135,15 @@ class Equilibrium:
                     next_step="ask for a place nearer to machine zero",
                 )
             )
-        tip_M, tip_P = self._tip(posture, _sum((cause.tool(now) for cause in causes), 3))
-        shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum((cause.reference(now) for cause in causes), 3)
+        tip_M, tip_P = self._tip(posture, _sum((cause.tool_shift(inputs) for cause in causes), 3))
+        shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum(
+            (cause.reference_shift(inputs) for cause in causes), 3
+        )
         plate_M = self._frame.plate_M(warm)
-        return Settled(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
+        return EquilibriumState(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
 
     def _tip(self, posture: Posture, displaced: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
-        """The tip in {M} and in {P}."""
+        """The tip in {M} and in {P}, (3,) each; `displaced`: of the tip against what carries the tool."""
         machine = self._mechanism
         tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.over_reference_K("tool")
         if machine.tip_frame == "M":

@@ -1,4 +1,4 @@
-"""The machine frame: columns grow, bend and give, the ring between them grows, the plate grows."""
+"""The machine frame: thermal expansion and bending of columns, ring and plate, and their elasticity."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.simulation.truth.warm_up import COLUMN_STOREYS, WarmUp
 # surface as the plate is thick.
 COLUMN_DEPTH_MM = 150.0
 FOOT_BELOW_PLATE_MM = 200.0
-# The ring is stiff against columns that lean differently: it lets them keep this share of the difference.
+# Share of the columns' differences in lean that remains: the ring between them is stiff.
 LEAN_KEPT_SHARE = 0.2
 # The nine distances (paper, equation (3)): ends among b1 b2 b3 m1 m2 m3, in order t1 t2 t3 u1 .. u6.
 DISTANCE_ENDS = ((0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5))
@@ -30,14 +30,14 @@ def distances_mm(supports_M: FloatArray, plate_M: FloatArray) -> FloatArray:
 
 
 class Frame:
-    """Where supports and plate points are, and what the nine comparators' rods make of it."""
+    """Positions of supports and plate points, and the nine frame comparators between them."""
 
     def __init__(self, mechanism: Mechanism, strengths: Strengths) -> None:
         self._mechanism = mechanism
         self._strengths = strengths
         supports = mechanism.supports0_M
         thickness = mechanism.geometry.plate_thickness_mm or FOOT_BELOW_PLATE_MM
-        # A support below the plate hangs from the same feet: its column then counts downwards.
+        # Height above the columns' feet; negative for a support that hangs below them.
         self._heights_mm = supports[:, 2] + thickness
         self._arms_M = supports - supports.mean(axis=0)
         outward = self._arms_M * [1.0, 1.0, 0.0]
@@ -46,20 +46,21 @@ class Frame:
         self._distances0_mm = distances_mm(supports, mechanism.plate0_M)
 
     def supports_M(self, warm: WarmUp, pull_M: FloatArray) -> FloatArray:
-        """(3, 3) mm. `pull_M`: (3, 3) N, force on each support beyond that at machine zero."""
+        """(3, 3) mm. pull_M : (3, 3) N, force on each support less that at machine zero."""
         return self._mechanism.supports0_M + self._growth(warm) + self._lean(warm) + self._give(pull_M)
 
     def plate_M(self, warm: WarmUp) -> FloatArray:
-        """(3, 3) mm: the plate grows about its middle, where {M} sits; its surface is the top layer."""
+        """(3, 3) mm: plate points after expansion of the plate about its middle, the origin of {M}."""
         growth = self._strengths.plate_expansion_ppm_per_K * PPM * warm.plate_K.mean()
         return np.asarray(self._mechanism.plate0_M * [1 + growth, 1 + growth, 1.0])
 
     def comparators_mm(self, supports_M: FloatArray, plate_M: FloatArray, warm: WarmUp) -> FloatArray:
-        """(9,) change of each distance since machine zero, less what the rod has grown by."""
+        """(9,) change of each distance since machine zero, less the rod's own expansion."""
         rods = self._strengths.frame_rod_expansion_ppm_per_K * PPM * warm.over_reference_K("rods")
         return np.asarray(distances_mm(supports_M, plate_M) - self._distances0_mm * (1 + rods))
 
     def _growth(self, warm: WarmUp) -> FloatArray:
+        """(3, 3) mm: expansion of the ring about its middle and of the columns upwards."""
         ring = self._strengths.ring_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
         column = self._strengths.column_expansion_ppm_per_K * PPM * warm.columns_K.mean(axis=(1, 2))
         growth_M: FloatArray = ring * self._arms_M
@@ -67,7 +68,10 @@ class Frame:
         return growth_M
 
     def _lean(self, warm: WarmUp) -> FloatArray:
-        """A warmer outer face curves its column inwards; each storey turns all that stands on it."""
+        """(3, 3) mm: a warmer outer face bends its column inwards.
+
+        curvature = alpha (T_outer - T_inner) / depth per storey, integrated twice up to the top.
+        """
         inner_K, outer_K = warm.columns_K[:, 0, :], warm.columns_K[:, 1, :]
         curvature = self._strengths.column_expansion_ppm_per_K * PPM / COLUMN_DEPTH_MM * (outer_K - inner_K)
         storey = (np.arange(COLUMN_STOREYS) + 0.5) / COLUMN_STOREYS
@@ -77,5 +81,6 @@ class Frame:
         return np.asarray(mean_M + LEAN_KEPT_SHARE * (lean_M - mean_M))
 
     def _give(self, pull_M: FloatArray) -> FloatArray:
+        """(3, 3) mm: elastic displacement of the supports."""
         across, along = self._strengths.column_give_across_um_per_N, self._strengths.column_give_along_um_per_N
         return np.asarray(pull_M * (np.array([across, across, along]) * UM))

@@ -1,4 +1,4 @@
-"""A network of heat capacities, solved exactly between changes of its surroundings."""
+"""A network of heat capacities, solved exactly while room temperature and heat are constant."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from compd.simulation.truth.weather import REFERENCE_degC
 
 Floats = NDArray[np.float64]
 
-# A body that is held warm or cold, by a mat of heaters or a jacket of water, is there within a minute.
+# Time constant of a body that heaters or a water jacket hold at a temperature.
 HELD_TIME_CONSTANT_S = 10.0
 
 
 class HeatNetwork:
-    """C_i dT_i/dt = sum_j G_ij (T_j - T_i) + G_room,i (T_room - T_i) + q_i, decomposed into its modes.
+    """C_i dT_i/dt = sum_j G_ij (T_j - T_i) + G_room,i (T_room - T_i) + q_i, solved by its modes.
 
-    Constant room and heat over a step make the step exact, whatever its length.
+    With room temperature and heat constant over a step the solution is exact, whatever the step's length.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class HeatNetwork:
         to_room_W_per_K: Mapping[str, float],
         between_W_per_K: Sequence[tuple[str, str, float]],
     ) -> None:
-        """Every body by name; every path of heat between two of them, and to the room."""
+        """capacity, to_room : by body. between : pairs of bodies with their conductance."""
         self.index = {name: i for i, name in enumerate(capacity_J_per_K)}
         self._capacity = np.array(list(capacity_J_per_K.values()))
         self._to_room = np.array([to_room_W_per_K.get(name, 0.0) for name in capacity_J_per_K])
@@ -41,7 +41,7 @@ class HeatNetwork:
         self.hold({})
 
     def hold(self, temperature_degC: Mapping[str, float]) -> None:
-        """From now on these bodies, and no others, are held at their temperatures."""
+        """Hold these bodies, and no others, at these temperatures from now on."""
         to_jacket, self._held_W = np.zeros(len(self.index)), np.zeros(len(self.index))
         for name, degC in temperature_degC.items():
             body = self.index[name]
@@ -56,11 +56,11 @@ class HeatNetwork:
         self._resistance = np.linalg.inv(conductance)
 
     def steady_degC(self, room_degC: float, heat_W: Floats) -> Floats:
-        """Where the temperatures would settle, (bodies,)."""
+        """(bodies,) steady state for this room temperature and heat (bodies,)."""
         return self._resistance @ (self._to_room * room_degC + heat_W + self._held_W)
 
     def advance(self, time_s: float, room_degC: float, heat_W: Floats) -> None:
-        """Let `time_s` pass with the room and the heat (bodies,) as given."""
+        """Advance by `time_s` at constant room temperature and heat (bodies,)."""
         steady = self.steady_degC(room_degC, heat_W)
         decayed = np.exp(-self._rates_per_s * time_s) * (self._to_modes @ (self.temperature_degC - steady))
         self.temperature_degC = steady + self._from_modes @ decayed

@@ -1,4 +1,4 @@
-"""Reference instruments: they show where the tip is, or how long a link is, with noise."""
+"""Reference instruments: their noise and outliers, and the certificate of a ball plate."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from compd.arrays import FloatArray
 TRACKER_SIGMA_UM = 0.15
 INTERFEROMETER_SIGMA_UM = 0.05
 UM = 1e-3
-# A beam that was cut or scattered: how far off, in sigmas.
+# Size of an outlier (a beam cut or scattered), in sigmas.
 OUTLIER_SIGMAS = (8.0, 40.0)
 
 Kind = Literal["tracker", "interferometer", "ball_plate"]
 SIGMA_UM = {"tracker": TRACKER_SIGMA_UM, "interferometer": INTERFEROMETER_SIGMA_UM, "ball_plate": TRACKER_SIGMA_UM}
 
-# A 3D ball plate: a ring of eight balls, one of eight above it turned by half a step, one in the middle.
+# A 3D ball plate: two rings of eight balls, the upper one turned by half a step, and one ball in the middle.
 BALLS = 17
 RING_MM = (75.0, 45.0)
 LEVELS_MM = (-30.0, 25.0)
 
 
 def noisy(value_mm: FloatArray, sigma_um: float, rng: np.random.Generator, outlier_share: float = 0.0) -> FloatArray:
-    """(m,) as the instrument shows it; now and then far off on one coordinate."""
+    """(m,) with normal noise; with probability `outlier_share` one coordinate is an outlier."""
     shown = value_mm + sigma_um * UM * rng.standard_normal(value_mm.shape)
     if rng.uniform() < outlier_share:
         off = rng.uniform(*OUTLIER_SIGMAS) * rng.choice([-1.0, 1.0])
@@ -34,7 +34,7 @@ def noisy(value_mm: FloatArray, sigma_um: float, rng: np.random.Generator, outli
 
 
 def ball_plate_mm(middle: FloatArray) -> FloatArray:
-    """(17, 3) calibrated places of the balls, about `middle`, rounded as a certificate gives them (0.1 um)."""
+    """(17, 3) calibrated centres of the balls about `middle` (3,), rounded to 0.1 um as in a certificate."""
     turn = np.arange(8) * np.pi / 4
     rings = [
         np.column_stack([radius * np.cos(turn + off), radius * np.sin(turn + off), np.full(8, level)])

@@ -1,4 +1,4 @@
-"""Ball joints: the balls' centres wander as the joints turn, and give under the links' forces."""
+"""Ball joints: runout of the balls' centres as the joints turn, and their elasticity under the links' forces."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from compd.simulation.truth.closure import Posture, homogeneous
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import Strengths
 
-# Low harmonics of each joint angle: roundness spectra of ground balls and bores fall off fast.
+# Amplitudes of the first three harmonics of each joint angle, relative to the first: ground balls are smooth.
 _HARMONIC_SHARES = np.array([1.0, 0.2, 0.05])
 UM = 1e-3
 
 
 @dataclass(frozen=True)
 class Balls:
-    """Where the balls' centres are, against where the drawing has them at machine zero; mm.
+    """Displacements of the balls' centres from the drawing since machine zero; mm.
 
-    base_along, platform_along : (n,) along the link, towards the platform.
-    base_across_M, platform_across_P : (n, 3) across it, where no comparator looks.
-    shank_mm : (n,) the two reference balls of a revolute joint against each other; no motion of the joint.
+    base_along_mm, platform_along_mm : (n,) along the link, positive towards the platform.
+    base_across_M, platform_across_P : (n, 3) across the link, which no comparator measures.
+    shank_mm : (n,) half the difference of the two reference balls of a revolute joint; no motion of the joint.
     """
 
     base_along_mm: FloatArray
@@ -33,19 +33,19 @@ class Balls:
 
 
 class Runout:
-    """One ball per row. Displacement (n, 3) by the joint's two angles, zero at machine zero."""
+    """Runout of n balls: harmonics of the joint's two angles with random phases, zero at machine zero."""
 
     def __init__(self, joints: int, amplitude_um: FloatArray, rng: np.random.Generator) -> None:
         """`amplitude_um`: (3,) of the first harmonic, along the link and in both directions across."""
         shape = (joints, 3, len(_HARMONIC_SHARES), 2)
         self._phase_rad = rng.uniform(0, 2 * np.pi, shape)
-        scatter = rng.uniform(0.5, 1.0, shape)  # no two balls are alike
+        scatter = rng.uniform(0.5, 1.0, shape)  # from ball to ball
         self._amplitude_mm = scatter * amplitude_um[:, None, None] * UM * _HARMONIC_SHARES[:, None]
         self._order = 1.0 + np.arange(len(_HARMONIC_SHARES))[:, None]
         self._at_zero = self._wave(np.zeros((joints, 2)))
 
     def displacement_mm(self, angles_rad: FloatArray) -> FloatArray:
-        """(n, 3) for (n, 2) angles."""
+        """(n, 3) mm for joint angles (n, 2)."""
         return self._wave(angles_rad) - self._at_zero
 
     def _wave(self, angles_rad: FloatArray) -> FloatArray:
@@ -72,7 +72,7 @@ class Joints:
     def balls(
         self, posture: Posture, base_M: FloatArray, platform_M: FloatArray, axial_N: FloatArray, lateral_M: FloatArray
     ) -> Balls:
-        """`axial_N` (n,) and `lateral_M` (n, 3): link forces beyond those at machine zero."""
+        """base_M, platform_M : (n, 3) joint centres. axial_N (n,), lateral_M (n, 3) : forces less those at zero."""
         directions_M = link_directions(base_M, platform_M)
         base = self._base.displacement_mm(angles(self._base_triads, directions_M))
         platform_angles_rad = angles(self._platform_triads, directions_M @ posture[1:].T)
@@ -96,7 +96,7 @@ def link_directions(base_M: FloatArray, platform_M: FloatArray) -> FloatArray:
 
 
 def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
-    """(n, 3, 3): rows along the link at machine zero, along the revolute axis (or any other), across both."""
+    """(n, 3, 3) orthonormal rows: along the link at machine zero, its revolute axis (or any normal), normal to both."""
     if axes is None:
         aside = np.where(np.abs(directions[:, [2]]) > 0.9, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]])
         axes = np.cross(directions, aside)
@@ -105,7 +105,7 @@ def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
 
 
 def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
-    """(n, 2) by which links have turned since machine zero; `axes` as from `triads`."""
+    """(n, 2) angles by which links have turned since machine zero; `axes` as from `triads`."""
     along, first, second = np.einsum("nij,nj->in", axes, directions)
     return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=1)
 

@@ -1,4 +1,4 @@
-"""The machine as its drawing says: joint centres, posture and link lengths at machine zero."""
+"""The machine as drawn: joint centres, posture and link lengths at machine zero."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.simulation.truth.closure import Closure, Posture, homogeneous
 
 
 class Mechanism:
-    """Arrays of a `Geometry`, in {M} unless the name says otherwise, and the closure that goes with it."""
+    """A `Geometry` as arrays, with its closure; frames by the names' endings."""
 
     def __init__(self, geometry: Geometry) -> None:
         base, platform, tool = geometry.base, geometry.platform, geometry.tool
@@ -30,7 +30,7 @@ class Mechanism:
         self.axes_P: FloatArray = np.array(platform.revolute_axes_P).reshape(-1, 3)
         self.weight_M: FloatArray = np.array([0.0, 0.0, -platform.weight_N])  # the surface plate is level
         self.weight_at_P: FloatArray = np.array(platform.weight_at_P_mm)
-        # The place of {P} that meets a place of {M} at machine zero: the tool's tip, or where it touches.
+        # Place in {P} that coincides with tip0_M at machine zero: the tool's tip, or the point that it touches.
         on_platform = isinstance(tool, ToolOnPlatformSettings)
         self.tip0_P: FloatArray = np.array(
             tool.at_P_mm if isinstance(tool, ToolOnPlatformSettings) else tool.zero_tip_P_mm
@@ -44,13 +44,13 @@ class Mechanism:
         self.lengths0_mm = self.lengths(self.posture0)
 
     def lengths(self, posture: Posture) -> FloatArray:
-        """(n,) distances of the joint centres, all parts as drawn."""
+        """(n,) distances between joint centres, all parts as drawn."""
         return np.asarray(np.linalg.norm(homogeneous(self.joints_P) @ posture - self.joints0_M, axis=1))
 
     def posture_at(self, tip: FloatArray, turn_rad: FloatArray) -> Posture:
-        """The posture, as drawn, with the tip at `tip` (in {M}, or in {P} with the tool on the plate).
+        """Posture as drawn with the tip at `tip`, (3,) in {M}, or in {P} with the tool on the plate.
 
-        `turn_rad`: hexapod only, rotation vector in {M} that turns the platform from its attitude at zero.
+        turn_rad : hexapod only, rotation vector (3,) in {M} from the attitude at machine zero.
         """
         tip_P, tip_M = (self.tip0_P, tip) if self.tip_frame == "M" else (tip, self.tip0_M)
         axes = self.posture0[1:] @ Rotation.from_rotvec(turn_rad).as_matrix().T
@@ -60,9 +60,9 @@ class Mechanism:
         return self.closure.by_tip(self.joints0_M, self.joints_P, tip_P, tip_M, posture)
 
     def base_joints_M(self, supports_M: FloatArray, stretch: float = 0.0) -> FloatArray:
-        """(n, 3) base joint centres; each keeps its offset from its support, in the axes of {B}.
+        """(n, 3) base joint centres from supports (3, 3); each keeps its offset from its support, in the axes of {B}.
 
-        `stretch`: how much the offsets have grown, as a share.
+        stretch : relative growth of the offsets.
         """
         z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
         y_M = supports_M[0] - supports_M.mean(axis=0)
@@ -71,7 +71,7 @@ class Mechanism:
         return np.asarray(supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes)
 
     def _zero(self, attitude: FloatArray) -> Posture:
-        """A hexapod's attitude is given; a tripod's follows from its tip, near that of {B}."""
+        """Posture at machine zero: a hexapod's with its stated attitude; a tripod's follows from its tip, near {B}."""
         axes = attitude.T if len(self.axes_P) == 0 else self.rotation_M_B0.T
         posture = np.vstack([self.tip0_M - self.tip0_P @ axes, axes])
         if len(self.axes_P) == 0:

@@ -1,4 +1,4 @@
-"""How the links move: a measuring tour from point to point, or a controller's scale setpoints."""
+"""Motion of the links: a tour from point to point, or along a controller's scale setpoints."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from compd.arrays import FloatArray
 
 Phase = Literal["moving", "dwelling"]
 
-# A measuring machine's drives: brisk, not fast.
+# Drives of a measuring machine.
 SPEED_MM_PER_S = 50.0
 ACCELERATION_MM_PER_S2 = 250.0
-# Setpoints of a controller are followed in steps no longer than this.
+# Longest step in which a controller's setpoints are followed.
 FOLLOWING_STEP_S = 0.004
 
 
 @dataclass(frozen=True)
 class Move:
-    """All links from `start_mm` to `end_mm` together, speed a trapezoid, the longest way setting the pace."""
+    """Synchronous motion of all links from `start_mm` to `end_mm`, (n,) each, with a trapezoidal speed profile.
+
+    speed_mm_per_s : limit for the link that has the longest way; the others move in proportion.
+    """
 
     start_mm: FloatArray
     end_mm: FloatArray
@@ -41,7 +44,7 @@ class Move:
         return ramp_s + self._way_mm / (ACCELERATION_MM_PER_S2 * ramp_s) if ramp_s > 0 else 0.0
 
     def position_mm(self, time_s: float) -> FloatArray:
-        """(n,) at `time_s` from the start."""
+        """(n,) scale positions `time_s` after the start; `end_mm` after the end."""
         duration_s, ramp_s = self.duration_s, self._ramp_s
         if time_s >= duration_s:
             return self.end_mm
@@ -54,11 +57,11 @@ class Move:
         return self.start_mm + (way / self._way_mm) * (self.end_mm - self.start_mm)
 
 
-class Tour:
-    """Visits points in random order, dwelling at each."""
+class TourMotion:
+    """Endless tour of points in random order, with a dwell at each."""
 
     def __init__(self, start_mm: FloatArray, points_mm: FloatArray, dwell_s: float, rng: np.random.Generator) -> None:
-        """`points_mm`: (points, n) scale values."""
+        """start_mm : (n,). points_mm : (points, n) scale values."""
         self._points_mm = points_mm
         self._dwell_s = dwell_s
         self._rng = rng
@@ -76,7 +79,7 @@ class Tour:
         return self._move.position_mm(self._since_s)
 
     def advance(self, time_s: float) -> float:
-        """Go on for `time_s`; for how much of it the links moved, s."""
+        """Advance by `time_s`; returns how many seconds of it the links moved."""
         moved_s = 0.0
         while True:
             left_s = self._move.duration_s + self._dwell_s - self._since_s
@@ -95,8 +98,8 @@ class Tour:
         self._since_s = 0.0
 
 
-class Follower:
-    """Each link after its own setpoint, within speed and acceleration, braking in time."""
+class SetpointMotion:
+    """Motion of each link to its own setpoint within limits of speed and acceleration, without overshoot."""
 
     point = None
 
@@ -110,7 +113,7 @@ class Follower:
         return "dwelling" if np.array_equal(self.position_mm, self.setpoint_mm) else "moving"
 
     def advance(self, time_s: float) -> float:
-        """Go on for `time_s`; for how much of it the links moved, s."""
+        """Advance by `time_s`; returns how many seconds of it the links moved."""
         moved_s = 0.0
         while time_s - moved_s > 1e-12 and self.phase == "moving":
             step_s = min(FOLLOWING_STEP_S, time_s - moved_s)
@@ -121,12 +124,12 @@ class Follower:
     def _step(self, step_s: float) -> None:
         left_mm = self.setpoint_mm - self.position_mm
         gain = ACCELERATION_MM_PER_S2 * step_s
-        # the speed from which `left_mm` is enough to brake, a step of travel being taken off first
+        # highest speed from which the link can still brake within `left_mm`, after one more step of travel
         braking = np.sqrt(gain**2 / 4 + 2 * ACCELERATION_MM_PER_S2 * np.abs(left_mm)) - gain / 2
         wanted = np.sign(left_mm) * np.minimum(braking, SPEED_MM_PER_S)
         self._speed_mm_per_s = self._speed_mm_per_s + np.clip(wanted - self._speed_mm_per_s, -gain, gain)
         travel_mm = self._speed_mm_per_s * step_s
-        # a short step leaves the next one more to brake than it can: nobody goes past for that
+        # after a short step the next one may have more speed to take off than it can: stop at the setpoint
         slow = np.abs(self._speed_mm_per_s) <= 2 * ACCELERATION_MM_PER_S2 * FOLLOWING_STEP_S
         arrived = (np.abs(left_mm) <= np.abs(travel_mm) + 1e-9) & slow
         self.position_mm = np.where(arrived, self.setpoint_mm, self.position_mm + travel_mm)

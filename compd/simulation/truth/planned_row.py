@@ -1,4 +1,4 @@
-"""One row of a measurement that somebody has planned: where to, from which side, how fast, and what is held there."""
+"""One row of a planned measurement: place, direction of approach, speed, and held quantities."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2
 
-# A link that has to come from the other side turns round so far before the row.
+# Distance before the row at which a link that has to arrive from the other side reverses.
 TURN_MM = 10.0
-# A link that moves less than this on its way comes from nowhere: below it lie the plan's own digits.
+# A link that moves less than this on its way keeps its direction: a plan's digits are no coarser.
 STILL_MM = 0.005
-# A pass is at its speed for so long before the row and after it.
+# Time at constant speed before and after a row on the move.
 STEADY_S = 0.3
 
 
@@ -22,10 +22,10 @@ STEADY_S = 0.3
 class PlannedRow:
     """A row at rest, or on the move where speed_mm_per_s > 0.
 
-    number : from 1. point : the same for the same place, from 1. begins : a programme begins here.
+    number : from 1. point : number of its place, from 1. begins : the first row of a programme.
     time_s : after the programme's first row. scale_mm : (n,).
-    approach : (n,) +1, -1: the direction in which each link last moved; 0: as it comes.
-    quantities : what is held, by name with unit; what is missing is left alone, but for a load: that is 0.
+    approach : (n,) direction of each link's last motion, +1 or -1; 0: either.
+    quantities : held values by name with unit. A missing quantity is not held; a missing load component is 0.
     """
 
     number: int
@@ -44,24 +44,25 @@ class PlannedRow:
 
     @property
     def parts_degC(self) -> dict[str, float]:
-        """The machine's parts that are held at a temperature."""
+        """Held temperatures of the machine's parts, without the room's."""
         named = {name: value for name, value in self.quantities.items() if name.startswith("temperature_")}
         return {name: value for name, value in named.items() if name != "temperature_room_degC"}
 
     @property
     def turning_mm(self) -> FloatArray:
-        """(n,) where the links turn round before the row; a pass starts there."""
+        """(n,) scale values at which the links reverse before the row, or from which they pass it."""
         return self.scale_mm - self.approach * (self._run_up_mm if self.on_the_move else TURN_MM)
 
     @property
     def end_mm(self) -> FloatArray:
-        """(n,) where the links stop: at the row, or as far behind it as a pass has started before it."""
+        """(n,) scale values at which the links stop: the row, or as far behind it as a pass starts before it."""
         return self.scale_mm + self.approach * self._run_up_mm if self.on_the_move else self.scale_mm
 
     def way_mm(self, here_mm: FloatArray, direction: FloatArray) -> list[FloatArray]:
-        """Scale values (n,) to go to in turn, from `here_mm`; a row on the move is passed after them.
+        """Scale values (n,) to go to in turn before the row is measured.
 
-        direction : (n,) in which each link moved last. The straight way is taken where it comes from the right side.
+        here_mm : (n,) present scale values. direction : (n,) of each link's last motion. The straight way is taken
+        where it approaches from the wanted side.
         """
         if self.on_the_move:
             return [self.turning_mm]

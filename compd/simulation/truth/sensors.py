@@ -1,4 +1,4 @@
-"""What the gauges show of the machine: with noise, and in steps."""
+"""Gauge readings: true values with noise, rounded to the gauges' resolution."""
 
 from __future__ import annotations
 
@@ -30,16 +30,17 @@ class Sensors:
         self._strengths = strengths
         self._rng = rng
 
-    def show(
+    def read(
         self, scale_mm: FloatArray, joint_mm: FloatArray, frame_mm: FloatArray, thermometers_degC: Mapping[str, float]
     ) -> dict[str, float]:
-        """Every reading by name: mm and degC."""
+        """One noisy reading of every gauge by name, mm and degC, from true values (n,), (k,) and (9,)."""
         step_mm = self._strengths.comparator_step_um * UM
         noise_mm = self._strengths.comparator_noise_um * UM
-        scale = self._seen(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
-        joint = self._seen(joint_mm, noise_mm, step_mm)
-        frame = self._seen(frame_mm, noise_mm, step_mm)
-        thermometer = self._seen(np.array(list(thermometers_degC.values())), self._strengths.thermometer_noise_K, 0.0)
+        scale = self._measure(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
+        joint = self._measure(joint_mm, noise_mm, step_mm)
+        frame = self._measure(frame_mm, noise_mm, step_mm)
+        degC = np.array(list(thermometers_degC.values()))
+        thermometer = self._measure(degC, self._strengths.thermometer_noise_K, 0.0)
         return {
             **{f"scale_{i + 1}": value for i, value in enumerate(scale.tolist())},
             **{f"joint_{k + 1}": value for k, value in enumerate(joint.tolist())},
@@ -47,16 +48,16 @@ class Sensors:
             **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
         }
 
-    def joints_mm(self, balls: Balls) -> FloatArray:
-        """(k,) mm: a comparator counts what shortens the link (paper, equation (1)), its ball coming the link's way."""
-        seen = {
+    def joint_values_mm(self, balls: Balls) -> FloatArray:
+        """(k,) true displacements at the joint comparators, positive where they shorten the link: equation (1)."""
+        by_role = {
             "S": -balls.base_along_mm,
             "Ra": balls.platform_along_mm + balls.shank_mm,
             "Rb": balls.platform_along_mm - balls.shank_mm,
             "B": balls.platform_along_mm,
         }
-        return np.array([seen[role][link] for role, link in self._joints])
+        return np.array([by_role[role][link] for role, link in self._joints])
 
-    def _seen(self, value: FloatArray, noise: float, step: float) -> FloatArray:
+    def _measure(self, value: FloatArray, noise: float, step: float) -> FloatArray:
         noisy = value + noise * self._rng.standard_normal(len(value))
         return np.asarray(np.round(noisy / step) * step) if step > 0 else noisy

@@ -1,4 +1,4 @@
-"""How strong each physical cause of the simulated machine is: its unit, and where the value comes from."""
+"""Strengths of the simulated machine's ordinary error sources, with unit and origin of each value."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, fields, replace
 
 @dataclass(frozen=True)
 class Strengths:
-    """One number per cause. Zero takes the cause away; `NOTHING` is the ideal machine.
+    """One number per error source. Zero removes it; `NOTHING` is the ideal machine.
 
     Expansion coefficients are handbook values at 20 degC; the others are typical of a small
     coordinate measuring machine, with the reason beside each.
     """
 
-    # Weather: daily swing of an air-conditioned laboratory is 1 K or so (VDI/VDE 2627, class 3).
+    # Weather: daily swing of an air-conditioned laboratory, about 1 K (VDI/VDE 2627, class 3).
     room_swing_K: float = 1.0
-    # Heat of drives and electronics, as a share of what warm_up.py lists in watts.
+    # Heat of drives and electronics, as a multiple of the watts in warm_up.py.
     heat_share: float = 1.0
 
     # Frame: grey cast iron 10-11.5 ppm/K; low-expansion cast iron, the paper's joint supports, 2-3 ppm/K.
@@ -58,9 +58,9 @@ class Strengths:
 
 NOTHING = Strengths(**{field.name: 0.0 for field in fields(Strengths)})
 
-# A machine whose gauges see everything: joints move along the links only, and every rod and the platform
-# keep their lengths. What is then hidden in it is all that the gauges do not see.
-SEEN = replace(
+# A machine whose errors the gauges measure completely: joints move along the links only, and rods and platform do not
+# expand. A hidden cause is then the only error that the gauges do not measure.
+FULLY_MEASURED = replace(
     Strengths(),
     ball_runout_across_share=0.0,
     ball_give_across_um_per_N=0.0,
@@ -77,4 +77,4 @@ WITHOUT_NOISE = {
     "scale_noise_um": 0.0,
     "thermometer_noise_K": 0.0,
 }
-SEEN_WITHOUT_NOISE = replace(SEEN, **WITHOUT_NOISE)
+FULLY_MEASURED_WITHOUT_NOISE = replace(FULLY_MEASURED, **WITHOUT_NOISE)

@@ -1,4 +1,4 @@
-"""The machine as bodies that warm up: links, base, columns, platform, tool, surface plate, rods.
+"""Temperatures of the machine's bodies: links, base, columns, platform, tool, surface plate, rods.
 
 Sizes are those of a machine of half a metre; `C` J/K, `G` W/K. Steel and iron: 460 J/(kg K),
 50 W/(m K); granite: 800 J/(kg K), 2.8 W/(m K), 2900 kg/m3; still air over painted metal, convection and
@@ -19,7 +19,7 @@ from compd.simulation.truth.weather import REFERENCE_degC, Weather
 
 Floats = NDArray[np.float64]
 
-# Beside the links, what a thermometer is on: a place that can be held warm or cold.
+# Places with a thermometer beside the links; each can be held at a temperature.
 PARTS = ("base", "platform", "tool", "frame", "plate_top", "plate_bottom")
 LINK_PIECES = 5
 COLUMN_STOREYS = 4
@@ -27,11 +27,11 @@ COLUMNS = 3
 PLATE_LAYERS = 5
 _FACES = ("inner", "outer")
 
-# Heat: a drive holding its link and moving it; electronics on the base ring; the
-# cabinet's radiation on a column's outer face (it stands beside column 1); lamps over the plate.
+# Heat of a drive that holds its link and that moves it, of electronics on the base ring, of the electrical cabinet
+# on each column's outer face (it stands beside column 1), of lamps over the plate.
 _DRIVE_HOLDING_W = 0.3
 _DRIVE_MOVING_W = 1.2
-# The motor near the base end gives off a third of it; nut, screw and guides the rest, over the whole travel.
+# Distribution of a drive's heat over its link's pieces: a third at the motor near the base end, the rest evenly.
 _DRIVE_SHARES = np.array([2, 7, 2, 2, 2]) / 15
 _RING_W = 12.0
 _CABINET_W = (8.0, 3.0, 4.0)
@@ -41,7 +41,7 @@ _LAMPS_W = 3.0
 
 @dataclass(frozen=True)
 class Heat:
-    """Heat at work; W. `drives`: (n,) in each link, beyond what it takes to move it; `cabinet`: (3,) per column."""
+    """Heat sources, W. drives_W : (n,) per link, without the heat of moving it. cabinet_W : (3,) per column."""
 
     drives_W: Floats
     ring_W: float
@@ -52,7 +52,7 @@ class Heat:
 
 
 def usual_heat(links: int, share: float) -> Heat:
-    """What this machine's drives and electronics give off, times `share`."""
+    """Heat of this machine's drives and electronics in normal use, times `share`."""
     return Heat(
         np.full(links, share * _DRIVE_HOLDING_W),
         share * _RING_W,
@@ -63,7 +63,7 @@ def usual_heat(links: int, share: float) -> Heat:
     )
 
 
-# Weather moves in minutes: within this step the room's change is taken at its middle.
+# Longest step: weather changes over minutes, and each step takes the room temperature at its middle.
 LONGEST_STEP_S = 20.0
 
 
@@ -96,7 +96,7 @@ class WarmUp:
         self._moving_W[self._at_link] = heat_share * _DRIVE_MOVING_W * _DRIVE_SHARES
 
     def advance(self, time_s: float, moving_share: float) -> None:
-        """Let `time_s` pass; the drives moved during `moving_share` of it."""
+        """Advance by `time_s`; the drives moved during `moving_share` of it."""
         heat_W = self._standing_W() + moving_share * self._moving_W
         steps = max(1, int(np.ceil(time_s / LONGEST_STEP_S)))
         for _ in range(steps):
@@ -105,7 +105,7 @@ class WarmUp:
             self.time_s += step_s
 
     def hold(self, places_degC: Mapping[str, float]) -> None:
-        """From now on these places, and no others, are held at their temperatures; named as by a thermometer there."""
+        """Hold these places, and no others, from now on. Names: link_1 .. and PARTS."""
         self._network.hold({body: degC for place, degC in places_degC.items() for body in self._places[place]})
 
     @property
@@ -137,9 +137,9 @@ class WarmUp:
         return np.asarray(self._network.temperature_degC[self._at_plate] - REFERENCE_degC)
 
     def thermometers_degC(self) -> dict[str, float]:
-        """What a thermometer at each place would show: `temperature_<place>_degC`.
+        """Reading of a thermometer at each place, without noise, as `temperature_<place>_degC`.
 
-        A link's sits in its middle, the frame's shows the mean of the columns.
+        A link's thermometer is at its middle; the frame's shows the mean of the columns.
         """
         places = {
             "room": self.room_degC,
@@ -155,6 +155,7 @@ class WarmUp:
         return float(self._network.temperature_degC[self._network.index[body]])
 
     def _standing_W(self) -> Floats:
+        """(bodies,) heat that does not depend on motion."""
         index, heat = self._network.index, self.heat
         heat_W = np.zeros(len(index))
         heat_W[self._at_link] = heat.drives_W[:, None] * _DRIVE_SHARES
@@ -169,6 +170,7 @@ class WarmUp:
         return heat_W
 
     def _build(self) -> HeatNetwork:
+        """Capacities and conductances of all bodies, from their sizes."""
         # base ring 25 kg, platform 8 kg, tool 0.15 kg, nine rods of 0.05 kg
         capacity = {"base": 11500.0, "platform": 3700.0, "tool": 70.0, "rods": 210.0}
         to_room = {"base": 3.2, "platform": 0.6, "tool": 0.05, "rods": 0.6}

@@ -24,13 +24,13 @@ KNOTS_PER_SESSION = 4
 
 
 class Weather:
-    """Slow waves with seeded phases. At time 0 the room is at reference conditions.
+    """An air-conditioned laboratory: sums of slow waves with seeded phases; reference conditions at time 0.
 
-    `held`: what a climate chamber keeps as it is told, by name with unit; all else is as outside.
+    held : quantities that a climate chamber holds, by name with unit; they replace the waves.
     """
 
     def __init__(self, swing_K: float, rng: np.random.Generator) -> None:
-        """`swing_K`: amplitude of the daily wave of the room's temperature."""
+        """swing_K : amplitude of the daily wave of the room's temperature."""
         self.held: Mapping[str, float] = {}
         self._temperature = _phased([(period, share * swing_K) for period, share in _TEMPERATURE_WAVES], rng)
         self._pressure = _phased(_PRESSURE_WAVES_hPa, rng)
@@ -45,7 +45,7 @@ class Weather:
     def humidity_pct(self, time_s: float) -> float:
         return self.held.get("humidity_pct", MIDDLE_HUMIDITY_pct + self._over_middle_pct(time_s))
 
-    # --- outside, as differences ----------------------------------------------------------------------
+    # --- departures from reference conditions ---------------------------------------------------------
 
     def _room_K(self, time_s: float) -> float:
         return _waves(self._temperature, time_s)
@@ -69,13 +69,13 @@ def _waves(waves: _Waves, time_s: float) -> float:
 
 
 class WorkshopWeather(Weather):
-    """A workshop over days: room, pressure and humidity run straight between drawn values. At time 0 as at reference.
+    """A workshop over days: room, pressure and humidity interpolated linearly between random values.
 
-    Sessions are weeks apart in mood: each has a level of its own, around which the room wanders.
+    Each session has a level of its own with random departures around it. Reference conditions at time 0.
     """
 
     def __init__(self, starts_s: list[float], session_s: float, rng: np.random.Generator) -> None:
-        """`starts_s`: when each session begins; the room changes to the next one's level in between."""
+        """starts_s : start of each session; between sessions the room changes to the next one's level."""
         super().__init__(0.0, rng)
         knots: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, 0.0)]
         for number, start_s in enumerate(starts_s):

@@ -1,4 +1,4 @@
-"""The simulated machine as a whole: what it does as time passes, where its tip truly is, what its gauges see."""
+"""The simulated machine as a whole: its motion and temperatures over time, its true tip, its gauges' readings."""
 
 from __future__ import annotations
 
@@ -13,25 +13,28 @@ from compd.configuration.operation import Wiring
 from compd.errors import CompdError, KinematicsError, Problem
 from compd.simulation.truth.cause import Cause, Interval
 from compd.simulation.truth.closure import Posture
-from compd.simulation.truth.equilibrium import Equilibrium, Settled
+from compd.simulation.truth.equilibrium import Equilibrium, EquilibriumState
 from compd.simulation.truth.frame import Frame
 from compd.simulation.truth.joints import Joints
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.motion import Follower, Phase, Tour
+from compd.simulation.truth.motion import Phase, SetpointMotion, TourMotion
+from compd.simulation.truth.plan_motion import DWELL_S, PlanMotion
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.sensors import Sensors
-from compd.simulation.truth.stages import DWELL_S, Measuring
 from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.tour import STROKE_SHARE, tour_points_mm
 from compd.simulation.truth.warm_up import Heat, WarmUp
 from compd.simulation.truth.weather import Weather
+from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
 
 Mode = Literal["zero", "tour", "plan", "commanded", "blocked"]
 
 
 class World:
-    """Starts at machine zero and stands there, unchanged, for a while; then it is switched on: it warms up
-    and starts its tour, or measures what is planned. Not for two threads at once, but for `sense`."""
+    """A machine that stands at machine zero for `zero_hold_s`, is then switched on, warms up and tours its workspace
+    or measures planned rows.
+
+    Not thread-safe, except for `sense`.
+    """
 
     def __init__(
         self,
@@ -45,11 +48,12 @@ class World:
         weather: Weather | None = None,
         rows: Sequence[PlannedRow] = (),
     ) -> None:
-        """`speedup`: weather and warm-up run this many times faster than the machine moves.
+        """seed : of joints, weather, tour and gauge noise. speedup : factor by which weather and warm-up run faster
+        than the machine moves.
 
-        `zero_hold_s`: how long it stands at machine zero; a command, or a call of `tour` or `measure`, ends it too.
-        `causes`: beyond those in `strengths`. `weather`: another than the usual one. `rows`: what to measure
-        instead of the tour.
+        zero_hold_s : time at machine zero before switch-on; a command, `start_tour` or `start_plan` ends it as well.
+        causes : in addition to those in `strengths`. weather : default an air-conditioned laboratory.
+        rows : measured instead of the tour.
         """
         self._strengths = strengths or Strengths()
         weather_rng, joint_rng, self._tour_rng, sensor_rng = (
@@ -64,9 +68,9 @@ class World:
         self._frame = Frame(self._mechanism, self._strengths)
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
-        self._points_mm = tour_points_mm(self._mechanism, self._tour_rng)
+        self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
-        self._drives: Tour | Follower | Measuring = Follower(np.zeros(self._mechanism.links))
+        self._motion: TourMotion | SetpointMotion | PlanMotion = SetpointMotion(np.zeros(self._mechanism.links))
         self._rows = rows
         self.time_s = 0.0
         self.force_M_N: FloatArray = np.zeros(3)
@@ -74,108 +78,109 @@ class World:
         self._equilibrium = Equilibrium(
             self._mechanism, self._strengths, self._frame, self._joints, self._causes, self._warm, self._weather
         )
-        self._settled = self._settle(self._drives.position_mm, self._mechanism.posture0)
-        self._shown: Mapping[str, float] = self._show()
+        self._state = self._solve(self._motion.position_mm, self._mechanism.posture0)
+        self._readings: Mapping[str, float] = self._read_gauges()
 
-    # --- what it does -------------------------------------------------------------------------------
+    # --- motion and time ----------------------------------------------------------------------------
 
     def advance(self, time_s: float) -> None:
-        """Let `time_s` pass. Drives that would pull the links apart stop before it (mode `blocked`)."""
+        """Advance by `time_s`. Motion to a place that the links cannot reach stops before it (mode `blocked`)."""
         self.time_s += time_s
         if self.mode == "zero":
-            held_s = min(time_s, self.zero_hold_s)
-            self.zero_hold_s -= held_s
-            time_s -= held_s
+            zero_s = min(time_s, self.zero_hold_s)
+            self.zero_hold_s -= zero_s
+            time_s -= zero_s
             if time_s > 0:
-                self.measure() if self._rows else self.tour()
+                self.start_plan() if self._rows else self.start_tour()
         if time_s > 0:
-            moved_s = self._drives.advance(time_s)
+            moved_s = self._motion.advance(time_s)
             try:
-                self._stand(self._drives.position_mm, self._settled.posture, time_s, moved_s)
+                self._advance_state(self._motion.position_mm, self._state.posture, time_s, moved_s)
             except KinematicsError:
-                self._drives = Follower(self._settled.scale_mm)
+                self._motion = SetpointMotion(self._state.scale_mm)
                 self.mode = "blocked"
-        self._shown = self._show()
+        self._readings = self._read_gauges()
 
-    def carry(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
-        """Let `time_s` pass, after `travel_s` of which the links have gone straight to `scale_mm`.
+    def advance_to(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
+        """Advance by `time_s`; in the first `travel_s` of it the links move straight to `scale_mm`, (n,).
 
-        For a campaign, which does not watch the machine on its way. `guess`: a posture near the end.
+        For campaigns, which need no state on the way. guess : a posture near the end, for Newton's method.
         Raises KinematicsError where the links cannot meet.
         """
         self.time_s += time_s
-        self._stand(scale_mm, guess, time_s, travel_s)
-        self._drives = Follower(scale_mm)
+        self._advance_state(scale_mm, guess, time_s, travel_s)
+        self._motion = SetpointMotion(scale_mm)
         self.mode, self.zero_hold_s = "commanded", 0.0
-        self._shown = self._show()
+        self._readings = self._read_gauges()
 
-    def tour(self) -> None:
-        """Visit seeded points of the workspace, dwelling at each, as a measuring machine does."""
+    def start_tour(self) -> None:
+        """Visit random points of the workspace from now on, dwelling at each, as a measuring machine does."""
         self._leave_plan()
-        self._drives = Tour(self._settled.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
+        self._motion = TourMotion(self._state.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
         self.mode, self.zero_hold_s = "tour", 0.0
 
-    def measure(self) -> None:
-        """Visit the tour's points once, go through the planned rows, then stand still.
+    def start_plan(self) -> None:
+        """Visit the tour's points once, measure the planned rows, then stand still.
 
-        The walk is for who has to lay two clocks over each other. Raises CompdError where nothing is planned.
+        The walk over the points gives `compd join` the motion by which it aligns two clocks. Raises CompdError where
+        no rows are planned.
         """
         if not self._rows:
             raise CompdError(
                 Problem(where="simulated machine", what="nothing is planned", next_step="start it with --plan")
             )
-        self._drives = Measuring(self._rows, self._settled.scale_mm, self.hold, self._speedup, [*self._points_mm])
+        self._motion = PlanMotion(self._rows, self._state.scale_mm, self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
 
     def hold(self, quantities: Mapping[str, float]) -> None:
-        """From now on hold parts of the machine, the room and the load on the tip as told, by name with unit.
+        """Hold temperatures of parts, room, air and load on the tip at these values from now on, by name with unit.
 
-        What is not named is left alone; a load that is not named is 0.
+        Quantities that are not named are not held; a load component that is not named is 0.
         """
-        parts = {name: degC for name, degC in quantities.items() if name.startswith("temperature_")}
-        parts.pop("temperature_room_degC", None)  # the weather's
-        self._warm.hold({name[len("temperature_") : -len("_degC")]: degC for name, degC in parts.items()})
+        parts_degC = {name: degC for name, degC in quantities.items() if name.startswith("temperature_")}
+        parts_degC.pop("temperature_room_degC", None)  # held by the weather
+        self._warm.hold({name[len("temperature_") : -len("_degC")]: degC for name, degC in parts_degC.items()})
         self._weather.held = quantities
         self.force_M_N = np.array([quantities.get(f"force_{axis}_N", 0.0) for axis in "xyz"])
 
     def command(self, scale_mm: Sequence[float]) -> None:
-        """Drive to scale values, (n,) mm, at limited speed.
+        """Drive to scale values, (n,) mm, at limited speed and acceleration.
 
-        Raises CompdError for the wrong number of values, beyond the stroke or where the links cannot meet.
+        Raises CompdError for a wrong number of values, beyond the stroke or where the links cannot meet.
         """
         setpoint_mm = self._checked(scale_mm)
-        self._settle(setpoint_mm, self._settled.posture)
+        self._solve(setpoint_mm, self._state.posture)
         self._leave_plan()
-        if not isinstance(self._drives, Follower):
-            self._drives = Follower(self._settled.scale_mm)
-        self._drives.setpoint_mm = setpoint_mm
+        if not isinstance(self._motion, SetpointMotion):
+            self._motion = SetpointMotion(self._state.scale_mm)
+        self._motion.setpoint_mm = setpoint_mm
         self.mode, self.zero_hold_s = "commanded", 0.0
 
-    # --- what is true -------------------------------------------------------------------------------
+    # --- true state ---------------------------------------------------------------------------------
 
     @property
     def phase(self) -> Phase:
-        return self._drives.phase
+        return self._motion.phase
 
     @property
     def point(self) -> int | None:
-        """Number of the tour's point that is visited or driven to; None outside a tour."""
-        return self._drives.point
+        """Number, from 1, of the tour's point that is visited or driven to; None outside a tour."""
+        return self._motion.point
 
     @property
-    def measuring(self) -> Measuring | None:
-        """How far the plan has come; None while none is followed."""
-        return self._drives if isinstance(self._drives, Measuring) else None
+    def plan_motion(self) -> PlanMotion | None:
+        """Progress through the planned rows; None while no plan is followed."""
+        return self._motion if isinstance(self._motion, PlanMotion) else None
 
     @property
     def tip_frame(self) -> str:
-        """In which frame the truth is told: "M", or "P" (the place on the work) with the tool on the plate."""
+        """Frame of the tip's coordinates: "M", or "P" (place on the workpiece) with the tool on the plate."""
         return self._mechanism.tip_frame
 
     @property
     def scale_mm(self) -> FloatArray:
         """(n,) true scale positions."""
-        return self._settled.scale_mm
+        return self._state.scale_mm
 
     @property
     def weather_time_s(self) -> float:
@@ -183,24 +188,24 @@ class World:
         return self._warm.time_s
 
     def tip_M_mm(self) -> FloatArray:
-        """(3,) where the tool's tip is, in {M}."""
-        return self._settled.tip_M
+        """(3,) the tool's tip in {M}."""
+        return self._state.tip_M
 
     def tip_P_mm(self) -> FloatArray:
-        """(3,) the place in {P} that the tool's tip touches."""
-        return self._settled.tip_P
+        """(3,) place in {P} that the tool's tip touches."""
+        return self._state.tip_P
 
-    def shown_mm(self) -> FloatArray:
-        """(3,) where a reference instrument without noise shows the tip, in `tip_frame`."""
-        return self._settled.shown
+    def reference_tip_mm(self) -> FloatArray:
+        """(3,) the tip as a reference instrument without noise shows it, in `tip_frame`."""
+        return self._state.shown
 
     def link_change_mm(self) -> FloatArray:
-        """(n,) by which the true distances of each link's joints have changed since machine zero."""
-        return self._settled.link_mm - self._mechanism.lengths0_mm
+        """(n,) change of the true distance between each link's joint centres since machine zero."""
+        return self._state.link_mm - self._mechanism.lengths0_mm
 
     def axial_N(self) -> FloatArray:
         """(n,) link forces beyond those at machine zero, tension positive."""
-        return self._settled.axial_N
+        return self._state.axial_N
 
     @property
     def mechanism(self) -> Mechanism:
@@ -208,72 +213,71 @@ class World:
 
     @property
     def posture(self) -> Posture:
-        return self._settled.posture
+        return self._state.posture
 
     def heat(self, heat: Heat) -> None:
-        """Drives, electronics, lamps from now on."""
+        """Set the heat of drives, electronics and lamps from now on."""
         self._warm.heat = heat
 
     def tip_for(self, scale_mm: Sequence[float]) -> FloatArray:
-        """(3,) where the tip would be, in `tip_frame`, were the scales at these values now; nothing moves.
+        """(3,) the tip, in `tip_frame`, if the scales were at these values now; the machine does not move.
 
         Raises CompdError as `command` does.
         """
-        settled = self._settle(self._checked(scale_mm), self._settled.posture)
-        return settled.tip_M if self.tip_frame == "M" else settled.tip_P
+        state = self._solve(self._checked(scale_mm), self._state.posture)
+        return state.tip_M if self.tip_frame == "M" else state.tip_P
 
-    # --- what is seen -------------------------------------------------------------------------------
+    # --- gauges -------------------------------------------------------------------------------------
 
     def sense(self, name: str) -> float:
-        """What a gauge shows since the last `advance`, in its unit; `names` lists them. Any thread may ask."""
+        """Reading of a gauge as of the last `advance`, in its unit. Thread-safe. Raises CompdError for a name that is
+        not in `names`."""
         try:
-            return self._shown[name]
+            return self._readings[name]
         except KeyError:
             raise CompdError(
                 Problem(
                     where="simulated machine",
                     what="has nothing to measure under this name",
                     value=name,
-                    allowed=", ".join(self._shown),
+                    allowed=", ".join(self._readings),
                     next_step="wire a gauge to one of these",
                 )
             ) from None
 
     @property
     def names(self) -> list[str]:
-        """Everything that can be sensed."""
-        return list(self._shown)
+        """Names of everything that can be sensed."""
+        return list(self._readings)
 
-    # --- how it comes about -------------------------------------------------------------------------
-
-    def _stand(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
-        """Let `time_s` pass, `travel_s` of it on the way to `scale_mm`, and settle there."""
+    def _advance_state(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
+        """Advance temperatures and the causes' memories, then solve for the state at `scale_mm`."""
         weather_s = time_s * self._speedup
         self._warm.advance(weather_s, travel_s / time_s)
-        travel = Interval(self._settled.scale_mm, scale_mm, travel_s, time_s, weather_s)
+        interval = Interval(self._state.scale_mm, scale_mm, travel_s, time_s, weather_s)
         for cause in self._causes:
-            cause.pass_time(travel, self._warm)
-        self._settled = self._settle(scale_mm, guess)
+            cause.pass_time(interval, self._warm)
+        self._state = self._solve(scale_mm, guess)
 
     def _leave_plan(self) -> None:
-        """What was held for the plan is held no longer; a load stays."""
-        if self.measuring:
+        """Release what the plan holds, except for a load."""
+        if self.plan_motion:
             self._warm.hold({})
             self._weather.held = {}
 
-    def _settle(self, scale_mm: FloatArray, guess: Posture) -> Settled:
-        return self._equilibrium.settle(scale_mm, guess, self.force_M_N)
+    def _solve(self, scale_mm: FloatArray, guess: Posture) -> EquilibriumState:
+        return self._equilibrium.solve(scale_mm, guess, self.force_M_N)
 
-    def _show(self) -> dict[str, float]:
-        settled, warm = self._settled, self._warm
-        scale_mm = settled.scale_mm
-        joint_mm = self._sensors.joints_mm(settled.balls)
-        frame_mm = self._frame.comparators_mm(settled.supports_M, settled.plate_M, warm)
+    def _read_gauges(self) -> dict[str, float]:
+        state, warm = self._state, self._warm
+        scale_mm = state.scale_mm
+        joint_mm = self._sensors.joint_values_mm(state.balls)
+        frame_mm = self._frame.comparators_mm(state.supports_M, state.plate_M, warm)
         for cause in self._causes:
-            scale_mm, joint_mm = cause.scale_seen(scale_mm), cause.joint_seen(joint_mm)
-            frame_mm = cause.frame_seen(frame_mm, warm)
+            scale_mm, joint_mm = cause.scale_reading_mm(scale_mm), cause.joint_reading_mm(joint_mm)
+            frame_mm = cause.frame_reading_mm(frame_mm, warm)
         return {
-            **self._sensors.show(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
+            **self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
             "pressure_hPa": self._weather.pressure_hPa(warm.time_s),
             "humidity_pct": self._weather.humidity_pct(warm.time_s),
             **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", self.force_M_N, strict=True)},

@@ -21,7 +21,7 @@ RTU_REQUEST = 8  # unit, function, address, count, CRC
 MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
 
 
-class Slaves:
+class ModbusSlaves:
     """The slaves on one wire. Each answers to its own unit number; nobody answers for an absent one."""
 
     def __init__(self, devices: Sequence[SimulatedRegisterDevice], over_tcp: bool) -> None:

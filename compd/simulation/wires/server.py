@@ -128,7 +128,7 @@ class Simulation:
                 "tip_frame": world.tip_frame,
                 "tip_mm": tip_mm.tolist(),
                 "scale_mm": world.scale_mm.tolist(),
-                **({} if world.measuring is None else {"plan": world.measuring.told()}),
+                **({} if world.plan_motion is None else {"plan": world.plan_motion.progress()}),
             }
 
     def measure(self) -> Answer:
@@ -138,7 +138,7 @@ class Simulation:
         """
         with self._lock:
             world = self.world
-            shown_mm = noisy(world.shown_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
+            shown_mm = noisy(world.reference_tip_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
             return {
                 "class": "MEASURED",
                 "instrument": "laser tracker",
@@ -157,12 +157,12 @@ class Simulation:
 
     def _tour(self, _: Mapping[str, Any]) -> Answer:
         with self._lock:
-            self.world.tour()
+            self.world.start_tour()
         return self.truth()
 
     def _plan(self, _: Mapping[str, Any]) -> Answer:
         with self._lock:
-            self.world.measure()
+            self.world.start_plan()
         return self.truth()
 
     def _tip_for(self, message: Mapping[str, Any]) -> Answer:

@@ -19,7 +19,7 @@ from pymodbus.framer.rtu import FramerRTU
 from compd.clock import Clock, MonotonicClock
 from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
-from compd.simulation.wires.modbus_slaves import Slaves
+from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
 # Characters leave in pieces of this length: finer would only cost time of this computer.
@@ -114,7 +114,7 @@ class SimulatedLine:
         self._listener: Listener
         if settings.kind.startswith("modbus"):
             registers = [device for device in devices if isinstance(device, SimulatedRegisterDevice)]
-            self._listener = Slaves(registers, over_tcp=settings.kind == "modbus_tcp")
+            self._listener = ModbusSlaves(registers, over_tcp=settings.kind == "modbus_tcp")
         else:
             self._listener = ByteDevices([device for device in devices if isinstance(device, SimulatedByteDevice)])
         self._character_s = 0.0

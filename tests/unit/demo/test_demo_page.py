@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.demo.page import error_rows, timing_rows, verdict, write_demo_page
-from compd.demo.session import DemoSession, Visit
+from compd.demo.session import DemoSession, DemoVisit
 
 SETPOINT: dict[str, Any] = {
     "time_s": 100.0,
@@ -18,8 +18,8 @@ SETPOINT: dict[str, Any] = {
 
 def session() -> DemoSession:
     visits = [
-        Visit(1.0, (1.0, 2.0, 3.0), {"none": 3.0, "joints": 2.0, "full": 0.3}, SETPOINT),
-        Visit(2.0, (4.0, 5.0, 6.0), {"none": 4.0, "joints": 1.0, "full": 0.4}, SETPOINT),
+        DemoVisit(1.0, (1.0, 2.0, 3.0), {"none": 3.0, "joints": 2.0, "full": 0.3}, SETPOINT),
+        DemoVisit(2.0, (4.0, 5.0, 6.0), {"none": 4.0, "joints": 1.0, "full": 0.4}, SETPOINT),
     ]
     return DemoSession("tripod-cmm", visits, [SETPOINT], {"loop": {"rate_hz": 200.0, "missed_cycles": 0}})
 

@@ -20,7 +20,7 @@ from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines.modbus_rtu import RtuMaster
 from compd.lines.modbus_tcp import ModbusTcp
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
-from compd.simulation.wires.modbus_slaves import Slaves
+from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from tests.support.paths import TESTS
 
 FILES = sorted((TESTS / "transcripts").glob("*.txt"))
@@ -270,7 +270,7 @@ def test_the_simulated_device_says_the_same(path: Path) -> None:
             options, lambda name, seen=seen: seen.get(name, float("nan"))
         )
         if gauge.line_kind == "registers":
-            device = Slaves([device], over_tcp=transcript.driver in OVER_TCP)
+            device = ModbusSlaves([device], over_tcp=transcript.driver in OVER_TCP)
         for exchange in marked:
             assert device.hear(exchange.sent) == exchange.received, f"line {poll.line}"
             tried += 1

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from compd.arrays import rms
 from compd.cli.main import app
 from compd.configuration import Configuration, load
 from compd.paper import drift_experiment, link_experiment, plate_experiment
-from compd.paper.reduction import Reduction, rms
+from compd.paper.reproduction import Reduction
 from compd.simulation.truth import strengths
 from tests.support.simulated import TRIPOD
 
@@ -23,24 +24,24 @@ def tripod() -> Configuration:
 
 
 def test_figure_18_load_and_warmth_hardly_show_with_rods_and_comparators(tripod: Configuration) -> None:
-    found = link_experiment.run(tripod, 3)
-    slope = np.polyfit(found.without.axial_N, found.without.cold_um, 1)[0]
+    result = link_experiment.run(tripod, 3)
+    slope = np.polyfit(result.without.axial_N, result.without.cold_um, 1)[0]
     # tube and screw, and the ball at the base and at the platform that no comparator is asked about
     gives = link_experiment.TUBE_UM_PER_N + 2 * strengths.Strengths().ball_give_along_um_per_N
     assert slope == pytest.approx(-gives, rel=0.05)  # it warms up a little meanwhile
-    assert np.ptp(found.without.axial_N) > 60.0
-    assert found.without.link_degC[-1] - found.without.link_degC[0] > 1.0
-    for reduction in link_experiment.reductions(found):
+    assert np.ptp(result.without.axial_N) > 60.0
+    assert result.without.link_degC[-1] - result.without.link_degC[0] > 1.0
+    for reduction in link_experiment.reductions(result):
         assert reduction.percent > 80.0
 
 
 def test_figure_20_has_136_distances_and_the_joints_gain_most_of_it(tripod: Configuration) -> None:
-    found = plate_experiment.run(tripod, 3)
-    assert len(found.nominal_mm) == 17 * 16 / 2
-    assert rms(found.joints_um) < rms(found.without_um)
-    assert rms(found.full_um) < rms(found.joints_um)
-    first = plate_experiment.reductions(found)[0]
-    assert first.percent == pytest.approx(100 * (1 - rms(found.joints_um) / rms(found.without_um)))
+    result = plate_experiment.run(tripod, 3)
+    assert len(result.nominal_mm) == 17 * 16 / 2
+    assert rms(result.joints_um) < rms(result.without_um)
+    assert rms(result.full_um) < rms(result.joints_um)
+    first = plate_experiment.reductions(result)[0]
+    assert first.percent == pytest.approx(100 * (1 - rms(result.joints_um) / rms(result.without_um)))
     assert "32 %" in first.paper
 
 
@@ -49,17 +50,17 @@ def test_figure_20_gains_nothing_where_the_joints_are_perfect(
 ) -> None:
     perfect = replace(strengths.Strengths(), ball_runout_um=0.0, ball_give_along_um_per_N=0.0)
     monkeypatch.setattr("compd.simulation.truth.world.Strengths", lambda: perfect)
-    found = plate_experiment.run(tripod, 3)
-    assert abs(plate_experiment.reductions(found)[0].percent) < 5.0
+    result = plate_experiment.run(tripod, 3)
+    assert abs(plate_experiment.reductions(result)[0].percent) < 5.0
 
 
 def test_figure_21_the_ball_stands_still_once_the_frame_is_measured(tripod: Configuration) -> None:
-    found = drift_experiment.run(tripod, 3)
-    z, x, y = drift_experiment.reductions(found)
+    result = drift_experiment.run(tripod, 3)
+    z, x, y = drift_experiment.reductions(result)
     assert z.without_um > 10.0
     assert z.without_um > max(x.without_um, y.without_um)
     assert z.percent > 80.0
-    assert len(found.time_h) > 50
+    assert len(result.time_h) > 50
 
 
 @pytest.mark.parametrize("figure", ["fig18", "fig20", "fig21"])

@@ -18,14 +18,15 @@ from compd.errors import CompdError
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from compd.simulation.campaign.campaign import Campaign
-from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, plan
+from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, draw_campaign_plan
 from compd.simulation.campaign.row_log import LoggedRows
-from compd.simulation.campaign.simulated_recording import Recorded, record
-from compd.simulation.campaign.sizing import Sizing
-from compd.simulation.causes.catalogue import CAUSES, LEAST_FLOORS, MOST_FLOORS, HiddenCause, asked, build, drawn
+from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
+from compd.simulation.campaign.sizing import CauseSizer
+from compd.simulation.causes.catalogue import CAUSES, build_cause
+from compd.simulation.causes.hidden_cause import LEAST_FLOORS, MOST_FLOORS, HiddenCause, draw_hidden, parse_hidden
 from compd.simulation.truth.instruments import BALLS, TRACKER_SIGMA_UM, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.strengths import NOTHING, SEEN, SEEN_WITHOUT_NOISE
+from compd.simulation.truth.strengths import FULLY_MEASURED, FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from tests.support.paths import SHARED
 from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, wiring
 
@@ -38,15 +39,15 @@ def machine() -> Mechanism:
 
 
 @pytest.fixture(scope="module")
-def recorded() -> Recorded:
-    return record(load(TRIPOD), 3, [HiddenCause("link_expansion", None, 4.0)])
+def recorded() -> SimulatedRecording:
+    return simulate_recording(load(TRIPOD), 3, [HiddenCause("link_expansion", None, 4.0)])
 
 
-def column(recorded: Recorded, name: str) -> Any:
+def column(recorded: SimulatedRecording, name: str) -> Any:
     return np.array(recorded.columns[name], dtype=float)
 
 
-def test_columns_are_those_of_the_example_recordings(recorded: Recorded) -> None:
+def test_columns_are_those_of_the_example_recordings(recorded: SimulatedRecording) -> None:
     if not EXAMPLE.exists():
         pytest.skip(f"the example recordings are not at {EXAMPLE.parent.parent}")
     with EXAMPLE.open(encoding="utf-8") as file:
@@ -55,7 +56,7 @@ def test_columns_are_those_of_the_example_recordings(recorded: Recorded) -> None
     assert 0.8 * len(rows) < len(recorded.columns["time_s"]) < 1.3 * len(rows)
 
 
-def test_sessions_points_repeats_and_loads(recorded: Recorded) -> None:
+def test_sessions_points_repeats_and_loads(recorded: SimulatedRecording) -> None:
     time_s, session, point, visit = (column(recorded, name) for name in ("time_s", "session", "point", "visit"))
     assert np.all(np.diff(time_s) > 0)
     assert np.unique(session).tolist() == list(range(1, SESSIONS + 1))
@@ -74,14 +75,14 @@ def test_sessions_points_repeats_and_loads(recorded: Recorded) -> None:
         assert np.ptp(column(recorded, f"temperature_{place}_degC")) > 2.0
 
 
-def test_immediate_repeats_scatter_as_the_tracker_does(recorded: Recorded) -> None:
+def test_immediate_repeats_scatter_as_the_tracker_does(recorded: SimulatedRecording) -> None:
     again = np.diff(column(recorded, "visit")) == 0
     differences = np.concatenate([np.diff(column(recorded, f"reference_{axis}_mm"))[again] for axis in "xyz"])
     sigma_um = 1.4826 * np.median(np.abs(differences)) / np.sqrt(2) * 1e3
     assert sigma_um == pytest.approx(TRACKER_SIGMA_UM, rel=0.15)
 
 
-def test_a_pass_moves_at_constant_speed(recorded: Recorded) -> None:
+def test_a_pass_moves_at_constant_speed(recorded: SimulatedRecording) -> None:
     time_s, scale_mm = column(recorded, "time_s"), column(recorded, "scale_1_mm")
     quick = np.diff(time_s) < 0.25
     speed = np.abs(np.diff(scale_mm)[quick] / np.diff(time_s)[quick])
@@ -91,7 +92,7 @@ def test_a_pass_moves_at_constant_speed(recorded: Recorded) -> None:
 
 
 def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
-    days = plan(machine, 3)
+    days = draw_campaign_plan(machine, 3)
     found = Campaign(tripod(), wiring(), days, 3, NOTHING, sigma_um=TRACKER_SIGMA_UM, outlier_share=0.01).run()
     true = Campaign(tripod(), wiring(), days, 3, NOTHING).run()
     names = [f"reference_{axis}_mm" for axis in "xyz"]
@@ -103,67 +104,69 @@ def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
 
 def test_gauges_explain_a_machine_without_hidden_causes(machine: Mechanism) -> None:
     for geometry, wires in ((tripod(), wiring()), (hexapod(), wiring(HEXAPOD))):
-        sizing = Sizing(geometry, wires, 4)
-        rows = Campaign(geometry, wires, sizing.plan.thinned(5), 4, SEEN_WITHOUT_NOISE).run()
+        sizer = CauseSizer(geometry, wires, 4)
+        rows = Campaign(geometry, wires, sizer.plan.thinned(5), 4, FULLY_MEASURED_WITHOUT_NOISE).run()
         assert rows.error_um() < 1e-3
-        unseen = replace(SEEN_WITHOUT_NOISE, platform_expansion_ppm_per_K=10.0)
-        assert Campaign(geometry, wires, sizing.plan.thinned(5), 4, unseen).run().error_um() > 0.1
+        unseen = replace(FULLY_MEASURED_WITHOUT_NOISE, platform_expansion_ppm_per_K=10.0)
+        assert Campaign(geometry, wires, sizer.plan.thinned(5), 4, unseen).run().error_um() > 0.1
 
 
 @pytest.mark.parametrize(
     "name", ["link_expansion", "backlash", "joint_contact", "reference_drift", "humidity_swelling"]
 )
 def test_a_cause_is_as_strong_as_it_takes(name: str) -> None:
-    sizing = Sizing(tripod(), wiring(), 5)
-    sized = sizing.cause(HiddenCause(name, None, 3.0))
+    sizer = CauseSizer(tripod(), wiring(), 5)
+    sized = sizer.size(HiddenCause(name, None, 3.0))
     assert sized.floors == pytest.approx(3.0, rel=0.06)
-    assert CAUSES[name].least <= abs(sized.cause.strength) <= CAUSES[name].most
-    given = sizing.cause(HiddenCause(name, sized.cause.strength))
+    assert CAUSES[name].min_strength <= abs(sized.cause.strength) <= CAUSES[name].max_strength
+    given = sizer.size(HiddenCause(name, sized.cause.strength))
     assert given.floors == pytest.approx(sized.floors, rel=1e-9)
 
 
-def test_weak_disturbances_are_two_and_weak(recorded: Recorded) -> None:
-    sizing = Sizing(tripod(), wiring(), 3)
+def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> None:
+    sizer = CauseSizer(tripod(), wiring(), 3)
     assert len(recorded.weak) == 2
     assert "link_expansion" not in [cause.id for cause in recorded.weak]
     for cause in recorded.weak:
-        again = build(cause.id, cause.strength, sizing.mechanism, 3)
-        assert sizing.floors(again) == pytest.approx(0.2, rel=0.1)
+        again = build_cause(cause.id, cause.strength, sizer.mechanism, 3)
+        assert sizer.error_in_floors(again) == pytest.approx(0.2, rel=0.1)
 
 
 def test_what_is_hidden_follows_from_its_number(machine: Mechanism) -> None:
-    found = [drawn(seed, machine) for seed in range(300)]
-    assert found == [drawn(seed, machine) for seed in range(300)]
+    found = [draw_hidden(seed, machine) for seed in range(300)]
+    assert found == [draw_hidden(seed, machine) for seed in range(300)]
     assert {one.id for one in found} == set(CAUSES)
     assert all(LEAST_FLOORS <= one.floors <= MOST_FLOORS for one in found)
     outside = np.mean([not CAUSES[one.id].in_library for one in found])
     assert 0.1 < outside < 0.3
     without_axes = Mechanism(hexapod())
-    assert "revolute_axis_tilt" not in {drawn(seed, without_axes).id for seed in range(300)}
+    assert "revolute_axis_tilt" not in {draw_hidden(seed, without_axes).id for seed in range(300)}
 
 
 def test_what_is_asked_for() -> None:
-    stiffness, backlash = asked(["link_elasticity=25", "backlash"])
+    stiffness, backlash = parse_hidden(["link_elasticity=25", "backlash"])
     assert stiffness == HiddenCause("link_elasticity", 1 / 25)
     assert backlash == HiddenCause("backlash", None)
     with pytest.raises(CompdError) as caught:
-        asked(["witchcraft=1", "backlash=much", "link_elasticity=0"])
+        parse_hidden(["witchcraft=1", "backlash=much", "link_elasticity=0"])
     assert len(caught.value.problems) == 3
 
 
 def test_the_same_seed_brings_home_the_same(machine: Mechanism) -> None:
     def rows() -> LoggedRows:
-        days = plan(machine, 6).thinned(4)
-        causes = [build("backlash", 1.0, machine, 6)]
-        return Campaign(tripod(), wiring(), days, 6, SEEN, causes, sigma_um=0.15, outlier_share=0.01).run()
+        days = draw_campaign_plan(machine, 6).thinned(4)
+        causes = [build_cause("backlash", 1.0, machine, 6)]
+        return Campaign(tripod(), wiring(), days, 6, FULLY_MEASURED, causes, sigma_um=0.15, outlier_share=0.01).run()
 
     first, again = rows(), rows()
     for name, values in first.columns.items():
         np.testing.assert_array_equal(values, again.columns[name])
 
 
-def test_other_days_are_on_the_same_machine(recorded: Recorded) -> None:
-    other = record(load(TRIPOD), 3, [HiddenCause("link_expansion", recorded.hidden[0].cause.strength)], other_days=1)
+def test_other_days_are_on_the_same_machine(recorded: SimulatedRecording) -> None:
+    other = simulate_recording(
+        load(TRIPOD), 3, [HiddenCause("link_expansion", recorded.hidden[0].cause.strength)], other_days=1
+    )
     assert {cause.id: cause.values for cause in recorded.weak} == {cause.id: cause.values for cause in other.weak}
     there, here = (column(one, "reference_x_mm")[:50] for one in (recorded, other))
     assert np.abs(there - here).max() > 1.0

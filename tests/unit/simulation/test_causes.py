@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.simulation.causes.catalogue import CAUSES, build, possible
+from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
 from compd.simulation.causes.link import LinkSag
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
@@ -51,11 +51,11 @@ def ideal(cause: Cause | None, weather: Weather | None = None) -> World:
 
 
 def cause(name: str, strength: float) -> Any:
-    return build(name, strength, MACHINE, seed=1)
+    return build_cause(name, strength, MACHINE, seed=1)
 
 
 def go(world: World, scale_mm: FloatArray, time_s: float = 10.0, travel_s: float = 1.0) -> None:
-    world.carry(np.asarray(scale_mm, dtype=float), world.posture, time_s, travel_s)
+    world.advance_to(np.asarray(scale_mm, dtype=float), world.posture, time_s, travel_s)
 
 
 def warmed(name: str, strength: float) -> World:
@@ -66,7 +66,7 @@ def warmed(name: str, strength: float) -> World:
 
 
 def moved_um(world: World) -> FloatArray:
-    return (world.shown_mm() - MACHINE.tip0_M) / UM
+    return (world.reference_tip_mm() - MACHINE.tip0_M) / UM
 
 
 def test_every_cause_that_the_library_has_is_in_the_truth_and_others_besides() -> None:
@@ -75,17 +75,17 @@ def test_every_cause_that_the_library_has_is_in_the_truth_and_others_besides() -
     ours = {name for name, kind in CAUSES.items() if kind.in_library}
     assert ours == set(library())
     assert len(CAUSES) - len(ours) >= 5
-    assert all(kind.follows for name, kind in CAUSES.items() if name not in ours)
+    assert all(kind.covariates for name, kind in CAUSES.items() if name not in ours)
 
 
-@pytest.mark.parametrize("name", possible(MACHINE))
+@pytest.mark.parametrize("name", possible_causes(MACHINE))
 def test_without_strength_a_cause_does_nothing(name: str) -> None:
     with_it, without = ideal(cause(name, 0.0), WarmRoom()), ideal(None, WarmRoom())
     for world in (with_it, without):
         world.force_M_N = np.array([3.0, -5.0, -20.0])
         go(world, np.array([5.0, -3.0, 2.0]), 5000.0)
         go(world, np.array([2.0, 1.0, 7.0]), 3000.0)
-    assert with_it.shown_mm() == pytest.approx(without.shown_mm(), abs=1e-10)
+    assert with_it.reference_tip_mm() == pytest.approx(without.reference_tip_mm(), abs=1e-10)
     shown = [[world.sense(name) for name in world.names] for world in (with_it, without)]
     assert shown[0] == pytest.approx(shown[1], abs=1e-12)
 
@@ -94,12 +94,12 @@ def test_without_strength_a_cause_does_nothing(name: str) -> None:
 def test_other_machines_have_causes_too(geometry: Any) -> None:
     machine = Mechanism(geometry)
     wires = wiring(HEXAPOD) if machine.links == 6 else wiring()
-    for name in possible(machine):
-        one = build(name, CAUSES[name].most / 10, machine, seed=2)
+    for name in possible_causes(machine):
+        one = build_cause(name, CAUSES[name].max_strength / 10, machine, seed=2)
         world = World(geometry, wires, 1, strengths=NOTHING, causes=[one], weather=WarmRoom())
         world.force_M_N = np.array([5.0, 5.0, -20.0])
-        world.carry(np.linspace(-2.0, 3.0, machine.links), world.posture, 3000.0, 1.0)
-        assert np.all(np.isfinite(world.shown_mm()))
+        world.advance_to(np.linspace(-2.0, 3.0, machine.links), world.posture, 3000.0, 1.0)
+        assert np.all(np.isfinite(world.reference_tip_mm()))
 
 
 # --- links ------------------------------------------------------------------------------------------------
@@ -159,9 +159,9 @@ def test_sag_is_the_arc_less_the_chord_of_a_bent_beam() -> None:
     level_500_um = shortening_mm * (500.0 / length) ** 7 / UM
     sag = LinkSag(level_500_um, MACHINE, np.random.default_rng(1))
     level = SimpleNamespace(link_mm=np.full(3, length), directions_M=np.tile([1.0, 0.0, 0.0], (3, 1)))
-    assert sag.link_mm(level) == pytest.approx([-shortening_mm] * 3, rel=1e-6)
+    assert sag.link_extension_mm(level) == pytest.approx([-shortening_mm] * 3, rel=1e-6)
     upright = SimpleNamespace(link_mm=np.full(3, length), directions_M=np.tile([0.0, 0.0, -1.0], (3, 1)))
-    assert sag.link_mm(upright) == pytest.approx([0.0] * 3, abs=1e-15)
+    assert sag.link_extension_mm(upright) == pytest.approx([0.0] * 3, abs=1e-15)
 
 
 def test_a_link_adjusted_wrongly_is_as_if_its_scale_stood_elsewhere() -> None:
@@ -188,8 +188,8 @@ def test_a_scale_that_is_too_long_and_one_that_grows() -> None:
 def test_a_scale_errs_within_its_period_and_repeats() -> None:
     cyclic = cause("scale_cyclic", 0.3)
     steps = np.arange(64) * 0.020 / 64
-    errors_um = np.array([cyclic.link_mm(SimpleNamespace(scale_mm=np.full(3, g))) for g in steps]) / UM
-    again_um = np.array([cyclic.link_mm(SimpleNamespace(scale_mm=np.full(3, g + 0.060))) for g in steps]) / UM
+    errors_um = np.array([cyclic.link_extension_mm(SimpleNamespace(scale_mm=np.full(3, g))) for g in steps]) / UM
+    again_um = np.array([cyclic.link_extension_mm(SimpleNamespace(scale_mm=np.full(3, g + 0.060))) for g in steps]) / UM
     assert errors_um == pytest.approx(again_um, abs=1e-9)
     first, second = np.abs(np.fft.rfft(errors_um, axis=0)[1:3]) * 2 / len(steps)
     assert first == pytest.approx([0.3] * 3, rel=0.1)

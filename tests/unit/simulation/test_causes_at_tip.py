@@ -20,12 +20,12 @@ from tests.unit.simulation.test_causes import COSINE, MACHINE, PPM, UM, WARM_K, 
 
 
 def test_comparators_that_show_too_much_and_rods_that_grow() -> None:
-    assert cause("joint_comparator_gain", 0.2).joint_seen(np.array([4.0])) == pytest.approx([5.0])
+    assert cause("joint_comparator_gain", 0.2).joint_reading_mm(np.array([4.0])) == pytest.approx([5.0])
     warm = warmed("frame_rod_expansion", 10.0)
     distances = distances_mm(MACHINE.supports0_M, MACHINE.plate0_M)
     shown = [warm.sense(name) for name in warm.names if name.startswith("frame_")]
     assert shown == pytest.approx(-10.0 * PPM * WARM_K * distances, rel=1e-6)
-    assert cause("frame_comparator_gain", 0.04).frame_seen(np.full(9, 0.96), None) == pytest.approx([1.0] * 9)
+    assert cause("frame_comparator_gain", 0.04).frame_reading_mm(np.full(9, 0.96), None) == pytest.approx([1.0] * 9)
     drifted = warmed("joint_comparator_drift", 0.4)
     assert drifted.sense("joint_5") == pytest.approx(0.4 * UM * WARM_K, rel=1e-6)
 
@@ -88,8 +88,8 @@ def test_runout_goes_across_the_link_where_no_comparator_looks() -> None:
 
 def at(tip_M: FloatArray, plate_K: FloatArray | None = None, **more: Any) -> CauseInputs:
     warm = SimpleNamespace(plate_K=plate_K, room_degC=more.pop("room_degC", REFERENCE_degC))
-    now: Any = SimpleNamespace(tip_M=np.asarray(tip_M), warm=warm, **more)
-    return now
+    inputs: Any = SimpleNamespace(tip_M=np.asarray(tip_M), warm=warm, **more)
+    return inputs
 
 
 def test_a_plate_warm_on_top_is_a_cap() -> None:
@@ -97,9 +97,9 @@ def test_a_plate_warm_on_top_is_a_cap() -> None:
     bow = cause("plate_bending", 6.0)
     plate_K = np.linspace(2.0, 0.0, 5)
     risen_um = 6.0 * PPM * 2.0 * 350.0**2 / (2 * 200.0) / UM
-    assert bow.reference(at([0.0, 0.0, 190.0], plate_K)) / UM == pytest.approx([0, 0, -risen_um], rel=1e-5)
-    assert bow.reference(at([0.0, 350.0, 190.0], plate_K)) / UM == pytest.approx([0, 0, 0], abs=1e-6)
-    even = bow.reference(at([0.0, 0.0, 190.0], np.full(5, 2.0)))
+    assert bow.reference_shift(at([0.0, 0.0, 190.0], plate_K)) / UM == pytest.approx([0, 0, -risen_um], rel=1e-5)
+    assert bow.reference_shift(at([0.0, 350.0, 190.0], plate_K)) / UM == pytest.approx([0, 0, 0], abs=1e-6)
+    even = bow.reference_shift(at([0.0, 0.0, 190.0], np.full(5, 2.0)))
     assert even == pytest.approx([0, 0, 0], abs=1e-12)
 
 
@@ -110,20 +110,22 @@ def test_air_as_edlen_measured_it() -> None:
     assert refractivity(21.0, 1013.25, 50.0) - air == pytest.approx(-0.95e-6, abs=0.03e-6)
     assert refractivity(20.0, 1014.25, 50.0) - air == pytest.approx(0.268e-6, abs=0.002e-6)
     assert refractivity(20.0, 1013.25, 51.0) - air == pytest.approx(-0.0085e-6, abs=0.001e-6)
-    longer = cause("reference_air_index", 1.0).reference(at([0.0, 0.0, 200.0], pressure_hPa=1023.25, humidity_pct=50.0))
+    longer = cause("reference_air_index", 1.0).reference_shift(
+        at([0.0, 0.0, 200.0], pressure_hPa=1023.25, humidity_pct=50.0)
+    )
     assert longer / UM == pytest.approx([0, 0, 200e3 * 2.68e-6], rel=0.02)
 
 
 def test_a_stand_creeps_and_a_frame_is_laid_over_askew() -> None:
     drift = cause("reference_drift", 2.0)
-    assert drift.reference(at([0, 0, 0], time_s=0.0)) == pytest.approx([0, 0, 0])
-    hour_um = drift.reference(at([0, 0, 0], time_s=3600.0)) / UM
+    assert drift.reference_shift(at([0, 0, 0], time_s=0.0)) == pytest.approx([0, 0, 0])
+    hour_um = drift.reference_shift(at([0, 0, 0], time_s=3600.0)) / UM
     assert hour_um == pytest.approx(drift.values, rel=0.02)
     askew = cause("reference_registration", 5.0)
     offset_um, turn_urad = np.array(askew.values).reshape(2, 3)
     place = np.array([50.0, -80.0, 190.0])
     expected_um = offset_um + np.cross(turn_urad, place) * UM
-    assert askew.reference(at(place)) / UM == pytest.approx(expected_um, abs=1e-3)
+    assert askew.reference_shift(at(place)) / UM == pytest.approx(expected_um, abs=1e-3)
 
 
 # --- outside the library --------------------------------------------------------------------------------------------
@@ -139,12 +141,12 @@ def test_weather_that_the_library_does_not_know() -> None:
 
 def test_a_blow_lasts_a_cable_pulls_on_one_side_and_a_room_breathes() -> None:
     blow = cause("collision_step", 5.0)
-    assert np.all(blow.tool(at([0, 0, 0], time_s=blow.hit_s - 1)) == 0.0)
-    assert blow.tool(at([0, 0, 0], time_s=blow.hit_s + 1)) / UM == pytest.approx(blow.values)
+    assert np.all(blow.tool_shift(at([0, 0, 0], time_s=blow.hit_s - 1)) == 0.0)
+    assert blow.tool_shift(at([0, 0, 0], time_s=blow.hit_s + 1)) / UM == pytest.approx(blow.values)
     cable = cause("cable_drag", 4.0)
     x = MACHINE.tip0_M[0]
-    pulled = [cable.tool(at([x + away, 0.0, 190.0]))[0] / UM for away in (-50.0, 10.0, 60.0, 110.0)]
+    pulled = [cable.tool_shift(at([x + away, 0.0, 190.0]))[0] / UM for away in (-50.0, 10.0, 60.0, 110.0)]
     assert pulled == pytest.approx([0.0, 0.0, -2.0, -4.0])
     room = cause("room_breathing", 1.0)
-    waves = [room.reference(at([0, 0, 0], time_s=time_s))[2] for time_s in (100.0, 100.0 + room.period_s)]
+    waves = [room.reference_shift(at([0, 0, 0], time_s=time_s))[2] for time_s in (100.0, 100.0 + room.period_s)]
     assert waves[0] == pytest.approx(waves[1], abs=1e-12)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, SPEED_MM_PER_S, Follower, Move, Tour
+from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, SPEED_MM_PER_S, Move, SetpointMotion, TourMotion
 
 
 @pytest.mark.parametrize("way_mm", [0.001, 3.0, 150.0])
@@ -30,7 +30,7 @@ def test_a_move_to_where_it_is_takes_no_time() -> None:
 
 def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
     points_mm = np.array([[5.0, 0.0], [0.0, 9.0], [-4.0, -4.0]])
-    tour = Tour(np.zeros(2), points_mm, 1.0, np.random.default_rng(1))
+    tour = TourMotion(np.zeros(2), points_mm, 1.0, np.random.default_rng(1))
     seen: list[int] = []
     moved_s = 0.0
     for _ in range(3000):
@@ -46,8 +46,8 @@ def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
 
 def test_a_tour_does_not_depend_on_the_step() -> None:
     points_mm = np.random.default_rng(4).uniform(-20, 20, (5, 3))
-    one = Tour(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
-    many = Tour(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    one = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    many = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
     moved_s = one.advance(40.0)
     assert sum(many.advance(0.008) for _ in range(5000)) == pytest.approx(moved_s, abs=1e-6)
     assert one.point == many.point
@@ -56,7 +56,7 @@ def test_a_tour_does_not_depend_on_the_step() -> None:
 
 @pytest.mark.parametrize("step_s", [0.001, 0.02, 0.5])
 def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
-    drives = Follower(np.zeros(3))
+    drives = SetpointMotion(np.zeros(3))
     drives.setpoint_mm = np.array([40.0, -0.002, 0.0])
     positions = [drives.position_mm]
     while drives.phase == "moving":
@@ -72,7 +72,7 @@ def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
 def test_follower_comes_from_one_side_whatever_the_steps() -> None:
     """A play of a micrometre would show a turn at the end."""
     rng = np.random.default_rng(1)
-    drives = Follower(np.zeros(3))
+    drives = SetpointMotion(np.zeros(3))
     for _ in range(100):
         start_mm = drives.position_mm
         drives.setpoint_mm = rng.uniform(-60.0, 60.0, 3)
@@ -83,7 +83,7 @@ def test_follower_comes_from_one_side_whatever_the_steps() -> None:
 
 
 def test_follower_takes_new_setpoints_on_the_way() -> None:
-    drives = Follower(np.zeros(1))
+    drives = SetpointMotion(np.zeros(1))
     drives.setpoint_mm = np.array([40.0])
     drives.advance(0.3)
     drives.setpoint_mm = np.array([-1.0])

@@ -11,14 +11,14 @@ from typer.testing import CliRunner
 from compd.cli.main import app
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.simulation.campaign.plan_reader import quantities, read_plan
-from compd.simulation.campaign.simulated_recording import Recorded, record
-from compd.simulation.causes.catalogue import HiddenCause
+from compd.simulation.campaign.plan_reader import holdable_quantities, read_plan
+from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
+from compd.simulation.causes.hidden_cause import HiddenCause
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
+from compd.simulation.truth.plan_motion import DWELL_S, SETTLED_S, PlanMotion, Stage, plan_stages
 from compd.simulation.truth.planned_row import TURN_MM, PlannedRow
-from compd.simulation.truth.stages import DWELL_S, SETTLED_S, Measuring, Stage, stages
-from compd.simulation.truth.strengths import SEEN_WITHOUT_NOISE
+from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
 from compd.simulation.truth.world import World
 from tests.support.planned_measurements import plan_file
 from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, tripod_with_tool_on_plate, wiring
@@ -39,7 +39,7 @@ def problems(path: Path) -> str:
 
 
 def staged(rows: tuple[PlannedRow, ...], speedup: float = 1.0) -> list[Stage]:
-    return list(stages(rows, np.zeros(3), lambda _: None, speedup))
+    return list(plan_stages(rows, np.zeros(3), lambda _: None, speedup))
 
 
 # --- the file ---------------------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_a_plan_that_does_not_suit_the_machine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("geometry", "wires"), [(tripod(), wiring()), (hexapod(), wiring(HEXAPOD))])
 def test_what_can_be_held_can_be_sensed(geometry: object, wires: object) -> None:
     world = World(geometry, wires, 1)  # type: ignore[arg-type]
-    held = quantities(world.mechanism.links)
+    held = holdable_quantities(world.mechanism.links)
     shown = [name for name in world.names if not name.startswith(("scale_", "joint_", "frame_"))]
     assert sorted(held) == sorted(shown)
 
@@ -227,27 +227,27 @@ def test_a_row_on_the_move_is_passed_at_its_speed(tmp_path: Path) -> None:
 def test_the_drives_follow_the_stages_in_any_steps(tmp_path: Path) -> None:
     rows = read(plan_file(tmp_path / "next.csv", [{"tip_x_mm": 20.0}, {"tip_x_mm": -20.0, "time_s": 30.0}]))
     held: list[object] = []
-    drives = [Measuring(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
-    whole_s = sum(stage.duration_s for stage in stages(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]))
-    assert drives[0].told() == {"row": 1, "rows": 2, "purpose": "a test", "doing": "walk", "done": False}
+    drives = [PlanMotion(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
+    whole_s = sum(stage.duration_s for stage in plan_stages(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]))
+    assert drives[0].progress() == {"row": 1, "rows": 2, "purpose": "a test", "doing": "walk", "done": False}
     moved_s = [drives[0].advance(whole_s + 0.001), sum(drives[1].advance(0.02) for _ in range(int(whole_s / 0.02) + 1))]
     assert moved_s[0] == pytest.approx(moved_s[1])
     for one in drives:
         assert one.position_mm == pytest.approx(rows[1].scale_mm)
-        assert (one.told()["row"], one.told()["doing"], one.phase) == (2, "done", "dwelling")
+        assert (one.progress()["row"], one.progress()["doing"], one.phase) == (2, "done", "dwelling")
 
 
 def test_what_is_held_is_as_told(tmp_path: Path) -> None:
-    world = World(tripod(), wiring(), 1, strengths=SEEN_WITHOUT_NOISE)
-    names = quantities(3)
+    world = World(tripod(), wiring(), 1, strengths=FULLY_MEASURED_WITHOUT_NOISE)
+    names = holdable_quantities(3)
     told = {name: 20.0 + 0.3 * k for k, name in enumerate(names) if name.startswith("temperature_")}
     told |= {"pressure_hPa": 990.0, "humidity_pct": 61.0, "force_x_N": 5.0, "force_y_N": -6.0, "force_z_N": 7.0}
     world.hold(told)
-    world.carry(world.scale_mm, world.posture, SETTLED_S, 0.0)
+    world.advance_to(world.scale_mm, world.posture, SETTLED_S, 0.0)
     for name, value in told.items():
         assert world.sense(name) == pytest.approx(value, abs=0.12), name
     world.hold({})
-    world.carry(world.scale_mm, world.posture, 48 * 3600.0, 0.0)
+    world.advance_to(world.scale_mm, world.posture, 48 * 3600.0, 0.0)
     assert world.sense("pressure_hPa") > 1000.0
     assert world.sense("force_x_N") == 0.0
     assert abs(world.sense("temperature_plate_bottom_degC") - told["temperature_plate_bottom_degC"]) > 1.0
@@ -256,8 +256,10 @@ def test_what_is_held_is_as_told(tmp_path: Path) -> None:
 # --- the recording that comes of it -----------------------------------------------------------------------------
 
 
-def campaign(path: Path, other_days: int = 0) -> Recorded:
-    return record(load(TRIPOD), 4, [HiddenCause("backlash", 3.0)], other_days=other_days, given=read(path))
+def campaign(path: Path, other_days: int = 0) -> SimulatedRecording:
+    return simulate_recording(
+        load(TRIPOD), 4, [HiddenCause("backlash", 3.0)], other_days=other_days, planned_rows=read(path)
+    )
 
 
 def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> None:
@@ -287,7 +289,7 @@ def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> 
     assert speed == pytest.approx([5.0, 5.0], rel=1e-3)
     # while the links warmed up the gauges were read often enough to see how
     assert (~measured & (columns["temperature_link_1_degC"] > 21) & (columns["temperature_link_1_degC"] < 24.5)).any()
-    other = record(load(TRIPOD), 4, [HiddenCause("backlash", 3.0)])
+    other = simulate_recording(load(TRIPOD), 4, [HiddenCause("backlash", 3.0)])
     assert {cause.id: cause.values for cause in found.weak} == {cause.id: cause.values for cause in other.weak}
     assert found.hidden[0].cause.values == other.hidden[0].cause.values
 

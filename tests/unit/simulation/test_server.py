@@ -20,7 +20,7 @@ from compd.configuration import Configuration, load
 from compd.errors import PluginError
 from compd.gauge import LineFault, Quality, Reading
 from compd.lines.open import open_line
-from compd.simulation.causes.catalogue import drawn
+from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.world import World
 from compd.simulation.wires.server import STEP_S, Simulation
@@ -251,7 +251,7 @@ def test_the_command_hides_a_cause_under_seal() -> None:
         finished = subprocess.run(command, capture_output=True, text=True, check=True)
         answer = json.loads((directory / "hidden.answer.json").read_text(encoding="utf-8"))
         (name,) = answer["effects"]
-        assert name == drawn(3, Mechanism(load(TRIPOD).geometry)).id
+        assert name == draw_hidden(3, Mechanism(load(TRIPOD).geometry)).id
         assert answer["error_in_floors"][name] > 0.5
         assert name not in finished.stdout
 

@@ -24,7 +24,7 @@ from tests.support.simulated import HEXAPOD, hexapod, tripod, tripod_with_tool_o
 MACHINES = [(tripod(), wiring()), (hexapod(), wiring(HEXAPOD))]
 ROLE_WEIGHT = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}
 # What the comparators do see, with nothing that they do not: joints along the links, and the frame.
-SEEN = replace(
+FULLY_MEASURED = replace(
     Strengths(),
     ball_runout_across_share=0.0,
     ball_give_across_um_per_N=0.0,
@@ -127,7 +127,7 @@ def test_ideal_machine_is_where_the_drawing_says(geometry: Geometry, wires: Wiri
 
 @arrangements
 def test_gauges_explain_joints_and_frame_by_the_papers_equations(geometry: Geometry, wires: Wiring) -> None:
-    world = World(geometry, wires, seed=2, speedup=300.0, strengths=SEEN)
+    world = World(geometry, wires, seed=2, speedup=300.0, strengths=FULLY_MEASURED)
     for _ in range(8):
         run(world, 5.0)
         assert compensated_tip(world, geometry, wires) == pytest.approx(true_tip(world), abs=1e-6)
@@ -181,7 +181,7 @@ def test_commanded_machine_drives_there_and_no_further() -> None:
     assert world.phase == "dwelling"
     np.testing.assert_array_equal(world.scale_mm, [10.0, -4.0, 2.5])
     assert world.weather_time_s > 0  # a command switches the machine on
-    world.tour()
+    world.start_tour()
     run(world, 10.0)
     assert world.point is not None
 

@@ -1,4 +1,4 @@
-"""What a machine does to measure a plan's rows: moves and waits, one after the other, for whoever lets time pass."""
+"""Motion of a machine that measures planned rows: a sequence of stages, each a move followed by a rest."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from compd.simulation.truth.heat import HELD_TIME_CONSTANT_S
 from compd.simulation.truth.motion import Move
 from compd.simulation.truth.planned_row import PlannedRow
 
-# After so long a part that was 10 K away from where it is held has come within 0.01 K of it.
+# Time after which a part that was 10 K away from its held temperature is within 0.01 K of it.
 SETTLED_S = 7 * HELD_TIME_CONSTANT_S
-# At rest at a row: every gauge is read, and a tracker has looked many times.
+# Rest at a row: every gauge is read anew, and a tracker has measured many times.
 DWELL_S = 1.5
 
-# At the points of a walk, in turn: motion with a pattern, so that two clocks that saw it can be laid over each other.
+# Dwell at the points of a walk, in turn: an irregular motion, so that two recordings of it can be aligned in time.
 WALK_DWELLS_S = (0.2, 0.9, 0.4, 0.7)
 
 Purpose = Literal["walk", "way", "settle", "wait", "look"]
@@ -25,9 +25,10 @@ Hold = Callable[[Mapping[str, float]], None]
 
 
 class Stage(NamedTuple):
-    """The links follow `move` and rest until `duration_s` is over; `look`: this is where the row is measured.
+    """The links follow `move`, then rest until `duration_s` is over.
 
-    row : the one that is measured here or next.
+    row : the row that is measured in this stage (purpose "look") or next. purpose : "walk" to align clocks, "way" to a
+    row, "settle" until held temperatures are reached, "wait" for the row's time, "look" to measure.
     """
 
     row: PlannedRow
@@ -36,20 +37,20 @@ class Stage(NamedTuple):
     duration_s: float
 
 
-def stages(
+def plan_stages(
     rows: Sequence[PlannedRow],
     start_mm: FloatArray,
     hold: Hold,
     speedup: float = 1.0,
     walk_mm: Sequence[FloatArray] = (),
 ) -> Iterator[Stage]:
-    """All of them in order. start_mm : (n,) where the links are.
+    """The stages that measure `rows`, in order. start_mm : (n,) present scale values.
 
-    hold : called with a row's quantities when the machine sets out for it. speedup : a plan's waiting, and the
-    warming up of its parts, take so many times less. walk_mm : points (n,) to visit first.
+    hold : called with a row's quantities when the machine sets out for it. speedup : factor by which waiting and
+    warming up take less time. walk_mm : points (n,) to visit first.
     """
     here_mm, direction = start_mm, np.ones_like(start_mm)
-    now_s = began_s = 0.0
+    now_s = start_s = 0.0
     held_degC: dict[str, float] = {}
     for number, point_mm in enumerate(walk_mm):
         move = Move(here_mm, point_mm)
@@ -71,8 +72,8 @@ def stages(
         if settled_s > now_s:
             yield Stage(row, "settle", rest, settled_s - now_s)
             now_s = settled_s
-        began_s = now_s if row.begins else began_s
-        due_s = began_s + row.time_s / speedup
+        start_s = now_s if row.begins else start_s
+        due_s = start_s + row.time_s / speedup
         if due_s > now_s:
             yield Stage(row, "wait", rest, due_s - now_s)
             now_s = due_s
@@ -82,8 +83,8 @@ def stages(
         here_mm, now_s = row.end_mm, now_s + look.duration_s + DWELL_S
 
 
-class Measuring:
-    """The drives of a machine that goes through a plan's rows, one or more, and stands still after the last."""
+class PlanMotion:
+    """Motion through a plan's rows, at least one; at rest after the last."""
 
     point = None
 
@@ -95,8 +96,8 @@ class Measuring:
         speedup: float,
         walk_mm: Sequence[FloatArray],
     ) -> None:
-        """As `stages`."""
-        self._stages = stages(rows, start_mm, hold, speedup, walk_mm)
+        """As for `plan_stages`."""
+        self._stages = plan_stages(rows, start_mm, hold, speedup, walk_mm)
         self._stage: Stage | None = next(self._stages, None)
         self._since_s = 0.0
         self._rows = len(rows)
@@ -112,7 +113,7 @@ class Measuring:
         return "moving" if self._stage and self._since_s < self._stage.move.duration_s else "dwelling"
 
     def advance(self, time_s: float) -> float:
-        """Go on for `time_s`; for how much of it the links moved, s."""
+        """Advance by `time_s`; returns how many seconds of it the links moved."""
         moved_s = 0.0
         while self._stage is not None:
             step_s = min(time_s, self._stage.duration_s - self._since_s)
@@ -126,8 +127,8 @@ class Measuring:
             self._row = self._stage.row if self._stage else self._row
         return moved_s
 
-    def told(self) -> Mapping[str, Any]:
-        """For TRUTH: which row of how many, what it is for, what happens there now, and whether all is done."""
+    def progress(self) -> Mapping[str, Any]:
+        """For the TRUTH message: row of how many, its purpose, the present stage, and whether all is done."""
         doing = self._stage.purpose if self._stage else "done"
         return {
             "row": self._row.number,
