@@ -11,6 +11,7 @@ from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.gauge import Quality
+from compd.json_text import omit_unknown
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.wiring import MachineWires
@@ -61,7 +62,7 @@ class StatusReport:
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
         }
-        known: dict[str, Any] = _without_unknown(message)
+        known: dict[str, Any] = omit_unknown(message)
         return known
 
     def _zero(self) -> dict[str, Any]:
@@ -94,16 +95,3 @@ class StatusReport:
                 entry["detail"] = reading.detail
             gauges.append(entry)
         return gauges
-
-
-def _without_unknown(value: Any) -> Any:
-    """`value` without the numbers in it that are not finite: JSON has none, and what is absent is unknown."""
-    match value:
-        case Mapping():
-            pairs = ((str(key), _without_unknown(part)) for key, part in value.items())
-            return {key: part for key, part in pairs if part is not None}
-        case list() | tuple():
-            return [_without_unknown(part) for part in value]
-        case float() if not math.isfinite(value):
-            return None
-    return value

@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
+from compd.recording.sidecar import sidecar_contents
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.campaign.planned_campaign import PlannedCampaign
@@ -99,7 +100,7 @@ def simulate_recording(
         reference_block["frame"] = "machine"
     if balls_M is not None:
         reference_block["balls"] = plate_file
-    sidecar = {"machine": configuration.machine, "reference": reference_block}
+    sidecar = sidecar_contents(configuration.machine, reference_block)
     return SimulatedRecording(campaign.run().columns, sidecar, balls_M, sized, tuple(weak))
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.errors import CompdError, Problem
+from compd.files import write_files
 from compd.simulation.causes.catalogue import CAUSES, possible_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
@@ -89,7 +90,7 @@ def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause]
         "error_in_floors": {sized.cause.id: round(sized.floors, 3) for sized in hidden},
         "weak_disturbances": {cause.id: _strengths(cause) for cause in weak},
     }
-    path.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+    write_files({path: json.dumps(answer, indent=1) + "\n"})
 
 
 def _strengths(cause: Cause) -> float | list[float]:
