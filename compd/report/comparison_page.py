@@ -9,7 +9,7 @@ import numpy as np
 from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import covariates
+from compd.comparison.covariates import covariates
 from compd.model_file import ModelFile, Stored, numbers_of
 from compd.report.figures import against, arrows, at_links, falling, histogram, switched_off, workspace
 from compd.report.page import PageTable, Panel, write_page

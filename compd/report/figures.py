@@ -10,7 +10,7 @@ from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import Covariate
+from compd.comparison.covariates import Covariate
 from compd.report.page import COLOURS, PageTable, styled
 
 # More dots than this hide each other; means are always over all rows.
