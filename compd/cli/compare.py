@@ -93,12 +93,12 @@ def print_comparisons(found: list[Comparison]) -> None:
             console.print(f"[bold]{name_of(one)}[/]")
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
-        if not one.findings:
+        if not one.trends:
             console.print(f"Where it fails: {nothing_found(one)}.")
-        for finding in one.findings[:MOST_SENTENCES]:
-            console.print(f"  - {finding.text}")
-        if len(one.findings) > MOST_SENTENCES:
-            console.print(f"  and {len(one.findings) - MOST_SENTENCES} weaker ones (--json and --html have all)")
+        for trend in one.trends[:MOST_SENTENCES]:
+            console.print(f"  - {trend.text}")
+        if len(one.trends) > MOST_SENTENCES:
+            console.print(f"  and {len(one.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
         rows = one.aligned.recording.row[one.outlier].tolist()
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.stats import f
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.outliers import find_replicates
 from compd.comparison.robust import robust_sigma
 
@@ -36,7 +36,7 @@ class NoiseFloor:
     @property
     def um(self) -> float:
         """Per coordinate, over all axes."""
-        return float(np.sqrt(np.mean(self.by_axis_um**2)))
+        return rms(self.by_axis_um)
 
 
 class Scatter(NamedTuple):
@@ -84,25 +84,21 @@ def noise_floor(
     if scatter is not None and (scatter.by_axis_um > 0).all():
         return _from_repeats(scatter, expected_um if known else None)
     if known:
-        gauges = "" if np.isnan(gauges_um).any() else f" with the gauges' {_rms(gauges_um):.3g} um at the tip"
-        how = f"declared: the reference's {_rms(declared_um):.3g} um{gauges}; no visit is repeated, so nothing tests it"
+        gauges = "" if np.isnan(gauges_um).any() else f" with the gauges' {rms(gauges_um):.3g} um at the tip"
+        how = f"declared: the reference's {rms(declared_um):.3g} um{gauges}; no visit is repeated, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
     return _estimate(residual_um[use], tuple(order[use] for order in orders))
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _from_repeats(scatter: Scatter, expected_um: FloatArray | None) -> NoiseFloor:
     """The repeats; a declaration that they do not contradict counts along, as measurements of its own."""
     axes = len(scatter.by_axis_um)
-    found = f"repeats of one visit scatter by {_rms(scatter.by_axis_um):.3g} um ({scatter.dof} repeats)"
+    found = f"repeats of one visit scatter by {rms(scatter.by_axis_um):.3g} um ({scatter.dof} repeats)"
     if scatter.gross_visits:
         found += f", {scatter.gross_visits} visits with a gross row left out"
     if expected_um is None:
         return NoiseFloor(scatter.by_axis_um, "repeats", found, float(scatter.dof * axes))
-    declared = f"declared noise of {_rms(expected_um):.3g} um"
+    declared = f"declared noise of {rms(expected_um):.3g} um"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
     chance = float(f.cdf(ratio, scatter.dof * axes, DECLARED_DOF * axes))
     if min(chance, 1 - chance) < CONTRADICTION / 2:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as t_distribution
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import cluster_std, neighbour_blocks
 from compd.comparison.covariates import Covariate, covariates
@@ -112,7 +112,7 @@ def find_trends(
     coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(aligned.labels)]
     if links_um is not None:
         # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
-        ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(_rms(residual_um[used]), 1e-12)
+        ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
     all_covariates = covariates(aligned)
     block = neighbour_blocks(aligned.recording)
@@ -250,14 +250,10 @@ def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray) 
         if rows.sum() < FEWEST_ROWS_OF_ENDS or np.ptp(place[rows]) == 0:
             continue
         low, high = np.quantile(place[rows], [1 / 3, 2 / 3])
-        rms_um = [_rms(values[rows & (place <= low)]), _rms(values[rows & (place >= high)])]
+        rms_um = [rms(values[rows & (place <= low)]), rms(values[rows & (place >= high)])]
         for end, other in ((0, 1), (1, 0)):
             ratio = rms_um[end] / max(rms_um[other], 1e-12)
             if ratio > largest:
                 largest = ratio
                 text = f"{ENDS[name][end]} ({rms_um[end]:.2g} um rms, {rms_um[other]:.2g} um at the other end)"
     return text
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -28,7 +28,7 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
     labels = list(dict.fromkeys(label for one in comparisons for label in one.aligned.labels))
     rows += [[f"{label}: rms / 95 % / largest", *(_axis(one, label) for one in comparisons)] for label in labels]
     rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(one) for one in comparisons)])
-    sources = list(dict.fromkeys(name for one in comparisons for name in one.sources))
+    sources = list(dict.fromkeys(name for one in comparisons for name in one.contributions))
     rows += [[f"rms without {name}", *(_without(one, name) for one in comparisons)] for name in sources]
     rows += [
         ["prediction's own uncertainty", *(_uncertainty(one) for one in comparisons)],
@@ -128,7 +128,7 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in found if name not in placed]
     vectors, enlarged = arrows(one)
-    said = [finding.text for finding in one.findings] or [nothing_found(one)]
+    said = [finding.text for finding in one.trends] or [nothing_found(one)]
     sentences = PageTable(("",), [[text] for text in said])
     panels = [
         Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
@@ -193,7 +193,7 @@ def _distance(one: Comparison) -> str:
 
 
 def _without(one: Comparison, name: str) -> str:
-    return f"{one.sources[name].without_rms_um:.3g} um" if name in one.sources else "-"
+    return f"{one.contributions[name].without_rms_um:.3g} um" if name in one.contributions else "-"
 
 
 def _uncertainty(one: Comparison) -> str:
