@@ -10,7 +10,7 @@ import yaml
 from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import Covariate, covariates
+from compd.comparison.covariates import Covariate, covariates
 from compd.diagnosis.empirical_search import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, in_um
