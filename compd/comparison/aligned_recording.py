@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.registration import Registration, free_motion, register
+from compd.comparison.registration import Registration, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
@@ -81,11 +81,11 @@ class AlignedRecording:
         return (found.link_length if self.of_links else found.tip)[:, list(self.axes)]
 
     @cached_property
-    def free_columns(self) -> FloatArray:
+    def registration_columns(self) -> FloatArray:
         """(N, m, 6 or fewer; 0 for a reference in {M}) columns of the instrument's frame."""
         if not self.registered:
             return np.zeros((*self.measured_mm.shape, 0))
-        return free_motion(self.rows.tip_M_mm, self.axes)
+        return registration_columns(self.rows.tip_M_mm, self.axes)
 
     @cached_property
     def usable(self) -> tuple[BoolArray, Mapping[str, int]]:
@@ -149,7 +149,7 @@ def align_recording(recording: Recording, configuration: Configuration | None) -
     return AlignedRecording(recording, model, rows, recording.reference_axes, axes, measured, registration)
 
 
-def added_by(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
+def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
     """What each effect adds at its ports, by id, and all together.
 
     Raises CompdError with everything that the effects need and the recording has not.

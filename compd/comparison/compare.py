@@ -12,10 +12,11 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, added_by
+from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
-from compd.comparison.fit import free_motion_of
-from compd.comparison.noise_floor import NoiseFloor, noise_floor, outlier_rows, repeat_scatter
+from compd.comparison.fit import frame_motion_um
+from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
+from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, first_order, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
@@ -87,7 +88,10 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """The result in a sentence or two, for a person at the machine."""
-        who = f"{self.aligned.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um (rms per coordinate)"
+        who = (
+            f"{self.aligned.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um "
+            "(rms per coordinate)"
+        )
         if self.at_floor:
             return f"{who}, which is the noise of the measurement itself ({self.floor.um:.3g} um): nothing is missing."
         share = 1 - 1 / self.floor_ratio
@@ -172,7 +176,7 @@ def compare(
     covariance : (P, P) of the effects' numbers jointly; where None, from each effect's own.
     Raises CompdError where an effect needs what the recording has not, RecordingError where too few rows are usable.
     """
-    by_effect, added = added_by(fitted, aligned.rows)
+    by_effect, added = effect_deltas(fitted, aligned.rows)
     usable, left = aligned.usable
     predicted_mm = aligned.predicted_mm(added)
     known = usable & np.isfinite(predicted_mm).all(axis=1)
@@ -231,7 +235,7 @@ def _without_frame(
     outlier = np.zeros(len(known), dtype=bool)
     left_um = residual_um
     for _ in range(3):  # a gross row bends the frame a little, and the frame decides which row is gross
-        left_um = residual_um - free_motion_of(aligned, residual_um, known & ~outlier)
+        left_um = residual_um - frame_motion_um(aligned, residual_um, known & ~outlier)
         found = outlier_rows(left_um, known, aligned.recording.visit)
         if (found == outlier).all():
             break

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import free_motion_of
+from compd.comparison.fit import frame_motion_um
 from compd.model.effect import Deltas, sum_deltas
 from compd.units import UM_PER_MM
 
@@ -43,7 +43,7 @@ def contributions(
         without_mm = aligned.predicted_mm(added)
         good = used & np.isfinite(without_mm).all(axis=1)
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
-        residual_um = residual_um - free_motion_of(aligned, residual_um, good)
+        residual_um = residual_um - frame_motion_um(aligned, residual_um, good)
         found[name] = Contribution(_rms(((predicted_mm - without_mm) * UM_PER_MM)[good]), _rms(residual_um[good]))
     return found
 

@@ -9,11 +9,9 @@ import numpy as np
 from scipy.stats import f
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.outliers import find_replicates
+from compd.comparison.robust import robust_sigma
 
-# Beyond five standard deviations a normal error comes once in two million: it is no noise.
-OUTLIER_SIGMAS = 5.0
-# Median of |x| and its 95 % point, of a normal distribution with standard deviation 1.
-_MEDIAN, _P95 = 0.674490, 1.959964
 # A declared uncertainty is taken to be right within 5 %, which counts as so many measurements (GUM, G.4.2:
 # 1 / (2 x 0.05^2)). Repeats that contradict it overrule it: a hundred of them do where it is wrong by a fifth.
 DECLARED_DOF = 200.0
@@ -49,79 +47,15 @@ class Scatter(NamedTuple):
     gross_visits: int
 
 
-def robust_sigma(values: FloatArray) -> FloatArray:
-    """(m,) standard deviation of (N, m) values about zero that a few per cent of gross rows do not move.
-
-    The larger of two: from the median of |x| (the MAD), and from its 95 % point. Where the model lacks an effect that
-    acts on few rows, the median alone would call them gross; rounded values can have a median of zero.
-    """
-    size = np.abs(values)
-    return np.asarray(np.maximum(np.median(size, axis=0) / _MEDIAN, np.quantile(size, 0.95, axis=0) / _P95))
-
-
-def outlier_rows(residual_um: FloatArray, use: BoolArray, visit: IntArray | None = None) -> BoolArray:
-    """(N,) rows of `use` with a coordinate of residual_um (N, m) beyond GROSS robust standard deviations.
-
-    A row whose visit was repeated and found the same is not gross: the machine really was there.
-    """
-    found = np.zeros(len(residual_um), dtype=bool)
-    if use.sum() < 5:
-        return found
-    middle = np.median(residual_um[use], axis=0)
-    far = np.abs(residual_um - middle) > OUTLIER_SIGMAS * np.maximum(robust_sigma(residual_um[use] - middle), 1e-9)
-    found = use & np.where(np.isfinite(residual_um), far, False).any(axis=1)
-    if visit is None or not found.any():
-        return found
-    return found & ~_confirmed(residual_um, use, found, visit)
-
-
-def _confirmed(residual_um: FloatArray, use: BoolArray, found: BoolArray, visit: IntArray) -> BoolArray:
-    """(N,) rows of `found` that another row of the same visit repeats within the scatter of repeats."""
-    repeats = _repeats(residual_um, use, visit)
-    confirmed = np.zeros(len(found), dtype=bool)
-    if repeats is not None:
-        confirmed[repeats.rows] = ~repeats.gross
-    return confirmed & found
-
-
-class _Repeats(NamedTuple):
-    """Rows in visits of two or more: deviation_um (R, m) from the visit's mean, scaled to the variance of one row."""
-
-    rows: IntArray
-    visit: IntArray
-    size: IntArray
-    deviation_um: FloatArray
-
-    @property
-    def gross(self) -> BoolArray:
-        """(R,) beyond all noise of repeats."""
-        limit_um = OUTLIER_SIGMAS * np.maximum(robust_sigma(self.deviation_um), 1e-9)
-        return np.asarray((np.abs(self.deviation_um) > limit_um).any(axis=1))
-
-
-def _repeats(residual_um: FloatArray, use: BoolArray, visit: IntArray) -> _Repeats | None:
-    """None where no visit of `use` is repeated."""
-    rows = np.flatnonzero(use & (visit >= 0) & np.isfinite(residual_um).all(axis=1))
-    _, group, count = np.unique(visit[rows], return_inverse=True, return_counts=True)
-    if not len(rows) or count.max() < 2:
-        return None
-    sums = np.stack([np.bincount(group, axis) for axis in residual_um[rows].T], axis=1)
-    size = count[group]
-    deviation_um = residual_um[rows] - (sums / count[:, None])[group]
-    repeated = size > 1
-    scale = np.sqrt(size[repeated] / (size[repeated] - 1.0))
-    return _Repeats(rows[repeated], group[repeated], size[repeated], deviation_um[repeated] * scale[:, None])
-
-
 def repeat_scatter(residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> Scatter | None:
     """Pure error: scatter of residual_um (N, m) within visits, pooled; None where no visit of `use` is repeated.
 
     Of the residual, not of the reference: what the model follows between two repeats does not count.
     """
-    repeats = None if visit is None else _repeats(residual_um, use, visit)
+    repeats = None if visit is None else find_replicates(residual_um, use, visit)
     if repeats is None:
         return None
-    gross = np.unique(repeats.visit[repeats.gross])
+    gross = np.unique(repeats.visit[repeats.outlier])
     kept = ~np.isin(repeats.visit, gross)
     if not kept.any():
         return None

@@ -11,7 +11,7 @@ from scipy.stats import t as t_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import blocks_of
+from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.noise_floor import NoiseFloor
 from compd.units import unit_of
 
@@ -134,7 +134,7 @@ def find_trends(
         )
         coordinates += [(f"link {i + 1}", column, float(share[i] * floor.um)) for i, column in enumerate(links_um.T)]
     all_covariates = covariates(aligned)
-    group = blocks_of(aligned.recording)
+    group = neighbour_blocks(aligned.recording)
     looks = len(coordinates) * len(all_covariates)
     found: list[tuple[float, Trend]] = []
     for label, values, floor_um in coordinates:

@@ -9,8 +9,8 @@ from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult, fit, start
-from compd.comparison.noise_floor import OUTLIER_SIGMAS
+from compd.comparison.fit import FitResult, fit, initial_effect
+from compd.comparison.outliers import OUTLIER_SIGMAS
 from compd.model.effect import Effect, FittedEffect, Shape
 
 # A searched constant is known well enough when it moves the error by less than its own standard error: 1 % is.
@@ -28,12 +28,12 @@ def search_constants(
     links = aligned.rows.links
     shapes = effect.shapes(aligned.rows)
     if len(shapes) == 1:
-        return fit(aligned, [*model, start(effect, shapes[0], links)], sigma_um)
+        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um)
     without = fit(aligned, model, sigma_um)
     limit = (OUTLIER_SIGMAS * without.rms_um) ** 2
 
     def tried(shape: Shape) -> tuple[float, FitResult]:
-        found = fit(aligned, [*model, start(effect, shape, links)], sigma_um)
+        found = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um)
         known = np.isfinite(found.residual_um).all(axis=1)
         # gross rows count as much as a gross row can, whichever each fit calls so
         return float(np.mean(np.minimum(found.residual_um[known] ** 2, limit))), found

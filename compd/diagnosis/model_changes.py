@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison, compare
-from compd.comparison.fit import FitResult, fit, start
+from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.unmodelled import with_disturbances
@@ -95,7 +95,7 @@ def undo(stored: Stored, date: str, where: str) -> Stored:
 
 
 def _afresh(one: FittedEffect, links: int) -> FittedEffect:
-    return start(one.effect, one.shape, links)
+    return initial_effect(one.effect, one.shape, links)
 
 
 def _change(

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.noise_floor import outlier_rows, robust_sigma
+from compd.comparison.outliers import outlier_rows
+from compd.comparison.robust import robust_sigma
 
 ROUNDS = 12
 # Huber's constant, as in `fit`.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import Comparison
-from compd.comparison.fit import blocks_of
 from compd.diagnosis.candidates import Candidate, Pool
 from compd.diagnosis.cross_validation import schemes
 from compd.diagnosis.outlier_screening import outliers
@@ -46,7 +46,7 @@ class DiagnosisProblem:
         self.evidence = Evidence(
             self._y[self.rows],
             tuple(_numbered(scheme[self.rows]) for scheme in schemes(aligned)),
-            _numbered(blocks_of(aligned.recording)[self.rows]),
+            _numbered(neighbour_blocks(aligned.recording)[self.rows]),
             Block(always[self.rows], np.full(always.shape[2], np.inf)),
         )
         self.values = [self.whiten(one.columns_um) for one in pool.candidates]
@@ -76,7 +76,7 @@ def _always_um(before: Comparison) -> FloatArray:
     aligned = before.aligned
     own: Sequence[FittedEffect] = before.fitted
     columns = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in own]
-    return np.concatenate([*columns, aligned.free_columns * UM_PER_MM], axis=2)
+    return np.concatenate([*columns, aligned.registration_columns * UM_PER_MM], axis=2)
 
 
 def _numbered(values: IntArray) -> IntArray:

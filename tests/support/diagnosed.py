@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, added_by, align_recording
+from compd.comparison.aligned_recording import AlignedRecording, align_recording, effect_deltas
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
@@ -86,7 +86,7 @@ def recorded(
     write_recording(path, columns | reference, SIDECAR, overwrite=True)
     aligned = align_recording(read_recording(path, configuration), configuration)
     fitted = [FittedEffect(LIBRARY[name], np.array(theta), dict(_shape(name))) for name, theta in effects.items()]
-    _, added = added_by(fitted, aligned.rows)
+    _, added = effect_deltas(fitted, aligned.rows)
     tip_mm = aligned.predicted_mm(added) + 1e-3 * (extra_um + NOISE_UM * rng.standard_normal((count, 3)))
     tip_mm[12 : 12 + 20 * outliers : 20] += 6e-3
     for axis, values in zip("xyz", tip_mm.T, strict=True):

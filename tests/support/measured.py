@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.comparison.aligned_recording import AlignedRecording, added_by, align_recording
+from compd.comparison.aligned_recording import AlignedRecording, align_recording, effect_deltas
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
@@ -103,7 +103,7 @@ def tips_mm(
 ) -> Floats:
     """(N, 3) where a perfect reference sees the tip."""
     aligned = _blank(directory, columns, configuration, machine)
-    _, added = added_by(effects, aligned.rows)
+    _, added = effect_deltas(effects, aligned.rows)
     return aligned.predicted_mm(added)
 
 

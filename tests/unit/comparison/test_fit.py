@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.comparison.aligned_recording import AlignedRecording, added_by
+from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.compare import compare
-from compd.comparison.fit import fit, start
+from compd.comparison.fit import fit, initial_effect
 from compd.comparison.prediction_uncertainty import first_order, gauge_noise, monte_carlo
 from compd.comparison.shape_search import search_constants
 from compd.errors import CompdError
@@ -31,7 +31,7 @@ def blank(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
 
 def measured(blank: AlignedRecording, effects: list[FittedEffect], noise_um: Floats) -> AlignedRecording:
     """The same gauges, with these effects and this noise in the reference."""
-    _, added = added_by(effects, blank.rows)
+    _, added = effect_deltas(effects, blank.rows)
     return replace(blank, measured_mm=blank.predicted_mm(added) + noise_um / 1e3)
 
 
@@ -40,7 +40,7 @@ def white(blank: AlignedRecording, seed: int) -> Floats:
 
 
 def fresh(*effects: str) -> list[FittedEffect]:
-    return [start(LIBRARY[one], {}, 3) for one in effects]
+    return [initial_effect(LIBRARY[one], {}, 3) for one in effects]
 
 
 @pytest.mark.parametrize(

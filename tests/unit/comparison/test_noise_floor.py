@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.comparison.noise_floor import noise_floor, outlier_rows, repeat_scatter
+from compd.comparison.noise_floor import noise_floor, repeat_scatter
+from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import gauge_noise
 from tests.support.measured import GAUGE_SIGMA_UM, aligned, gauges, record
 

@@ -10,7 +10,7 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import fit, start
+from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.cross_validation import SECTORS, schemes
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.regression import Block, Evidence, sums
@@ -84,7 +84,7 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     assert first["note"] == "a description, not a cause"
     effect = find(first["formula_effect"], "pasted")
     aligned = found.before.aligned
-    result = fit(aligned, [start(effect, {}, aligned.rows.links)], found.before.floor.by_axis_um)
+    result = fit(aligned, [initial_effect(effect, {}, aligned.rows.links)], found.before.floor.by_axis_um)
     assert result.rms_um < 1.1 * found.before.floor.um
     slope = dict(zip((name.split(".")[1] for name in result.names), result.fitted[0].theta, strict=True))["k"]
     assert slope == pytest.approx(0.05, abs=0.004)
