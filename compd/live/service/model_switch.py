@@ -17,11 +17,11 @@ _log = structlog.get_logger()
 
 
 class ModelSwitch:
-    """Takes one order at a time, and is the only writer of `orders.models`: neither loop nor publisher waits."""
+    """Takes one order at a time, and is the only writer of `commands.models`: neither loop nor publisher waits."""
 
-    def __init__(self, shelf: ModelLoader, orders: Commands) -> None:
-        self._shelf = shelf
-        self._orders = orders
+    def __init__(self, loader: ModelLoader, commands: Commands) -> None:
+        self._loader = loader
+        self._commands = commands
         self._errand = BackgroundJob("model", "another model is being read")
 
     def take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
@@ -35,20 +35,20 @@ class ModelSwitch:
     def _taken(self, order: ModelOrder) -> bytes:
         """Do it; the MODEL or ERROR line."""
         try:
-            model = self._shelf.read(Path(order.file)) if order.file else None
+            model = self._loader.read(Path(order.file)) if order.file else None
         except CompdError as error:
             _log.warning("model refused", file=order.file, reason=str(error))
             return ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json()
         models = self._changed(order, model)
-        self._orders.models = models
+        self._commands.models = models
         _log.info("shadow" if order.shadow else "model adopted", file=order.file or "none")
         return line({"class": "MODEL", **models.summary})
 
     def _changed(self, order: ModelOrder, model: LiveModel | None) -> Models:
-        applied, shadow = self._orders.models or Models(self._shelf.bare)
+        applied, shadow = self._commands.models or Models(self._loader.without_effects)
         if order.shadow:
             return Models(applied, model)
         if model is not None and shadow is not None and model.hash == shadow.hash:
             # the very object that ran as a shadow: its effects keep what they remember
             return Models(shadow)
-        return Models(model or self._shelf.bare, shadow)
+        return Models(model or self._loader.without_effects, shadow)

@@ -26,9 +26,12 @@ from compd.readings import Snapshot
 
 
 class RecordedCycle(NamedTuple):
-    """One READINGS message: the tick, what went in, and the SETPOINT line that came out."""
+    """One READINGS message: the state and inputs of a cycle, and the SETPOINT line that came out.
 
-    tick: int
+    The models are None in both: the message has their hashes only.
+    """
+
+    state: CycleState
     inputs: CycleInputs
     setpoint_line: bytes
 
@@ -43,8 +46,9 @@ class ReadingsMessage:
 
     def line(self, setpoint: Setpoint) -> bytes:
         """The READINGS line of the cycle that made `setpoint`, with its newline."""
-        inputs = setpoint.inputs
+        inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
+        assert state is not None, "and its state"
         message: dict[str, Any] = {
             "class": "READINGS",
             "seq": setpoint.seq,
@@ -64,7 +68,7 @@ class ReadingsMessage:
             message |= inputs.models.hashes
             if files := inputs.models.files:
                 message["model_files"] = files
-        message["carried"] = _carried(inputs)
+        message["carried"] = _carried(state, inputs)
         return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
 
 
@@ -99,12 +103,12 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
     zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
     target = message.get("target")
     inputs = CycleInputs(
+        message["seq"],
         Snapshot(message["time_s"], readings),
         zero,
         None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
-        _parsed_carried(message["carried"], zero),
     )
-    return RecordedCycle(message["seq"], inputs, line(message["setpoint"]))
+    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
 
 
 def _reading(reading: Reading) -> dict[str, Any]:
@@ -128,12 +132,11 @@ def _target(target: Target) -> dict[str, Any]:
     return found
 
 
-def _carried(inputs: CycleInputs) -> Any:
-    """What was carried over; of its zero only whether it is this cycle's, since of another nothing is used."""
-    carried = inputs.carried
-    return to_plain(carried._replace(zero=None)) | {"zero": carried.zero is inputs.zero}
+def _carried(state: CycleState, inputs: CycleInputs) -> Any:
+    """The state; of its zero only whether it is that of the inputs, since nothing of another one is used."""
+    return to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
 
 
 def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> CycleState:
-    carried: CycleState = from_plain(data)
-    return carried._replace(zero=zero if carried.zero and isinstance(zero, MachineZero) else None)
+    state: CycleState = from_plain(data)
+    return state._replace(zero=zero if state.zero and isinstance(zero, MachineZero) else None)

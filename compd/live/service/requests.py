@@ -34,7 +34,7 @@ class Requests:
         self,
         version: Mapping[str, Any],
         target_keys: TargetKeys,
-        orders: Commands,
+        commands: Commands,
         status: Callable[[], Mapping[str, Any]],
         take_zero: TakeZero,
         transcript: ReadingsMessage | None = None,
@@ -46,7 +46,7 @@ class Requests:
         """
         self.version = line(version)
         self._target_keys = target_keys
-        self._orders = orders
+        self._commands = commands
         self._status = status
         self._take_zero = take_zero
         self._transcript = transcript
@@ -67,7 +67,7 @@ class Requests:
                 if self._controller not in {None, session}:
                     raise ProtocolError(ErrorCode.ROLE_TAKEN, "another client is the controller")
                 self._controller = session
-                self._orders.target = target
+                self._commands.target = target
                 return b""
             case "RELEASE":
                 parse_bare(message)
@@ -113,7 +113,7 @@ class Requests:
             # an order names a file of this computer, and so does the answer
             raise ProtocolError(ErrorCode.UNIX_ONLY, "models are asked for and adopted over the Unix socket only")
         if order is None:
-            models = self._orders.models
+            models = self._commands.models
             return line({"class": "MODEL", **({} if models is None else models.summary)})
         self._take_model(order, later)
         return b""
@@ -122,7 +122,7 @@ class Requests:
         """A client has gone or gives its role back: without a controller the mode is CMM."""
         if self._controller is session:
             self._controller = None
-            self._orders.target = None
+            self._commands.target = None
 
     @property
     def controlled(self) -> bool:
