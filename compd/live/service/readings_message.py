@@ -30,12 +30,14 @@ class RecordedCycle(NamedTuple):
 
     Attributes
     ----------
-    tick : number of the cycle.
+    state : what the cycle before left.
     inputs : what the cycle computed from.
     setpoint_line : the SETPOINT line that it made, with its newline.
+
+    The models are None in both: the message has their hashes only.
     """
 
-    tick: int
+    state: CycleState
     inputs: CycleInputs
     setpoint_line: bytes
 
@@ -50,12 +52,10 @@ class ReadingsMessage:
         self._directions = directions
 
     def line(self, setpoint: Setpoint) -> bytes:
-        """The READINGS line of the cycle that made `setpoint`, with its newline.
-
-        Called with the setpoints of a run in order, since the direction of travel is that of the newest cycle.
-        """
-        inputs = setpoint.inputs
+        """The READINGS line of the cycle that made `setpoint`, with its newline."""
+        inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
+        assert state is not None, "and its state"
         message: dict[str, Any] = {
             "class": "READINGS",
             "seq": setpoint.seq,
@@ -75,7 +75,7 @@ class ReadingsMessage:
             message |= inputs.models.hashes
             if files := inputs.models.files:
                 message["model_files"] = files
-        message["carried"] = _carried(inputs)
+        message["carried"] = _carried(state, inputs)
         return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
 
 
@@ -105,12 +105,12 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
     zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
     target = message.get("target")
     inputs = CycleInputs(
+        message["seq"],
         Snapshot(message["time_s"], readings),
         zero,
         None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
-        _parsed_carried(message["carried"], zero),
     )
-    return RecordedCycle(message["seq"], inputs, line(message["setpoint"]))
+    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
 
 
 def _reading(reading: Reading) -> dict[str, Any]:
@@ -134,15 +134,14 @@ def _target(target: Target) -> dict[str, Any]:
     return tip | {"rotation_B0_rad": target.rotation_B0_rad}
 
 
-def _carried(inputs: CycleInputs) -> Any:
+def _carried(state: CycleState, inputs: CycleInputs) -> Any:
     """The state from the cycle before, as plain data.
 
     Of its machine zero only whether it is this cycle's own: a cycle uses nothing that was computed with another.
     """
-    carried = inputs.carried
-    return to_plain(carried._replace(zero=None)) | {"zero": carried.zero is inputs.zero}
+    return to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
 
 
 def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> CycleState:
-    carried: CycleState = from_plain(data)
-    return carried._replace(zero=zero if carried.zero and isinstance(zero, MachineZero) else None)
+    state: CycleState = from_plain(data)
+    return state._replace(zero=zero if state.zero and isinstance(zero, MachineZero) else None)

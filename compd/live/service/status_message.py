@@ -27,7 +27,7 @@ class StatusReport:
     Attributes
     ----------
     version : the VERSION message, whose keys STATUS repeats.
-    orders, latest, wires, loop, publisher : the daemon's own.
+    commands, latest, wires, loop, publisher : the daemon's own.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
     """
@@ -36,7 +36,7 @@ class StatusReport:
     configuration: Configuration
     latest: Latest
     wires: MachineWires
-    orders: Commands
+    commands: Commands
     loop: Loop
     publisher: Publisher
     packets: UdpSender | None
@@ -53,7 +53,7 @@ class StatusReport:
             **self.version,
             "class": "STATUS",
             "time_s": round(now_s, 6),
-            "mode": "cmm" if self.orders.target is None else "machine_tool",
+            "mode": "cmm" if self.commands.target is None else "machine_tool",
             "zero": self._zero(),
             "model": self._model(),
             "loop": self.loop.timing.summary(),
@@ -66,14 +66,14 @@ class StatusReport:
         return known
 
     def _zero(self) -> dict[str, Any]:
-        zero = self.orders.zero
+        zero = self.commands.zero
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
         return {"taken": True, "taken_at": zero.taken_at}
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
-        summary = {} if self.orders.models is None else self.orders.models.summary
+        summary = {} if self.commands.models is None else self.commands.models.summary
         return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
