@@ -166,6 +166,7 @@ class Gauge(ABC, Generic[LineT]):
     sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver.
     sample_range : what the gauge can show with these options, in its channels' unit.
     usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
+    about : what the device speaks and where that was read; "" where the module's docstring says it.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
@@ -174,6 +175,7 @@ class Gauge(ABC, Generic[LineT]):
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
     usual_line: ClassVar[tuple[int, str] | None] = None
+    about: ClassVar[str] = ""
 
     def __init__(self, options: Any) -> None:
         """`options` is an instance of this class's `Options`."""

@@ -24,7 +24,6 @@ from compd.simulation.wires.modbus_slaves import Slaves
 from tests.support.paths import TESTS
 
 FILES = sorted((TESTS / "transcripts").glob("*.txt"))
-OVER_TCP = {"moxa_e1240"}
 GENERIC = {"modbus"}  # its map is tried in tests of its own; the presets on it have transcripts
 PATIENCE_S = 5.0
 
@@ -56,6 +55,7 @@ class Transcript:
     driver: str
     options: dict[str, Any]
     polls: list[Poll]
+    over_tcp: bool
 
 
 def octets(text: str) -> bytes:
@@ -68,6 +68,7 @@ def octets(text: str) -> bytes:
 def parse(path: Path) -> Transcript:
     """A transcript; ValueError names the line that is none."""
     options: dict[str, Any] = {}
+    over_tcp = False
     polls: list[Poll] = []
     ended = True
     for number, raw in enumerate(path.read_text(encoding="ascii").splitlines(), start=1):
@@ -76,6 +77,9 @@ def parse(path: Path) -> Transcript:
             continue
         if mark == "options":
             options = yaml.safe_load(rest)
+            continue
+        if mark == "line":
+            over_tcp = rest == "modbus_tcp"
             continue
         if mark in {">", "again"} and ended:
             polls.append(Poll(number))
@@ -97,7 +101,7 @@ def parse(path: Path) -> Transcript:
                 poll.fault = rest
             case _:
                 raise ValueError(f"{path.name}:{number}: {raw}")
-    return Transcript(path.name.split(".")[0], options, polls)
+    return Transcript(path.name.split(".")[0], options, polls, over_tcp)
 
 
 class ReplayedLine:
@@ -236,7 +240,7 @@ def tcp_line(transcript: Transcript) -> Iterator[ModbusTcp]:
 def test_replay(path: Path) -> None:
     transcript = parse(path)
     gauge, _ = gauge_of(transcript)
-    if transcript.driver in OVER_TCP:
+    if transcript.over_tcp:
         with tcp_line(transcript) as tcp:
             replay(gauge, tcp, transcript.polls, lambda poll: None)
         return
@@ -270,11 +274,11 @@ def test_the_simulated_device_says_the_same(path: Path) -> None:
             options, lambda name, seen=seen: seen.get(name, float("nan"))
         )
         if gauge.line_kind == "registers":
-            device = Slaves([device], over_tcp=transcript.driver in OVER_TCP)
+            device = Slaves([device], over_tcp=transcript.over_tcp)
         for exchange in marked:
             assert device.hear(exchange.sent) == exchange.received, f"line {poll.line}"
             tried += 1
-    assert tried or transcript.driver in {"icpdas_m7017c", "adam_4017p"}  # see test_presets_modbus: their steps
+    assert tried, "mark with <* what the simulated device answers"
 
 
 def test_every_driver_has_a_transcript() -> None:
