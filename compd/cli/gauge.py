@@ -30,21 +30,12 @@ def list_gauges() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
+    from compd.commissioning.catalogue import catalogue
 
-    simulated = set(names(SIMULATED_GAUGES))
     table = Table("driver", "line carries", "what it is", "options it needs", "simulated")
-    for name in names(GAUGES):
-        driver = load(GAUGES, name, name)
-        needs = [key for key, field in driver.Options.model_fields.items() if field.is_required()]
-        said = _first_line(driver)
-        table.add_row(
-            name,
-            driver.line_kind,
-            said,
-            ", ".join(key.rstrip("_") for key in needs if key not in ("driver", "line")),
-            "yes" if name in simulated else "no",
-        )
+    for entry in catalogue():
+        options = ", ".join(entry.needed_options)
+        table.add_row(entry.name, entry.line_kind, entry.title, options, "yes" if entry.simulated else "no")
     Console().print(table)
     typer.echo('An unknown gauge: `compd gauge learn`. README.md, "Add a gauge", says the rest.')
 
@@ -52,20 +43,19 @@ def list_gauges() -> None:
 @app.command()
 def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge list`.")]) -> None:
     """Show a driver: what it speaks, where that was read, an example, and every option."""
-    import inspect
-
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
-    from compd.plugins import GAUGES, load
+    from compd.commissioning.catalogue import driver_description
 
-    driver = load(GAUGES, name, name)
+    description = driver_description(name)
     console = Console()
-    console.print(inspect.getdoc(inspect.getmodule(driver)) or inspect.getdoc(driver) or "", markup=False)
+    console.print(description.text, markup=False)
     table = Table("option", "needed", "meaning", title="Options", title_justify="left")
-    for key, field in driver.Options.model_fields.items():
-        default = "yes" if field.is_required() else f"no: {field.get_default(call_default_factory=True)!r}"
-        table.add_row(field.alias or key, default, field.description or "")
+    for option in description.options:
+        needed = "yes" if option.needed else f"no: {option.default}"
+        table.add_row(option.name, escape(needed), escape(option.meaning))
     console.print(table)
 
 
@@ -236,13 +226,6 @@ def _target(
     if not port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
     return by_driver(target, TappedWire(port, baud, form, timeout_s), assignments or ())
-
-
-def _first_line(driver: Any) -> str:
-    import sys
-
-    module = sys.modules[driver.__module__].__doc__ or driver.__doc__ or ""
-    return module.strip().splitlines()[0] if module.strip() else ""
 
 
 def _shown(reading: Reading, unit: str) -> str:

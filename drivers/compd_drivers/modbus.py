@@ -27,6 +27,7 @@ from compd_drivers.linearisation import Linearisation
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Function = Literal[3, 4]
+RegisterType = Literal["int16", "uint16", "int32", "uint32", "float32"]
 # One less than Modbus allows: the RTU master wants to ask for one more.
 MOST_REGISTERS = 124
 
@@ -52,7 +53,7 @@ class ModbusChannel(BaseModel):
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     function: Function = Field(description="3: holding registers, 4: input registers")
     address: Address = Field(description="first register as on the wire, from 0")
-    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(description="how the number is stored")
+    type: RegisterType = Field(description="how the number is stored")
     word_order: Literal["high_first", "low_first"] = Field(
         default="high_first", description="of a number in two registers"
     )

@@ -1,7 +1,8 @@
 """Generic binary gauge: a request, and a reply of fixed length with a checksum, described in the configuration.
 
 `frame` is the reply byte by byte, as a manual draws it: hexadecimal bytes that are always so, `..` for a byte that
-may be anything, `CS` for each byte of the checksum. `at` counts from 0. Micro-Epsilon MSC7401, appendix 4.4.4:
+may be anything, `CS` for each byte of the checksum (in `out`, too, with an `out_checksum`). `at` counts from 0.
+Micro-Epsilon MSC7401, appendix 4.4.4:
 
     driver: serial_frame
     line: rs485
@@ -74,11 +75,18 @@ class FrameChecksum(BaseModel):
     )
     byte_order: Literal["little", "big"] = Field(default="little", description="of a checksum of two bytes")
 
-    def fits(self, data: bytes, place: slice) -> bool:
-        """Whether the bytes at `place` are the checksum of what it covers."""
-        said = data[place]
-        made = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
-        return said == (made if self.byte_order == "little" else made[::-1])
+    def of(self, data: bytes, place: slice) -> bytes:
+        """The checksum that belongs at `place` of `data`."""
+        checksum = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
+        return checksum if self.byte_order == "little" else checksum[::-1]
+
+    def check(self, frame: Frame, key: str) -> None:
+        """ValueError where `frame`, the option `key`, has no place for this checksum."""
+        length = frame.checksum.stop - frame.checksum.start
+        if length != CHECKSUMS[self.kind].length:
+            raise ValueError(f"`{key}` has {length} bytes CS, its checksum makes {CHECKSUMS[self.kind].length}")
+        if not self.first < (self.end or frame.checksum.start) <= len(frame.fixed):
+            raise ValueError(f"the checksum of `{key}` covers nothing: see `first` and `end`")
 
 
 class FrameChannel(MeasuredChannel):
@@ -117,6 +125,9 @@ class SerialFrameOptions(ExchangeOptions):
     """Options of a described binary gauge."""
 
     out: str = Field(min_length=2, description="the request in hexadecimal bytes, its checksum included")
+    out_checksum: FrameChecksum | None = Field(
+        default=None, description="how `CS` in `out` is made, where it is not written out"
+    )
     frame: str = Field(min_length=2, description="the reply: hexadecimal bytes, `..` for any, `CS` for the checksum")
     checksum: FrameChecksum | None = Field(default=None, description="how `CS` is made")
     channels: tuple[FrameChannel, ...] = Field(min_length=1)
@@ -126,15 +137,16 @@ class SerialFrameOptions(ExchangeOptions):
     def _whole(self) -> Self:
         if doubled := twice([channel.name for channel in self.channels]):
             raise ValueError(f"channel named twice: {doubled}")
-        bytes.fromhex(self.out)
+        if self.out_checksum is None:
+            bytes.fromhex(self.out)
+        else:
+            self.out_checksum.check(Frame.of(self.out), "out")
         frame = Frame.of(self.frame)
-        place = frame.checksum
-        needed = CHECKSUMS[self.checksum.kind].length if self.checksum else 0
-        if place.stop - place.start != needed:
-            raise ValueError(f"`frame` has {place.stop - place.start} bytes CS, `checksum` makes {needed}")
-        if self.checksum and not self.checksum.first < (self.checksum.end or place.start) <= len(frame.fixed):
-            raise ValueError("`checksum` covers nothing: see `first` and `end`")
-        if not self.checksum and sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
+        if self.checksum is not None:
+            self.checksum.check(frame, "frame")
+        elif frame.checksum.stop:
+            raise ValueError("`frame` has bytes CS, `checksum` must say how they are made")
+        elif sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
             raise ValueError(f"a frame without a checksum needs {FEWEST_FIXED_BYTES} fixed bytes to be known by")
         for channel in self.channels:
             if channel.at + channel.length > len(frame.fixed):
@@ -146,6 +158,16 @@ class SerialFrameOptions(ExchangeOptions):
             if all(None in (a, b) or a == b for a, b in zip(short, frame.fixed, strict=False)):
                 raise ValueError(f"error {error.frame!r} could be the beginning of a reply")
         return self
+
+    @property
+    def request(self) -> bytes:
+        """What is sent, its checksum included."""
+        if self.out_checksum is None:
+            return bytes.fromhex(self.out)
+        frame = Frame.of(self.out)
+        request = bytes(byte or 0 for byte in frame.fixed)
+        checksum = self.out_checksum.of(request, frame.checksum)
+        return request[: frame.checksum.start] + checksum + request[frame.checksum.stop :]
 
 
 class SerialFrame(Gauge[ByteLine]):
@@ -174,7 +196,7 @@ class SerialFrame(Gauge[ByteLine]):
     def __init__(self, options: SerialFrameOptions) -> None:
         super().__init__(options)
         self._said = options
-        self._request = bytes.fromhex(options.out)
+        self._request = options.request
         self._frame = Frame.of(options.frame)
         self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
         self._channels = tuple(channel.channel for channel in options.channels)
@@ -200,7 +222,8 @@ class SerialFrame(Gauge[ByteLine]):
         if error is not None:
             detail = f"{data.hex(' ')}: {error.says}" if error.says else data.hex(" ")
             return [bad(time_s, Quality(error.quality), detail)] * len(self._channels)
-        if self._said.checksum and not self._said.checksum.fits(data, self._frame.checksum):
+        place = self._frame.checksum
+        if self._said.checksum and data[place] != self._said.checksum.of(data, place):
             raise LineFault(Quality.CRC, data.hex(" "))
         if not self._frame.fits(data):
             raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._said.frame}")

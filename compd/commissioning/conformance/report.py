@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -39,8 +40,9 @@ class Driver:
     @property
     def error_replies(self) -> Mapping[bytes, Quality]:
         """Whole replies by which the device says that something is wrong, as its simulator names them."""
-        found = getattr(self.simulator, "error_replies", {})
-        return {reply: Quality(quality) for reply, quality in found.items()}
+        device = self.simulator(self.options, lambda channel: math.nan)
+        replies = getattr(device, "error_replies", {})
+        return {reply: Quality(quality) for reply, quality in replies.items()}
 
     def kinds(self) -> tuple[Kind, ...]:
         """The lines that it can hang on."""

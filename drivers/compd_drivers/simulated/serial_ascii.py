@@ -40,6 +40,12 @@ class SimulatedAscii(SimulatedByteDevice):
             self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
         self._heard = b""
 
+    @property
+    def error_replies(self) -> dict[bytes, str]:
+        """Each described error as it goes over the wire, and the quality that it means."""
+        end = plain(self.options.in_terminator)
+        return {(self._printed(error.in_, {}) + end).encode("latin-1"): error.quality for error in self.options.errors}
+
     def hear(self, data: bytes) -> bytes:
         self._heard += data
         replies = ""
@@ -67,10 +73,16 @@ class SimulatedAscii(SimulatedByteDevice):
             if not math.isfinite(value):
                 word = next((word for word, meant in channel.instead.items() if meant == "sensor_fault"), None)
                 if word is None:
-                    error = next((one.in_ for one in self.options.errors if one.quality == "sensor_fault"), None)
-                    return self._printed(error, {}) + end if error is not None else ""
+                    error = self._error_of("sensor_fault") or self._error_of("device_error")
+                    return self._printed(error, {}) + end if error else ""
                 words[channel.name] = plain(word)
+            elif (error := self._error_of("over_range")) and _beyond(channel, value):
+                return self._printed(error, {}) + end
         return self._printed(form, words) + end
+
+    def _error_of(self, quality: str) -> str:
+        """The first error reply of this meaning; "" if the description has none."""
+        return next((error.in_ for error in self.options.errors if error.quality == quality), "")
 
     def _printed(self, form: str, words: dict[str, str]) -> str:
         """`form` with numbers, blanks for what the driver skips, and checksums."""
@@ -107,7 +119,14 @@ class SimulatedAscii(SimulatedByteDevice):
             case unit:
                 value /= MM_IN.get(unit, OTHER.get(unit, 1.0))
         value = value / channel.scale * 10**channel.decimals
-        return str(form % (round(value) if form[-1] in "dx" else value))
+        text = str(form % (round(value) if form[-1] in "dx" else value))
+        width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)
+        # an exact width without room for the zero before the point: -.050000
+        return text.replace("0.", ".", 1) if 0 < width < len(text) and abs(value) < 1 else text
+
+
+def _beyond(channel: Any, value: float) -> bool:
+    return channel.range is not None and not channel.range[0] <= value <= channel.range[1]
 
 
 def checksum(kind: str, data: bytes, hexadecimal: bool) -> str:
