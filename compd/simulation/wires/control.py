@@ -24,7 +24,7 @@ from typing import Any
 
 from compd.errors import CompdError
 
-MOST_BYTES = 4096  # of one request
+LONGEST_REQUEST = 4096  # bytes
 Answer = Mapping[str, Any]
 Handler = Callable[[Mapping[str, Any]], Answer]
 
@@ -40,7 +40,7 @@ class _Client(socketserver.StreamRequestHandler):
 
     def handle(self) -> None:
         try:
-            while line := self.rfile.readline(MOST_BYTES):
+            while line := self.rfile.readline(LONGEST_REQUEST):
                 complete = line.endswith(b"\n")
                 answer = _answer(self.server.handlers, line) if complete else _error("too_long", f"{len(line)} bytes")
                 self.wfile.write(json.dumps(answer).encode() + b"\n")
