@@ -62,7 +62,7 @@ class DemoSession:
     status: dict[str, Any] = field(default_factory=dict)
 
 
-Watcher = Callable[["DemoSession", float, dict[str, Any]], None]
+Watcher = Callable[[DemoSession, float, dict[str, Any]], None]
 
 
 def run_demo(configuration: Configuration, seconds: float, seed: int, on_change: Watcher) -> DemoSession:

@@ -1,12 +1,15 @@
-"""The simulated machine: the truth that the model is tested against, and it shares no code with the model.
+"""The simulated machine: the truth against which the model is tested; it shares no code with the model.
 
-Causes displace things, and the closure says where the tip goes; nothing computes a tip error:
+Displacements of parts come from causes, and the closure gives the tip; no tip error is ever stated directly:
 
     weather -> warm_up (heat) -> frame: supports, plate points, rods    -.
-                              -> joints: balls   <- closure: forces      +-> closure -> tip
-    motion, tour              -> scales: link lengths, rods             -'
-                                        sensors <- what each gauge can see of all that
+                              -> joints: balls   <- closure: forces      +-> equilibrium -> tip
+    motion, plan_motion       -> scales: link lengths, rods             -'
+    causes (hidden)           -> parts, gauges, reference instrument
+                                        sensors <- readings of the gauges
 
-`strengths` says how strong every cause is. `world` holds it together; `server` puts it on real ports (`wire`,
-`sensing`), with a control socket (`control`) and a configuration for the daemon (`daemon_configuration`).
+truth     the machine itself: `strengths` of its ordinary error sources, the protocol of a `cause`, `world` as a whole
+causes    causes that can be hidden in it, one module per family; `catalogue` lists them, `hidden_cause` draws one
+campaign  recordings computed without real time: `simulated_recording.simulate_recording`
+wires     the world on real ports: `server.Simulation`, its lines and devices, its control socket and client
 """

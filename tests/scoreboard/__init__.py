@@ -1,1 +1,1 @@
-"""The diagnosis, scored on simulated machines whose secret only the scorer opens: `make scoreboard`."""
+"""Scores of the diagnosis on simulated machines with hidden causes: `make scoreboard`."""

@@ -1,6 +1,6 @@
-"""`python -m tests.scoreboard`: run what is not in the results yet, on all cores; then print the tables.
+"""`python -m tests.scoreboard`: run the cases that are not in the results yet, on all cores; then print the tables.
 
-Every result is a line of --out, written when its case is done: a run that was stopped goes on where it was.
+Every result is a line of --out, written when its case is done, so that an interrupted run can be continued.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TextIO
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tests.scoreboard.cases import KINDS, NOTHING, OUTSIDE, PAIRS, SEEDS, STRENGTHS, Case, cases, named
+from tests.scoreboard.cases import KINDS, NOTHING, OUTSIDE, PAIRS, SEEDS, STRENGTHS, Case, cases, parse_cases
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepare, run
 
@@ -25,7 +25,7 @@ def main() -> None:
     options = _options()
     options.out.parent.mkdir(parents=True, exist_ok=True)
     wanted = (
-        named(options.case)
+        parse_cases(options.case)
         if options.case
         else cases(options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs)
     )
@@ -36,7 +36,7 @@ def main() -> None:
         failed = _in_parallel(run, _missing(wanted, options.out)[: options.most], options, partial(_write, file))
     results = [json.loads(line) for line in options.out.read_text(encoding="utf-8").splitlines()]
     names = {case.name for case in wanted}
-    results = [one for one in results if one["case"] in names]
+    results = [result for result in results if result["case"] in names]
     print(f"\n{len(results)} of {len(wanted)} cases, {len(failed)} failed\n")
     print(report(results))
     for name, why in failed:
@@ -78,7 +78,7 @@ def _in_parallel(
     options: argparse.Namespace,
     done: Callable[[object], None],
 ) -> list[tuple[str, str]]:
-    """`done` gets each result. What failed, and why: a case that fails is reported, and not counted as anything."""
+    """Run `work` on every case; `done` is called with each result. Returns (name, error) of the cases that failed."""
     failed: list[tuple[str, str]] = []
     columns = (TextColumn("scoreboard"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with ProcessPoolExecutor(options.jobs) as pool, Progress(*columns, transient=True) as progress:

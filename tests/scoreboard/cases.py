@@ -1,4 +1,4 @@
-"""What is tried: which causes are hidden, how large they make the tip's error, on which machine."""
+"""The cases of the scoreboard: hidden causes, sizes of their errors, machines."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from compd.simulation.causes.catalogue import CAUSES
 
 Kind = Literal["library", "nothing", "outside", "pair"]
 KINDS: tuple[Kind, ...] = ("library", "nothing", "outside", "pair")
-# Times the reference's noise, per coordinate. The acceptance counts one to six.
+# Sizes of the tip's error in units of the reference's noise.
 STRENGTHS = (0.5, 1.0, 2.0, 4.0)
 SEEDS = 5
 NOTHING = 100
 OUTSIDE = 10
 PAIRS = 40
-# Causes outside the library and pairs: from plain to strong.
+# Range of sizes for causes outside the library and for pairs.
 FLOORS = (2.0, 6.0)
 
 
@@ -33,18 +33,18 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Its key in the file of results; the diagnosis never sees it."""
-        hidden = "+".join(f"{one}x{size:.2g}" for one, size in zip(self.causes, self.floors, strict=True))
+        """Key in the file of results."""
+        hidden = "+".join(f"{cause}x{size:.2g}" for cause, size in zip(self.causes, self.floors, strict=True))
         return f"{self.kind}:{hidden or '-'}:{self.seed}"
 
 
 def cases(
     kinds: Sequence[Kind], strengths: Sequence[float], seeds: int, nothing: int, outside: int, pairs: int
 ) -> list[Case]:
-    """All of them, in an order in which a run that is cut short has seen a bit of everything."""
+    """All cases, in an order in which the first part of a run contains some of every kind."""
     library = [name for name, cause in CAUSES.items() if cause.in_library]
     others = [name for name, cause in CAUSES.items() if not cause.in_library]
-    found = {
+    by_kind = {
         "library": [
             Case("library", (name,), (floors,), 1000 + seed)
             for seed in range(seeds)
@@ -57,7 +57,7 @@ def cases(
         ],
         "pair": [_pair(library, 4000 + seed) for seed in range(pairs)],
     }
-    return list(_evenly([found[kind] for kind in kinds]))
+    return list(_evenly([by_kind[kind] for kind in kinds]))
 
 
 def _size(seed: int) -> float:
@@ -72,19 +72,20 @@ def _pair(library: Sequence[str], seed: int) -> Case:
 
 
 def _evenly(groups: Sequence[Sequence[Case]]) -> Iterator[Case]:
-    """Each group spread over the whole: sorted by how far through its own group a case is."""
+    """Merge the groups, each spread evenly over the whole."""
     placed = [((number + 0.5) / len(group), case) for group in groups for number, case in enumerate(group)]
     return (case for _, case in sorted(placed, key=lambda pair: pair[0]))
 
 
-def named(texts: Sequence[str]) -> list[Case]:
-    """From names as `Case.name` writes them; to run single cases again. Raises ValueError for another kind."""
-    found = []
+def parse_cases(texts: Sequence[str]) -> list[Case]:
+    """Cases from names as `Case.name` writes them. Raises ValueError for an unknown kind."""
+    parsed = []
     for text in texts:
         kind, hidden, seed = text.split(":")
-        matched = next((one for one in KINDS if one == kind), None)
-        if matched is None:
+        known = next((known for known in KINDS if known == kind), None)
+        if known is None:
             raise ValueError(f"{text}: kind is one of {', '.join(KINDS)}")
         parts = [] if hidden == "-" else [part.rpartition("x") for part in hidden.split("+")]
-        found.append(Case(matched, tuple(p[0] for p in parts), tuple(float(p[2]) for p in parts), int(seed)))
-    return found
+        causes, floors = tuple(part[0] for part in parts), tuple(float(part[2]) for part in parts)
+        parsed.append(Case(known, causes, floors, int(seed)))
+    return parsed

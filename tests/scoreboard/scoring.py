@@ -1,4 +1,4 @@
-"""Was it right? One line of results against its secret."""
+"""Scores of one result: the diagnosis against what was hidden."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-# A cause that follows the tip's place shows along any of the tip's coordinates.
+# Covariates of a cause that depends on the tip's position: any of its coordinates.
 POSITION = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 # Two-sided 95 % of a normal distribution.
 WITHIN_STD = 1.96
-# Effects whose truth has the library's own form, so that its parameters have a true value: their numbers are
-# the same quantity. Elsewhere (a round loop, a thermal chain, a stand that creeps less every day) there is none.
+# Effects for which truth and library have the same equation, so that the parameters have true values. The others
+# (hysteresis, thermal chains, creep) have none.
 SAME_FORM = (
     "scale_gain",
     "joint_comparator_gain",
@@ -31,7 +31,7 @@ def steps(result: Result) -> list[dict[str, Any]]:
 
 
 def first(result: Result) -> str:
-    """The effect that is named first; "-" for none."""
+    """Effect of the diagnosis' first step; "-" for none."""
     return steps(result)[0]["effect"] if steps(result) else "-"
 
 
@@ -40,13 +40,13 @@ def named_first(result: Result) -> bool:
 
 
 def all_named(result: Result) -> bool:
-    """Every hidden effect of the library is a step or a step's rival."""
+    """Whether every hidden effect of the library is a step's effect or rival."""
     named = {name for step in steps(result) for name in (step["effect"], *step["rivals"])}
     return named >= set(result["secret"]["answers"])
 
 
 def named_wrongly(result: Result) -> list[str]:
-    """Steps in which neither the effect nor a rival was hidden."""
+    """Effects of steps in which neither the effect nor a rival was hidden."""
     truth = set(result["secret"]["answers"])
     return [step["effect"] for step in steps(result) if not truth & {step["effect"], *step["rivals"]}]
 
@@ -56,14 +56,14 @@ def adequate(result: Result) -> bool:
 
 
 def follows(secret: Mapping[str, Any]) -> set[str]:
-    """The covariates by which a cause outside the library may be known."""
-    return {name for one in secret["follows"] for name in (POSITION if one == "position" else (one,))}
+    """Covariates by which the hidden causes outside the library can be described."""
+    return {name for covariate in secret["follows"] for name in (POSITION if covariate == "position" else (covariate,))}
 
 
 def covariate_found(result: Result) -> bool:
-    """What a cause outside the library follows is first or second in `depends_on`."""
-    told = {one["covariate"] for one in result["verdict"]["depends_on"][:2]}
-    return bool(follows(result["secret"]) & told)
+    """Whether one of these covariates is first or second in `depends_on`."""
+    proposed = {trend["covariate"] for trend in result["verdict"]["depends_on"][:2]}
+    return bool(follows(result["secret"]) & proposed)
 
 
 def intervals(result: Result) -> Iterator[tuple[str, bool]]:
@@ -73,10 +73,10 @@ def intervals(result: Result) -> Iterator[tuple[str, bool]]:
         name = entry["effect"]
         if name not in SAME_FORM or name not in secret["effects"]:
             continue
-        true = secret["effects"][name]
-        values = true if isinstance(true, list) else [true]
-        if len(values) != len(entry["parameters"]):
+        strength = secret["effects"][name]
+        true_values = strength if isinstance(strength, list) else [strength]
+        if len(true_values) != len(entry["parameters"]):
             continue
-        for value, number in zip(values, entry["parameters"], strict=True):
-            if math.isfinite(number["std"]):
-                yield name, abs(number["value"] - value) <= WITHIN_STD * number["std"]
+        for true_value, parameter in zip(true_values, entry["parameters"], strict=True):
+            if math.isfinite(parameter["std"]):
+                yield name, abs(parameter["value"] - true_value) <= WITHIN_STD * parameter["std"]

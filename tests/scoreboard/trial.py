@@ -1,4 +1,4 @@
-"""One case from the sealed machine to the score, by the commands that a person would use."""
+"""One case of the scoreboard: campaigns with hidden causes, then the commands that a user would run."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ TIMEOUT_S = 300.0
 
 
 def prepare(case: Case, campaigns: Path) -> Path:
-    """The case's two campaigns, made once: what is measured first, and other days on the same machine."""
+    """Directory of the case's two campaigns, on the same machine on different days; made once."""
     directory = campaigns / case.name.replace(":", "_")
     if not (directory / "other.answer.json").exists():
         directory.mkdir(parents=True, exist_ok=True)
         wanted = [HiddenCause(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
-        sized = hide(case, wanted, directory, "train", 0)
-        hide(case, sized, directory, "other", 1)
+        sized = write_campaign(case, wanted, directory, "train", 0)
+        write_campaign(case, sized, directory, "other", 1)
     return directory
 
 
 def run(case: Case, campaigns: Path) -> dict[str, Any]:
-    """A line of the results: what was hidden, what the diagnosis said, and how well the model then does elsewhere."""
+    """One result: what was hidden, the diagnosis, and the floor ratio of its model on the other campaign."""
     prepared = prepare(case, campaigns)
     with tempfile.TemporaryDirectory(prefix="compd-score-") as temporary:
         directory = Path(temporary)
         for name in ("train.csv", "train.yaml", "other.csv", "other.yaml"):
-            # without the seal: it stays where it is
+            # the answer files are not copied
             shutil.copy(prepared / name, directory)
-        said, took_s = timed(directory, "diagnose", "train.csv", "--json")
-        verdict = json.loads(said)
+        output, took_s = run_timed(directory, "diagnose", "train.csv", "--json")
+        verdict = json.loads(output)
         ratio, fitted = add_all(directory, [step["effect"] for step in verdict["steps"]])
     secret = json.loads((prepared / "train.answer.json").read_text(encoding="utf-8"))
     return {
@@ -61,42 +61,41 @@ def run(case: Case, campaigns: Path) -> dict[str, Any]:
     }
 
 
-def hide(case: Case, hidden: list[HiddenCause], directory: Path, name: str, other_days: int) -> list[HiddenCause]:
-    """A campaign with these causes in it, and how strong each became; NAME.answer.json is for the scorer."""
+def write_campaign(
+    case: Case, hidden: list[HiddenCause], directory: Path, name: str, other_days: int
+) -> list[HiddenCause]:
+    """Write a campaign with these causes and its answer file; returns the causes with the strengths that they got."""
     recorded = simulate_recording(load(CONFIG), case.seed, hidden, other_days=other_days)
     write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar, overwrite=True)
     write_answer(directory / f"{name}.answer.json", recorded.hidden, recorded.weak, case.seed)
-    return [HiddenCause(one.cause.id, one.cause.strength) for one in recorded.hidden]
+    return [HiddenCause(sized.cause.id, sized.cause.strength) for sized in recorded.hidden]
 
 
 def add_all(directory: Path, effects: list[str]) -> tuple[float, list[dict[str, Any]]]:
-    """Floor ratio on the other days with the named effects in the model, and the numbers that were fitted."""
+    """Floor ratio on the other campaign with these effects added to the model, and the fitted effects."""
     model = directory / "model.yaml"
-    given = ["--model", str(model)] if effects else []
+    model_option = ["--model", str(model)] if effects else []
     for effect in effects:
-        at_once("effect", "add", effect, "--recording", str(directory / "train.csv"), *given)
-    compared = json.loads(at_once("compare", str(directory / "other.csv"), "--json", *given))
+        run_in_process("effect", "add", effect, "--recording", str(directory / "train.csv"), *model_option)
+    compared = json.loads(run_in_process("compare", str(directory / "other.csv"), "--json", *model_option))
     fitted = yaml.safe_load(model.read_text(encoding="utf-8"))["effects"] if effects else []
     return float(compared["floor_ratio"]), fitted
 
 
-def at_once(*arguments: str) -> str:
-    """What one command prints, in this process: hundreds of starts would cost more than the work.
-
-    Raises RuntimeError, with its own words, where it fails.
-    """
+def run_in_process(*arguments: str) -> str:
+    """Output of a command, run in this process to save its start. Raises RuntimeError with the output if it fails."""
     done = CliRunner().invoke(app, arguments)
     if done.exit_code:
         raise RuntimeError(f"compd {' '.join(arguments)}: {done.output}") from done.exception
     return done.stdout
 
 
-def timed(directory: Path, *arguments: str) -> tuple[str, float]:
-    """What one command prints, and how many seconds it takes from start to end, as a person waits for it.
+def run_timed(directory: Path, *arguments: str) -> tuple[str, float]:
+    """Output of a command in a process of its own, and its duration from start to end in seconds.
 
-    Raises RuntimeError as `at_once` does.
+    Raises RuntimeError as `run_in_process` does.
     """
-    # one thread each: cases run side by side
+    # one thread each, because cases run side by side
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     start_s = time.perf_counter()
     done = subprocess.run(

@@ -1,7 +1,7 @@
-"""A simulated machine with a secret, the daemon on its wires, and a laser tracker beside it: by `compd` alone.
+"""A simulated machine with a hidden cause, the daemon on its wires and a laser tracker, run by `compd` commands alone.
 
-What a person would do by hand is done here: drive about, load the tip, let the tracker look, call the commands.
-Nothing here knows what is hidden.
+Does what a user would do by hand: drive, load the tip, measure with the tracker, call the commands. Nothing here
+knows what is hidden.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from compd.simulation.wires.control_client import ControlClient
 from tests.support.hidden_visits import Visit
 from tests.support.simulated import TRIPOD
 
-# Half the tracker's rate: every row has looks of its own.
+# Half the tracker's rate, so that every row has tracker points of its own.
 RECORDER_HZ = 10.0
 TRACKER_SIGMA_UM = 0.15
-# Slower than shipped, for two thirds of the processor time. Not slower still: the frame moves while it is read.
+# Slower than shipped, to save a third of the processor time; still fast against the frame's motion.
 LOOP_HZ, POLL_EVERY_S = 100, 0.02
-# Twice as long as the slowest gauge needs to be read anew, and the tracker to have looked three times.
+# Twice what the slowest gauge needs to be read anew and the tracker to measure three times.
 DWELL_S = 0.8
 COMMAND_TIMEOUT_S = 120.0
 ZERO_TRIES = 3
 MORE_CHANNELS = ("force_x_N", "force_y_N", "force_z_N", "pressure_hPa", "humidity_pct")
 
 
-def equipped(directory: Path) -> Path:
+def write_configuration(directory: Path) -> Path:
     """The shipped tripod with a load cell, a barometer and a hygrometer on its cabinet's module."""
     data = read(TRIPOD).data
     address = 16
@@ -66,20 +66,20 @@ class HiddenRun:
     """A machine that runs, seen from outside.
 
     configuration: as a person wrote it; directory: of the simulation; machine: its controller.
-    said: what commands beside it printed.
+    outputs: of the commands that ran beside it.
     """
 
     configuration: Path
     directory: Path
     machine: ControlClient
-    said: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
 
     @property
     def socket(self) -> Path:
         return self.directory / "compd.sock"
 
     def compd(self, *arguments: str | Path) -> str:
-        """What a command prints; AssertionError with all its words where it fails."""
+        """Output of a command; AssertionError with its errors where it fails."""
         done = self._compd(*arguments)
         assert done.returncode == 0, f"compd {' '.join(map(str, arguments))}: {done.stderr}{done.stdout}"
         return done.stdout
@@ -98,13 +98,13 @@ class HiddenRun:
         with connect(self.socket, COMMAND_TIMEOUT_S) as observer, connect(self.socket, COMMAND_TIMEOUT_S) as daemon:
             wait_for_gauges(observer, daemon.watch(10.0))
         for _ in range(ZERO_TRIES - 1):
-            # as the refusal says: a line that was late on a busy computer is well again a moment later
+            # on a busy computer a line may be late for a moment
             if self._compd("zero", self.socket).returncode == 0:
                 return
         self.compd("zero", self.socket)
 
     def drive(self, visit: Visit) -> None:
-        """Go there, under its load, with its heaters on, and rest there."""
+        """Drive to a visit's place with its load and heaters, and rest there."""
         if visit.heat is not None:
             self.machine.ask("HEAT", **visit.heat)
         self.machine.ask("LOAD", force_M_N=visit.force_M_N)
@@ -116,25 +116,27 @@ class HiddenRun:
         threading.Event().wait(DWELL_S)
 
     def tip_error_um(self, visits: Sequence[Visit]) -> float:
-        """rms per coordinate of what the daemon says of the tip, against the truth, at rest at each visit's place."""
-        wrong = []
+        """rms per coordinate of the daemon's tip less the true one, um, at rest at each visit's place."""
+        errors_mm = []
         with connect(self.socket, COMMAND_TIMEOUT_S) as daemon:
             setpoints = daemon.watch(20.0)
             for visit in visits:
                 self.drive(visit)
                 arrived_s = time.monotonic()
-                setpoint = next(one for one in setpoints if one["time_s"] > arrived_s and one["state"] == "ok")
-                wrong.append(np.subtract(setpoint["tip_M_mm"], self.machine.ask("TRUTH")["tip_mm"]))
-        return float(np.sqrt(np.mean(np.square(wrong)))) * 1e3
+                setpoint = next(
+                    message for message in setpoints if message["time_s"] > arrived_s and message["state"] == "ok"
+                )
+                errors_mm.append(np.subtract(setpoint["tip_M_mm"], self.machine.ask("TRUTH")["tip_mm"]))
+        return float(np.sqrt(np.mean(np.square(errors_mm)))) * 1e3
 
     def survey(self, visits: Sequence[Visit], name: str) -> tuple[Path, float]:
-        """The daemon records and the tracker looks: the recording, joined, and the tip's error meanwhile, in um."""
+        """Record and track the visits; returns the joined recording and the tip's error during them, um."""
         part, track, joined = (self.directory / f"{name}{suffix}" for suffix in ("-0001.csv", ".track.csv", ".csv"))
         recorder = self.beside("record", name, "--daemon", self.socket, "--rate-hz", str(RECORDER_HZ), begins="begins")
         tracker = self.beside("tracker", self.directory, "--out", track, begins="looks")
         with recorder, tracker:
             error_um = self.tip_error_um(visits)
-        self.said.append(
+        self.outputs.append(
             self.compd("join", part, track, joined, "--frame", "machine", "--sigma-um", str(TRACKER_SIGMA_UM))
         )
         return joined, error_um
@@ -156,13 +158,13 @@ class HiddenRun:
             yield
         finally:
             process.terminate()
-            self.said.append(first + process.communicate(timeout=COMMAND_TIMEOUT_S)[0])
+            self.outputs.append(first + process.communicate(timeout=COMMAND_TIMEOUT_S)[0])
 
 
 @contextmanager
 def hidden_run(directory: Path, *options: str) -> Iterator[HiddenRun]:
     """`compd simulate` with `options`, and `compd run` on its wires; machine zero is taken."""
-    config = equipped(directory)
+    config = write_configuration(directory)
     machine = directory / "machine"
     simulate = ["simulate", str(config), "--directory", str(machine), "--zero-hold", "600", *options]
     commands = [
@@ -176,5 +178,6 @@ def hidden_run(directory: Path, *options: str) -> Iterator[HiddenRun]:
         yield run
 
 
-def told(output: str) -> dict[str, Any]:
+def parse_output(output: str) -> dict[str, Any]:
+    """A command's output with --json."""
     return dict(json.loads(output))

@@ -1,4 +1,4 @@
-"""What a person does to a machine to learn about it: where it goes, what hangs on its tip, what is switched on."""
+"""Visits of a survey: places, loads on the tip, and heaters, as a user would choose them to learn about a machine."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# The points lie in this box about machine zero, as scale values, a survey's first ones at its corners: what is learned
-# is used where it was learned. Half of the visits are a short way from the last one, out or back: each link comes to
-# its place from both sides.
+# Half edge of the box of points about machine zero, as scale values; a survey begins at its corners. Every other visit
+# is a short way from the last one, so that each link approaches its places from both sides.
 REACH_MM = 60.0
 SHORT_WAY_MM = (2.0, 10.0)
-# Loads as a person would hang them on: sideways either way, down and a little up.
+# Share of visits with a load, and the range of loads in {M}.
 LOADED_SHARE = 0.45
 LOAD_LOW_N, LOAD_HIGH_N = (-30.0, -30.0, -60.0), (30.0, 30.0, 10.0)
-# Every so many visits other heaters are on: drives, base ring, cabinet by column, platform, tool, lamps; up to W.
-# A few kelvin: hours of weather and warm-up pass, and every part has time to follow.
+# The heaters change after so many visits; their upper limits make a few kelvin in the hours of warm-up between.
 VISITS_PER_HEAT = 6
 HEATERS_W = {
     "drives_W": [1.5] * 3,
@@ -39,7 +37,7 @@ class Visit(NamedTuple):
 
 
 def survey_visits(seed: int, count: int, *, heaters: bool) -> list[Visit]:
-    """All over the box, corners and all; for 16 visits or more. `heaters`: whether they are switched."""
+    """At least 16 visits: the corners of the box and random points in it. heaters : whether they are switched."""
     rng = np.random.default_rng(seed)
     corners = REACH_MM * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     inside = rng.uniform(-REACH_MM, REACH_MM, ((count + 1) // 2 - len(corners), 3))
@@ -47,13 +45,13 @@ def survey_visits(seed: int, count: int, *, heaters: bool) -> list[Visit]:
 
 
 def check_visits(seed: int, count: int, *, heaters: bool) -> list[Visit]:
-    """Other places in the box."""
+    """Visits to random points in the box."""
     rng = np.random.default_rng(seed)
     return list(_visits(rng.uniform(-REACH_MM, REACH_MM, ((count + 1) // 2, 3)), count, rng, heaters))
 
 
 def _visits(points: NDArray[np.float64], count: int, rng: np.random.Generator, heaters: bool) -> Iterator[Visit]:
-    """Points one near the other, so that little time is spent on the way; at each a short way out or back."""
+    """Visits to the points, in an order with short ways, each followed by one a short way off."""
     heat = None
     points = _near_each_other(points)
     for number in range(count):
@@ -69,15 +67,15 @@ def _visits(points: NDArray[np.float64], count: int, rng: np.random.Generator, h
 
 
 def _near_each_other(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same points; after each the nearest of those that are left."""
-    order, left = [0], set(range(1, len(points)))
-    while left:
-        here = points[order[-1]]
-        order.append(min(left, key=lambda k: float(np.abs(points[k] - here).max())))
-        left.remove(order[-1])
+    """The points in greedy order: after each the nearest of the remaining ones."""
+    order, remaining = [0], set(range(1, len(points)))
+    while remaining:
+        last = points[order[-1]]
+        order.append(min(remaining, key=lambda k: float(np.abs(points[k] - last).max())))
+        remaining.remove(order[-1])
     return points[order]
 
 
 def _heat(rng: np.random.Generator) -> dict[str, float | list[float]]:
-    """Each heater is on at any strength."""
+    """Random power of every heater."""
     return {name: (rng.uniform(0, 1, np.shape(most)) * most).tolist() for name, most in HEATERS_W.items()}

@@ -22,7 +22,7 @@ from compd.simulation.causes.catalogue import CAUSES
 from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
 from tests.scoreboard.scoring import follows
-from tests.support.hidden_run import HiddenRun, hidden_run, told
+from tests.support.hidden_run import HiddenRun, hidden_run, parse_output
 from tests.support.hidden_visits import check_visits, survey_visits
 from tests.support.simulated import run_directory, tripod
 
@@ -75,7 +75,7 @@ class Outcome(NamedTuple):
     secret: dict[str, Any]
 
 
-def add_found(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: Path) -> None:
+def add_named_effects(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: Path) -> None:
     """What the diagnosis names; where it names no effect, the description that it proposes."""
     named = [step["effect"] for step in verdict["steps"]]
     for number, formula in enumerate(verdict["depends_on"][0]["formula_effects"] if verdict["depends_on"] else []):
@@ -86,16 +86,16 @@ def add_found(run: HiddenRun, verdict: dict[str, Any], recording: Path, model: P
         run.compd("effect", "add", effect, "--recording", recording, "--machine", run.configuration, "--model", model)
 
 
-def learned(hidden: list[int], directory: Path, pace: Pace = HOURS) -> Outcome:
+def run_hidden(hidden: list[int], directory: Path, pace: Pace = HOURS) -> Outcome:
     """The whole way, from a machine with a secret to the daemon that has learned it."""
     options = [word for number in hidden for word in ("--hidden", str(number))]
     with hidden_run(directory, "--seed", "1", "--speedup", pace.speedup, *options) as run:
         recording, before_um = run.survey(survey_visits(2, VISITS, heaters=pace.heaters), "survey")
         machine = ("--machine", str(run.configuration))
-        compared = told(run.compd("compare", recording, "--json", *machine))
-        verdict = told(run.compd("diagnose", recording, "--json", *machine))
+        compared = parse_output(run.compd("compare", recording, "--json", *machine))
+        verdict = parse_output(run.compd("diagnose", recording, "--json", *machine))
         model = run.directory / "model.yaml"
-        add_found(run, verdict, recording, model)
+        add_named_effects(run, verdict, recording, model)
         if model.exists():
             run.compd("adopt", model, "--daemon", run.socket)
         after_um = run.tip_error_um(check_visits(3, CHECKS, heaters=pace.heaters))
@@ -118,8 +118,8 @@ def check_described(outcome: Outcome) -> None:
     verdict, floor_um = outcome.verdict, outcome.compared["noise_floor_um"]
     assert outcome.compared["floor_ratio"] > PLAIN_RATIO
     assert (verdict["verdict"], verdict["steps"]) == ("unexplained", [])
-    told_first = {one["covariate"] for one in verdict["depends_on"][:2]}
-    assert told_first & follows(outcome.secret), (outcome.secret, told_first)
+    proposed = {trend["covariate"] for trend in verdict["depends_on"][:2]}
+    assert proposed & follows(outcome.secret), (outcome.secret, proposed)
     assert outcome.after_um < floor_um < outcome.before_um
 
 
@@ -138,7 +138,7 @@ def test_every_live_cause_is_run_by_the_first_number_that_hides_it() -> None:
 @pytest.mark.parametrize("hidden", [*QUICK, *(pytest.param(number, marks=pytest.mark.long) for number in ONE)])
 def test_one_effect(hidden: int) -> None:
     with run_directory() as directory:
-        check_found(learned([hidden], directory))
+        check_found(run_hidden([hidden], directory))
 
 
 @pytest.mark.long
@@ -146,7 +146,7 @@ def test_one_effect(hidden: int) -> None:
 @pytest.mark.parametrize("hidden", PAIRS)
 def test_two_effects(hidden: list[int]) -> None:
     with run_directory() as directory:
-        check_found(learned(hidden, directory))
+        check_found(run_hidden(hidden, directory))
 
 
 @pytest.mark.long
@@ -154,4 +154,4 @@ def test_two_effects(hidden: list[int]) -> None:
 @pytest.mark.parametrize("hidden", OUTSIDE)
 def test_cause_that_the_library_has_not(hidden: int) -> None:
     with run_directory() as directory:
-        check_described(learned([hidden], directory, OUTSIDE[hidden]))
+        check_described(run_hidden([hidden], directory, OUTSIDE[hidden]))

@@ -1,1 +1,1 @@
-"""PlanMotion campaigns on the simulated machine, without wires and without waiting."""
+"""Measuring campaigns on the simulated machine, computed without wires or real time."""

@@ -1,1 +1,1 @@
-"""Physical causes that can be hidden in the simulated machine."""
+"""Physical causes that can be hidden in the simulated machine, one module per family."""

@@ -23,7 +23,7 @@ class PlateBending(Cause):
     """Bending of the surface plate by its vertical temperature gradient: it bows to a spherical cap.
 
     curvature = 12 alpha / h^3 times the integral of T(z) z dz over the thickness h (B. A. Boley, J. H. Weiner, Theory
-    of Thermal Stresses, 1960, chapter 12), by Simpson's rule over layers that lie evenly from face to face. The
+    of Thermal Stresses, 1960), by Simpson's rule over layers that lie evenly from face to face. The
     instrument sees the tip lower by what the surface beneath has risen over the plate points. Strength: alpha
     (granite 4 to 8 ppm/K).
     """

@@ -1,1 +1,1 @@
-"""The simulated machine: its mechanism, heat, joints, frame and sensors."""
+"""The machine itself: mechanism, heat, joints, frame, sensors, motion, and the protocol of a cause."""

@@ -1,1 +1,1 @@
-"""The simulated machine on real ports: its gauges on ptys and sockets."""
+"""The simulated machine on real ports: its gauges on ptys and TCP sockets, each in its own protocol."""

@@ -1,14 +1,14 @@
-"""The simulated machine's own controller panel: one JSON object per line on a Unix socket.
+"""The simulated machine's control socket: one JSON object per line on a Unix socket.
 
-    {"class": "TRUTH"}                                where the tip truly is, and what the machine does
-    {"class": "MEASURE"}                              what a laser tracker shows of the tip, with its noise
+    {"class": "TRUTH"}                                the true tip, and what the machine does
+    {"class": "MEASURE"}                              the tip as a laser tracker shows it, with its noise
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
-    {"class": "TOUR"}                                 go on visiting points
+    {"class": "TOUR"}                                 visit random points from now on
     {"class": "PLAN"}                                 measure the planned rows, from the first
-    {"class": "TIP_FOR", "scale_mm": [..]}            where the tip would be, were the scales there now
+    {"class": "TIP_FOR", "scale_mm": [..]}            the tip if the scales were there now
     {"class": "LOAD", "force_M_N": [x, y, z]}         load on the tool's tip
-    {"class": "HEAT", "drives_W": [..], "ring_W": ..} what parts give off from now on: all of `Heat`
-    {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null mends it
+    {"class": "HEAT", "drives_W": [..], "ring_W": ..} heat sources from now on: all of `Heat`
+    {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null repairs it
 
 Every request gets one answer: TRUTH, MEASURED, TIP, or ERROR with code and text.
 """
@@ -24,7 +24,7 @@ from typing import Any
 
 from compd.errors import CompdError
 
-LONGEST_REQUEST = 4096
+LONGEST_REQUEST = 4096  # bytes
 Answer = Mapping[str, Any]
 Handler = Callable[[Mapping[str, Any]], Answer]
 
@@ -41,13 +41,13 @@ class _Client(socketserver.StreamRequestHandler):
     def handle(self) -> None:
         try:
             while line := self.rfile.readline(LONGEST_REQUEST):
-                whole = line.endswith(b"\n")
-                answer = _answer(self.server.handlers, line) if whole else _error("too_long", f"{len(line)} bytes")
+                complete = line.endswith(b"\n")
+                answer = _answer(self.server.handlers, line) if complete else _error("too_long", f"{len(line)} bytes")
                 self.wfile.write(json.dumps(answer).encode() + b"\n")
-                if not whole:
+                if not complete:
                     return
         except (BrokenPipeError, ConnectionResetError):
-            return  # the client has gone; so does its thread
+            return  # the client has closed the connection
 
 
 class ControlSocket:

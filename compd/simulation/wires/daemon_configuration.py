@@ -1,4 +1,4 @@
-"""The configuration with which the daemon cannot tell the simulated machine from the real one."""
+"""The daemon's configuration for a simulated machine: the machine's own with other ports and sockets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def daemon_path(configuration: Configuration, directory: Path) -> Path:
-    """Where the daemon's configuration goes; ConfigurationError where that is the machine's own."""
+    """Path of the daemon's configuration in `directory`. ConfigurationError if that is the machine's own file."""
     path = directory / configuration.path.name
     if path.resolve() == configuration.path.resolve():
         raise ConfigurationError(
@@ -33,10 +33,10 @@ def daemon_path(configuration: Configuration, directory: Path) -> Path:
 
 
 def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port], directory: Path) -> Configuration:
-    """Write `directory`/<the same file name>: everything as in the original but where things are.
+    """Write and load a copy of the configuration, under the same file name in `directory`, with these ports.
 
-    `ports`: by line, a device path or (host, port). Unix socket and state move into `directory`; TCP and
-    UDP stay on this computer, so that no real controller hears of a machine that does not exist.
+    ports : by line, a device path or (host, port). Unix socket and state directory are in `directory`. TCP and UDP are
+    bound to this computer, so that no real controller receives setpoints for a machine that does not exist.
     """
     path = daemon_path(configuration, directory)
     data = read(configuration.path).data
@@ -59,7 +59,7 @@ def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port]
 
 
 def _free_port(wanted: int) -> int:
-    """The configured TCP port, or 0 (any) where a daemon on this computer already has it."""
+    """The configured TCP port, or 0 (any) where it is already in use on this computer."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

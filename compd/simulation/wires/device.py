@@ -1,7 +1,7 @@
-"""The other end of a gauge's wire: what a simulated device answers.
+"""Simulated devices: the far end of a gauge's wire, which answers requests as the device would.
 
 A driver package offers one class per driver name in the entry-point group `compd.simulated_gauges`.
-It is written from the device's manual, not from the driver: the two ends share no code.
+It is written from the device's manual, not from the driver; the two share no code.
 """
 
 from __future__ import annotations
@@ -10,28 +10,28 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-# What the device's sensor sees now, by channel name, in the channel's unit; nan = the sensor is off.
+# Present value at the device's sensor by channel name, in the channel's unit; nan: the sensor is off.
 Sense = Callable[[str], float]
 
 
 class SimulatedByteDevice(ABC):
-    """A device on a byte line; several may share one line, each hears every byte."""
+    """A device on a line of bytes. Several may share a line; each receives every byte."""
 
     def __init__(self, options: Any, sense: Sense) -> None:
-        """`options`: the gauge's own validated options, from the same configuration."""
+        """options : the gauge's validated options from the configuration. sense : see `Sense`."""
         self.options = options
         self.sense = sense
 
     @abstractmethod
     def hear(self, data: bytes) -> bytes:
-        """Bytes as they arrive, in any pieces; the reply to what is complete, or b""."""
+        """Receive bytes, in pieces of any size; returns the reply to complete requests, or b""."""
 
 
 class SimulatedRegisterDevice(ABC):
-    """A Modbus slave's registers; the line does the framing."""
+    """Registers of a Modbus slave; the line does the framing."""
 
     def __init__(self, options: Any, sense: Sense) -> None:
-        """`options`: the gauge's own validated options, from the same configuration."""
+        """options : the gauge's validated options from the configuration. sense : see `Sense`."""
         self.options = options
         self.sense = sense
 

@@ -1,6 +1,6 @@
 """Modbus slaves behind one wire: requests in, replies out, in RTU or TCP framing.
 
-The framing is pymodbus's, so that the product's own RTU master is tested against another's.
+Framing is done by pymodbus, so that compd's own RTU master is tested against an independent implementation.
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
 
 
 class ModbusSlaves:
-    """The slaves on one wire. Each answers to its own unit number; nobody answers for an absent one."""
+    """The slaves on one wire, by unit number; requests to an absent unit get no reply."""
 
     def __init__(self, devices: Sequence[SimulatedRegisterDevice], over_tcp: bool) -> None:
-        """`over_tcp`: Modbus TCP framing (MBAP) instead of RTU."""
+        """over_tcp : Modbus TCP framing (MBAP) instead of RTU."""
         self._devices = {device.unit: device for device in devices}
         self._over_tcp = over_tcp
         self._framer = FramerSocket(DecodePDU(True)) if over_tcp else FramerRTU(DecodePDU(True))
-        self._heard = b""
+        self._received = b""
 
     def hear(self, data: bytes) -> bytes:
-        """Bytes as they arrive, in any pieces; the replies to the requests that are complete."""
-        self._heard += data
+        """Receive bytes, in pieces of any size; returns the replies to complete requests."""
+        self._received += data
         replies = b""
         while request := self._next():
             replies += self._answer(request)
         return replies
 
     def _next(self) -> bytes:
-        """The next whole request, taken from what was heard; b"" if there is none yet."""
+        """Take the next complete request from the received bytes; b"" if there is none yet."""
         if self._over_tcp:
             length = MBAP.size
-            if len(self._heard) >= length:
-                _, protocol, rest = MBAP.unpack_from(self._heard)
-                if protocol != 0:  # no Modbus: a device drops what it cannot read
-                    self._heard = b""
+            if len(self._received) >= length:
+                _, protocol, rest = MBAP.unpack_from(self._received)
+                if protocol != 0:  # not Modbus: a device discards it
+                    self._received = b""
                 length += rest
         else:
             length = RTU_REQUEST
-            while len(self._heard) >= length and not _whole(self._heard[:length]):
-                self._heard = self._heard[1:]  # noise: look for a frame further on
-        if len(self._heard) < length:
+            while len(self._received) >= length and not _crc_matches(self._received[:length]):
+                self._received = self._received[1:]  # noise before a frame
+        if len(self._received) < length:
             return b""
-        request, self._heard = self._heard[:length], self._heard[length:]
+        request, self._received = self._received[:length], self._received[length:]
         return request
 
     def _answer(self, request: bytes) -> bytes:
-        """The reply to one whole frame; b"" if it is for an absent unit."""
+        """The reply to one complete frame; b"" for an absent unit."""
         if self._over_tcp:
             transaction, unit, message = MBAP.unpack_from(request)[0], request[6], request[7:]
         else:
@@ -71,7 +71,7 @@ class ModbusSlaves:
         return self._framer.buildFrame(reply)
 
 
-def _whole(frame: bytes) -> bool:
+def _crc_matches(frame: bytes) -> bool:
     return FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big"))
 
 

@@ -1,4 +1,4 @@
-"""From the configuration's wiring to what each simulated device's sensors see."""
+"""Connection of simulated devices to the world, by the configuration's wiring."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from compd.configuration.crosscheck import resolve
 from compd.simulation.truth.world import World
 from compd.simulation.wires.device import Sense
 
-# What a channel that the wiring does not use, or that the simulated machine does not have, answers.
+# Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.
 _IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}
 
 
 class Sensing:
-    """`of(gauge)` is that gauge's `Sense`: its channels, in its own counting direction."""
+    """Gives each gauge its `Sense`: values of its channels, with the gauge's own sign."""
 
     def __init__(self, configuration: Configuration, world: World) -> None:
         self._world = world
@@ -38,6 +38,7 @@ class Sensing:
                 self._sources[gauge][channel.name] = self._source(name, sign)
 
     def of(self, gauge: str) -> Sense:
+        """The function by which the simulated device of this gauge asks for its channels' values."""
         sources = self._sources[gauge]
         return lambda channel: sources[channel]()
 

@@ -1,4 +1,4 @@
-"""The simulated machine at work: its world, its gauges on their lines, its control socket."""
+"""The running simulation: a world that follows the clock, its gauges on their lines, its control socket."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from compd.simulation.wires.daemon_configuration import Port, daemon_configurati
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 
-# The world moves on this often: far below the 25 ms in which the fastest scale display answers.
+# Step of the world: below the 25 ms in which the fastest scale display answers.
 STEP_S = 0.02
 CONTROL_SOCKET = "control.sock"
-# The tracker's noise is its own, whatever the machine does.
+# The tracker's noise does not depend on the machine's seed.
 TRACKER_SEED = 17
 
 
 class Simulation:
-    """A configured machine that does not exist, on real ports. The world belongs to whoever holds the lock."""
+    """A configured machine, simulated on real ports. Access to the world is serialised by a lock."""
 
     def __init__(self, configuration: Configuration, world: World, directory: Path, clock: Clock) -> None:
-        """`directory`: an existing directory for ports, sockets, state and the daemon's configuration.
+        """directory : existing, for ports, sockets, state and the daemon's configuration.
 
-        Raises PluginError for a driver that nobody offers a simulated device for, ConfigurationError where
-        `directory` holds the machine's own configuration.
+        Raises PluginError for a driver without a simulated device, ConfigurationError where `directory` holds the
+        machine's own configuration.
         """
         daemon_path(configuration, directory)
         self.configuration = configuration
@@ -76,7 +76,7 @@ class Simulation:
         self._running = ExitStack()
 
     def start(self) -> Configuration:
-        """Open every port; the configuration, written to `directory`, with which the daemon finds them."""
+        """Open every port; returns the daemon's configuration, which is also written to `directory`."""
         self._ports_directory.mkdir(exist_ok=True)
         ports = {}
         for name, line in self.lines.items():
@@ -87,13 +87,13 @@ class Simulation:
         self._thread.start()
         self._running.callback(self._thread.join)
         self._running.callback(self._stop.set)
-        # last, for whoever waits for this socket to appear
+        # last: the socket's appearance tells others that the simulation is ready
         control = ControlSocket(self.directory / CONTROL_SOCKET, self._handlers)
         self._running.callback(control.stop)
         return daemon
 
     def stop(self) -> None:
-        """Close every port and socket that `start` has opened."""
+        """Close every port and socket."""
         self._running.close()
 
     def _run(self) -> None:
@@ -109,10 +109,10 @@ class Simulation:
         where = f"{self.configuration.path} gauges.{gauge}.driver"
         return load(SIMULATED_GAUGES, driver, where)(self.configuration.gauges[gauge], sensing.of(gauge))
 
-    # --- what the control socket asks for -------------------------------------------------------------
+    # --- requests on the control socket ---------------------------------------------------------------
 
     def truth(self) -> Answer:
-        """Where the tip truly is and what the machine does: the TRUTH message."""
+        """True tip and state of motion: the TRUTH message."""
         with self._lock:
             world = self.world
             tip_mm = world.tip_M_mm() if world.tip_frame == "M" else world.tip_P_mm()
@@ -132,13 +132,13 @@ class Simulation:
             }
 
     def measure(self) -> Answer:
-        """What a laser tracker on the surface plate shows of the tip now: the MEASURED message.
+        """The tip as a laser tracker on the surface plate shows it now: the MEASURED message.
 
-        `monotonic_s`: on the clock by which the gauges' readings are stamped too.
+        monotonic_s : on the clock that also stamps the gauges' readings.
         """
         with self._lock:
             world = self.world
-            shown_mm = noisy(world.reference_tip_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
+            tip_mm = noisy(world.reference_tip_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
             return {
                 "class": "MEASURED",
                 "instrument": "laser tracker",
@@ -146,7 +146,7 @@ class Simulation:
                 "monotonic_s": self._clock.monotonic(),
                 "moving": world.phase == "moving",
                 "tip_frame": world.tip_frame,
-                "reference_mm": [round(value, 6) for value in shown_mm.tolist()],
+                "reference_mm": [round(value, 6) for value in tip_mm.tolist()],
                 "sigma_um": TRACKER_SIGMA_UM,
             }
 

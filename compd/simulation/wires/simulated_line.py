@@ -1,7 +1,7 @@
-"""A simulated line: its devices on a real pty or TCP port, at the line's own pace, and its faults.
+"""A simulated line: its devices on a real pty or TCP port, at the line's baud rate, and its faults.
 
-A serial line is a pty whose replies come out as fast as the baud rate lets them; a TCP line is a listening
-socket on this computer. The daemon opens either as it would the real one.
+A serial line is a pty whose replies come at the baud rate; a TCP line is a listening socket on this computer. The
+daemon opens either as it would the real one.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegister
 from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
-# Characters leave in pieces of this length: finer would only cost time of this computer.
+# Replies are written in pieces of this duration; shorter pieces would only cost processor time.
 PIECE_S = 1e-3
 DAMAGED_BIT = 0x80
 
-# What is wrong with a line -> the reply as it then arrives, and how many line timeouts late.
+# A fault's effect on a reply.
 Damage = Callable[[bytes], bytes]
 
 
 def _garble(reply: bytes) -> bytes:
-    """One bit in the middle turned: no text has it, and a CRC finds it."""
+    """Invert the high bit in the middle: invalid in a text protocol, and found by a CRC."""
     middle = len(reply) // 2
     return reply[:middle] + bytes([reply[middle] ^ DAMAGED_BIT]) + reply[middle + 1 :]
 
 
 def _garble_header(reply: bytes) -> bytes:
-    """Modbus TCP: the frame's protocol number; TCP's own checksum keeps noise out of the rest."""
+    """Modbus TCP: damage the frame's protocol number; TCP's own checksum protects the rest against noise."""
     return reply[:2] + bytes([reply[2] ^ DAMAGED_BIT]) + reply[3:]
 
 
@@ -50,6 +50,7 @@ def _other_unit_tcp(reply: bytes) -> bytes:
     return reply[:6] + bytes([reply[6] % 247 + 1]) + reply[7:]
 
 
+# Delay of a reply with the fault "late", in line timeouts.
 LATE_TIMEOUTS = 1.5
 _COMMON: Mapping[str, Damage] = {
     "silent": lambda reply: b"",
@@ -69,13 +70,13 @@ UNPLUGGED = "unplugged"
 
 
 class Listener(Protocol):
-    """What hears the line's bytes and answers."""
+    """Receives a line's bytes and returns replies."""
 
     def hear(self, data: bytes) -> bytes: ...
 
 
 class ByteDevices:
-    """Devices on a line of bytes: each hears everything."""
+    """Devices on a line of bytes: each receives everything."""
 
     def __init__(self, devices: Sequence[SimulatedByteDevice]) -> None:
         self._devices = devices
@@ -85,17 +86,17 @@ class ByteDevices:
 
 
 @dataclass
-class _Leaving:
-    """A reply on its way out: from when, to whom, and how much of it has left."""
+class _Reply:
+    """A reply under way: transmission starts at start_s to fd; `sent` bytes of it are written."""
 
     start_s: float
     fd: int
-    reply: bytes
-    left: int = 0
+    data: bytes
+    sent: int = 0
 
 
 class SimulatedLine:
-    """One configured line with its devices. Everything happens on the line's own thread."""
+    """One configured line with its devices, served by a thread of its own."""
 
     def __init__(
         self,
@@ -105,8 +106,8 @@ class SimulatedLine:
         directory: Path,
         clock: Clock | None = None,
     ) -> None:
-        """`directory`: where a serial line's port appears, as `name`."""
-        self.replies = 0  # that have gone out, or would have
+        """directory : where a serial line's port appears, as `name`."""
+        self.replies = 0  # number of replies, including those that a fault suppresses
         self._settings = settings
         self._clock = clock or MonotonicClock()
         self._link = directory / name
@@ -124,16 +125,16 @@ class SimulatedLine:
             self._character_s = bits / settings.baud
         self._tcp_port = 0
         self._end: End | None = None
-        self._leaving: list[_Leaving] = []
+        self._replies: list[_Reply] = []
         self._fault: str | None = None
-        self._wanted: str | None = None  # the line's thread follows it between two replies
+        self._requested_fault: str | None = None  # applied by the line's thread between two replies
         self._wake_read, self._wake_write = os.pipe()
         self._stopping = False
         self._applied = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"simulated {name}", daemon=True)
 
     def start(self) -> str | tuple[str, int]:
-        """Open the port and serve it. The port for the daemon: a device path or pyserial URL, or (host, port)."""
+        """Open the port and serve it. Returns the port for the daemon: device path, pyserial URL, or (host, port)."""
         self._plug_in()
         self._thread.start()
         if self._on_pty:
@@ -152,12 +153,12 @@ class SimulatedLine:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What can be wrong with this line."""
+        """Faults that this kind of line can have."""
         return (*self._damages, UNPLUGGED)
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with the line now; None: nothing. Setting it returns when the line is so."""
+        """The line's fault, or None. Setting it returns when the fault is applied."""
         return self._fault
 
     @fault.setter
@@ -166,7 +167,7 @@ class SimulatedLine:
             raise ValueError(f"no fault {fault!r} on a line of kind {self._settings.kind}: {', '.join(self.faults)}")
         if not self._thread.is_alive():
             raise RuntimeError("only a line that is served can have a fault: start it first")
-        self._wanted = fault
+        self._requested_fault = fault
         self._applied.clear()
         self._wake()
         self._applied.wait()
@@ -186,7 +187,7 @@ class SimulatedLine:
         if self._end is not None:
             self._end.close()
         self._end = None
-        self._leaving.clear()
+        self._replies.clear()
 
     def _run(self) -> None:
         while not self._stopping:
@@ -195,13 +196,13 @@ class SimulatedLine:
             for fd in ready:
                 if fd == self._wake_read:
                     os.read(fd, 4096)
-                    self._follow_fault()
+                    self._apply_fault()
                 elif self._end is not None:
                     self._hear(self._end, fd)
         self._pull_out()
 
-    def _follow_fault(self) -> None:
-        self._fault = self._wanted
+    def _apply_fault(self) -> None:
+        self._fault = self._requested_fault
         if self._fault == UNPLUGGED:
             self._pull_out()
         elif self._end is None:
@@ -214,34 +215,34 @@ class SimulatedLine:
         if not reply:
             return
         self.replies += 1
-        # the request has been on the wire, too
+        # transmission of the request takes time as well
         start_s = self._clock.monotonic() + len(data) * self._character_s
         if self._fault is not None:
             reply = self._damages[self._fault](reply)
         if self._fault == "late":
             start_s += LATE_TIMEOUTS * self._settings.timeout_s
-        if self._leaving:  # one after the other, also behind a late one
-            start_s = max(start_s, self._end_s(self._leaving[-1]))
-        self._leaving.append(_Leaving(start_s, fd, reply))
+        if self._replies:  # in order, also behind a late one
+            start_s = max(start_s, self._end_s(self._replies[-1]))
+        self._replies.append(_Reply(start_s, fd, reply))
 
     def _transmit(self) -> float | None:
-        """Write what is due; the time (s) until more is, None if nothing is under way."""
+        """Write what is due; returns the time in s until more is due, None if no reply is under way."""
         if self._end is None:
             return None
         now_s = self._clock.monotonic()
-        while self._leaving:
-            item = self._leaving[0]
-            if now_s >= self._end_s(item):
-                self._end.write(item.fd, item.reply[item.left :])
-                del self._leaving[0]
+        while self._replies:
+            reply = self._replies[0]
+            if now_s >= self._end_s(reply):
+                self._end.write(reply.fd, reply.data[reply.sent :])
+                del self._replies[0]
                 continue
-            if now_s < item.start_s:
-                return min(item.start_s + PIECE_S, self._end_s(item)) - now_s
-            due = int((now_s - item.start_s) / self._character_s)
-            self._end.write(item.fd, item.reply[item.left : due])
-            item.left = due
-            return min(PIECE_S, self._end_s(item) - now_s)
+            if now_s < reply.start_s:
+                return min(reply.start_s + PIECE_S, self._end_s(reply)) - now_s
+            due = int((now_s - reply.start_s) / self._character_s)
+            self._end.write(reply.fd, reply.data[reply.sent : due])
+            reply.sent = due
+            return min(PIECE_S, self._end_s(reply) - now_s)
         return None
 
-    def _end_s(self, item: _Leaving) -> float:
-        return item.start_s + len(item.reply) * self._character_s
+    def _end_s(self, reply: _Reply) -> float:
+        return reply.start_s + len(reply.data) * self._character_s

@@ -1,4 +1,4 @@
-"""The ends that a simulated line holds: a pty's master side, or a listening TCP socket."""
+"""Ends of a simulated line: a pty's master side, or a listening TCP socket."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_BYTES = 4096  # of one read
 
 
 class End(Protocol):
-    """What can be selected, read and written."""
+    """An end that can be selected, read and written, by file descriptor."""
 
     def fds(self) -> list[int]: ...
     def read(self, fd: int) -> bytes: ...
@@ -23,11 +23,11 @@ class End(Protocol):
 
 
 class PtyEnd:
-    """A pty with a symbolic link to the daemon's side; closing it is pulling the plug."""
+    """A pty with a symbolic link to the daemon's side; closing it unplugs the line."""
 
     def __init__(self, link: Path) -> None:
         self._link = link
-        # The daemon's side stays open here, so that the daemon may come and go.
+        # The daemon's side stays open here, so that the daemon can close and reopen it.
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         link.unlink(missing_ok=True)
@@ -49,7 +49,7 @@ class PtyEnd:
 
 
 class TcpEnd:
-    """A listening socket; one reply goes to the connection that asked."""
+    """A listening socket; a reply goes to the connection that sent the request."""
 
     def __init__(self, port: int) -> None:
         self._connections: dict[int, socket.socket] = {}
@@ -60,7 +60,7 @@ class TcpEnd:
         return [self._listener.fileno(), *self._connections]
 
     def read(self, fd: int) -> bytes:
-        """What a client sent; a new client, and one that leaves, has sent nothing."""
+        """Bytes that a client sent; b"" for a new or closed connection."""
         if fd == self._listener.fileno():
             connection, _ = self._listener.accept()
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -75,7 +75,7 @@ class TcpEnd:
         return data
 
     def write(self, fd: int, data: bytes) -> None:
-        with suppress(OSError):  # who has gone needs no answer
+        with suppress(OSError):  # the client has closed the connection
             if fd in self._connections:
                 self._connections[fd].sendall(data)
 

@@ -93,13 +93,13 @@ def test_a_pass_moves_at_constant_speed(recorded: SimulatedRecording) -> None:
 
 def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
     days = draw_campaign_plan(machine, 3)
-    found = Campaign(tripod(), wiring(), days, 3, NOTHING, sigma_um=TRACKER_SIGMA_UM, outlier_share=0.01).run()
+    measured = Campaign(tripod(), wiring(), days, 3, NOTHING, sigma_um=TRACKER_SIGMA_UM, outlier_share=0.01).run()
     true = Campaign(tripod(), wiring(), days, 3, NOTHING).run()
     names = [f"reference_{axis}_mm" for axis in "xyz"]
-    wrong_um = 1e3 * np.array([np.array(found.columns[n]) - np.array(true.columns[n]) for n in names])
-    far = np.abs(wrong_um).max(axis=0) > 6 * TRACKER_SIGMA_UM
-    assert 0.002 < far.mean() < 0.02
-    assert np.std(wrong_um[:, ~far]) == pytest.approx(TRACKER_SIGMA_UM, rel=0.1)
+    error_um = 1e3 * np.array([np.array(measured.columns[name]) - np.array(true.columns[name]) for name in names])
+    outliers = np.abs(error_um).max(axis=0) > 6 * TRACKER_SIGMA_UM
+    assert 0.002 < outliers.mean() < 0.02
+    assert np.std(error_um[:, ~outliers]) == pytest.approx(TRACKER_SIGMA_UM, rel=0.1)
 
 
 def test_gauges_explain_a_machine_without_hidden_causes(machine: Mechanism) -> None:
@@ -119,8 +119,8 @@ def test_a_cause_is_as_strong_as_it_takes(name: str) -> None:
     sized = sizer.size(HiddenCause(name, None, 3.0))
     assert sized.floors == pytest.approx(3.0, rel=0.06)
     assert CAUSES[name].min_strength <= abs(sized.cause.strength) <= CAUSES[name].max_strength
-    given = sizer.size(HiddenCause(name, sized.cause.strength))
-    assert given.floors == pytest.approx(sized.floors, rel=1e-9)
+    same = sizer.size(HiddenCause(name, sized.cause.strength))
+    assert same.floors == pytest.approx(sized.floors, rel=1e-9)
 
 
 def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> None:
@@ -133,11 +133,11 @@ def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> Non
 
 
 def test_what_is_hidden_follows_from_its_number(machine: Mechanism) -> None:
-    found = [draw_hidden(seed, machine) for seed in range(300)]
-    assert found == [draw_hidden(seed, machine) for seed in range(300)]
-    assert {one.id for one in found} == set(CAUSES)
-    assert all(LEAST_FLOORS <= one.floors <= MOST_FLOORS for one in found)
-    outside = np.mean([not CAUSES[one.id].in_library for one in found])
+    hidden = [draw_hidden(seed, machine) for seed in range(300)]
+    assert hidden == [draw_hidden(seed, machine) for seed in range(300)]
+    assert {cause.id for cause in hidden} == set(CAUSES)
+    assert all(LEAST_FLOORS <= cause.floors <= MOST_FLOORS for cause in hidden)
+    outside = np.mean([not CAUSES[cause.id].in_library for cause in hidden])
     assert 0.1 < outside < 0.3
     without_axes = Mechanism(hexapod())
     assert "revolute_axis_tilt" not in {draw_hidden(seed, without_axes).id for seed in range(300)}
@@ -168,8 +168,8 @@ def test_other_days_are_on_the_same_machine(recorded: SimulatedRecording) -> Non
         load(TRIPOD), 3, [HiddenCause("link_expansion", recorded.hidden[0].cause.strength)], other_days=1
     )
     assert {cause.id: cause.values for cause in recorded.weak} == {cause.id: cause.values for cause in other.weak}
-    there, here = (column(one, "reference_x_mm")[:50] for one in (recorded, other))
-    assert np.abs(there - here).max() > 1.0
+    first_mm, other_mm = (column(days, "reference_x_mm")[:50] for days in (recorded, other))
+    assert np.abs(first_mm - other_mm).max() > 1.0
 
 
 def test_balls_of_a_plate_are_apart_and_within_reach(machine: Mechanism) -> None:

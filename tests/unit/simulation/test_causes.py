@@ -95,8 +95,8 @@ def test_other_machines_have_causes_too(geometry: Any) -> None:
     machine = Mechanism(geometry)
     wires = wiring(HEXAPOD) if machine.links == 6 else wiring()
     for name in possible_causes(machine):
-        one = build_cause(name, CAUSES[name].max_strength / 10, machine, seed=2)
-        world = World(geometry, wires, 1, strengths=NOTHING, causes=[one], weather=WarmRoom())
+        built = build_cause(name, CAUSES[name].max_strength / 10, machine, seed=2)
+        world = World(geometry, wires, 1, strengths=NOTHING, causes=[built], weather=WarmRoom())
         world.force_M_N = np.array([5.0, 5.0, -20.0])
         world.advance_to(np.linspace(-2.0, 3.0, machine.links), world.posture, 3000.0, 1.0)
         assert np.all(np.isfinite(world.reference_tip_mm()))
@@ -178,8 +178,11 @@ def test_a_link_adjusted_wrongly_is_as_if_its_scale_stood_elsewhere() -> None:
 def test_a_scale_that_is_too_long_and_one_that_grows() -> None:
     gain = cause("scale_gain", 30.0)
     scale_mm = np.array([40.0, -25.0, 60.0])
-    for one, factor in ((gain, 1 + PPM * np.array(gain.values)), (cause("scale_expansion", 8.0), 1 + 8 * PPM * WARM_K)):
-        world, other = ideal(one, WarmRoom()), ideal(None)
+    for scale_cause, factor in (
+        (gain, 1 + PPM * np.array(gain.values)),
+        (cause("scale_expansion", 8.0), 1 + 8 * PPM * WARM_K),
+    ):
+        world, other = ideal(scale_cause, WarmRoom()), ideal(None)
         go(world, scale_mm, LONG_S)
         go(other, scale_mm * factor)
         assert world.tip_M_mm() == pytest.approx(other.tip_M_mm(), abs=3e-6)

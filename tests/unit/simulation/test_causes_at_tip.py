@@ -76,8 +76,8 @@ def test_runout_goes_across_the_link_where_no_comparator_looks() -> None:
     world, true = ideal(cause("joint_runout", 20.0)), ideal(None)
     go(world, np.zeros(3))
     assert moved_um(world) == pytest.approx([0.0] * 3, abs=1e-6)
-    for one in (world, true):
-        go(one, np.array([60.0, -30.0, 10.0]))
+    for machine in (world, true):
+        go(machine, np.array([60.0, -30.0, 10.0]))
     assert np.abs(world.link_change_mm() - true.link_change_mm()).max() < 1e-12
     assert all(world.sense(f"joint_{k}") == 0.0 for k in range(1, 10))
     assert 0.1 < np.linalg.norm(world.tip_M_mm() - true.tip_M_mm()) / UM < 60.0

@@ -38,9 +38,9 @@ def supports_from_distances(machine: Mechanism, change_mm: FloatArray) -> FloatA
     def error(coordinates: FloatArray) -> FloatArray:
         return distances_mm(coordinates.reshape(3, 3), machine.plate0_M) - wanted
 
-    found = least_squares(error, machine.supports0_M.ravel(), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
-    assert np.abs(error(found)).max() < 1e-9
-    return np.asarray(found.reshape(3, 3))
+    solution = least_squares(error, machine.supports0_M.ravel(), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    assert np.abs(error(solution)).max() < 1e-9
+    return np.asarray(solution.reshape(3, 3))
 
 
 def test_tripod_at_the_worked_places() -> None:

@@ -31,27 +31,27 @@ def test_a_move_to_where_it_is_takes_no_time() -> None:
 def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
     points_mm = np.array([[5.0, 0.0], [0.0, 9.0], [-4.0, -4.0]])
     tour = TourMotion(np.zeros(2), points_mm, 1.0, np.random.default_rng(1))
-    seen: list[int] = []
+    visited: list[int] = []
     moved_s = 0.0
     for _ in range(3000):
         moved_s += tour.advance(0.01)
         if tour.phase == "dwelling":
             np.testing.assert_array_equal(tour.position_mm, points_mm[tour.point - 1])
-            if not seen or seen[-1] != tour.point:
-                seen.append(tour.point)
-    assert set(seen) == {1, 2, 3}
+            if not visited or visited[-1] != tour.point:
+                visited.append(tour.point)
+    assert set(visited) == {1, 2, 3}
     assert 0 < moved_s < 30.0
-    assert 30.0 - moved_s == pytest.approx(len(seen), abs=1.1)  # a second at each point
+    assert 30.0 - moved_s == pytest.approx(len(visited), abs=1.1)  # a second at each point
 
 
 def test_a_tour_does_not_depend_on_the_step() -> None:
     points_mm = np.random.default_rng(4).uniform(-20, 20, (5, 3))
-    one = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    once = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
     many = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
-    moved_s = one.advance(40.0)
+    moved_s = once.advance(40.0)
     assert sum(many.advance(0.008) for _ in range(5000)) == pytest.approx(moved_s, abs=1e-6)
-    assert one.point == many.point
-    np.testing.assert_allclose(one.position_mm, many.position_mm, atol=1e-6)
+    assert once.point == many.point
+    np.testing.assert_allclose(once.position_mm, many.position_mm, atol=1e-6)
 
 
 @pytest.mark.parametrize("step_s", [0.001, 0.02, 0.5])

@@ -92,7 +92,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
         ],
         ["temperature_link_1_degC", "temperature_link_4_degC", "force_w_N", "spindle_rpm"],
     )
-    said = problems(wrong)
+    text = problems(wrong)
     for line, what in (
         ("1 column temperature_link_4_degC", "is nothing that this machine can be told"),
         ("1 column force_w_N", "did you mean force_"),
@@ -105,9 +105,9 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
         ("7 column temperature_link_1_degC", "is out of range"),
         ("8 column time_s", "is empty"),
     ):
-        at = said.index(f"{wrong}:{line}: ")
-        assert what in said[at : at + 1200].split(f"\n{wrong}")[0], line
-    assert f"0 to {SPEED_MM_PER_S:g}" in said
+        start = text.index(f"{wrong}:{line}: ")
+        assert what in text[start : start + 1200].split(f"\n{wrong}")[0], line
+    assert f"0 to {SPEED_MM_PER_S:g}" in text
 
 
 def test_no_room_to_come_from_a_side(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_no_room_to_come_from_a_side(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "problem"),
     [
         ("", "is empty"),
         ("time_s,tip_x_mm,tip_y_mm,tip_z_mm\n", "has no row"),
@@ -133,10 +133,10 @@ def test_no_room_to_come_from_a_side(tmp_path: Path) -> None:
         ("time_s,tip_x_mm,tip_y_mm,tip_z_mm\n0,0,190\n", ":2: has not as many cells as the header"),
     ],
 )
-def test_a_file_that_is_no_plan(tmp_path: Path, text: str, said: str) -> None:
+def test_a_file_that_is_no_plan(tmp_path: Path, text: str, problem: str) -> None:
     path = tmp_path / "next.csv"
     path.write_text(text, encoding="utf-8")
-    assert said in problems(path)
+    assert problem in problems(path)
 
 
 def test_a_plan_that_does_not_suit_the_machine(tmp_path: Path) -> None:
@@ -152,9 +152,9 @@ def test_a_plan_that_does_not_suit_the_machine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("geometry", "wires"), [(tripod(), wiring()), (hexapod(), wiring(HEXAPOD))])
 def test_what_can_be_held_can_be_sensed(geometry: object, wires: object) -> None:
     world = World(geometry, wires, 1)  # type: ignore[arg-type]
-    held = holdable_quantities(world.mechanism.links)
+    holdable = holdable_quantities(world.mechanism.links)
     shown = [name for name in world.names if not name.startswith(("scale_", "joint_", "frame_"))]
-    assert sorted(held) == sorted(shown)
+    assert sorted(holdable) == sorted(shown)
 
 
 # --- how the machine goes about it ----------------------------------------------------------------------------
@@ -162,14 +162,14 @@ def test_what_can_be_held_can_be_sensed(geometry: object, wires: object) -> None
 
 def test_every_row_is_reached_from_its_side(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    given = [
+    planned = [
         {
             **{f"tip_{a}_mm": round(float(v), 3) for a, v in zip("xyz", tip, strict=True)},
             **{f"approach_{i}": int(rng.choice([-1, 1])) for i in (1, 2, 3)},
         }
         for tip in rng.uniform([-60, -60, 150], [60, 60, 220], (12, 3))
     ]
-    rows = read(plan_file(tmp_path / "next.csv", given))
+    rows = read(plan_file(tmp_path / "next.csv", planned))
     last = np.zeros(3)
     for stage in staged(rows):
         moved = stage.move.end_mm - stage.move.start_mm
@@ -201,8 +201,8 @@ def test_waiting_and_settling(tmp_path: Path) -> None:
     rows = read(
         plan_file(tmp_path / "next.csv", [{**warm}, {**warm, "time_s": 600.0}, {**dict.fromkeys(WARM, 20.0)}], WARM)
     )
-    found = [(stage.row.number, stage.purpose, stage.duration_s) for stage in staged(rows, speedup=10.0)]
-    assert [(number, purpose) for number, purpose, _ in found] == [
+    timeline = [(stage.row.number, stage.purpose, stage.duration_s) for stage in staged(rows, speedup=10.0)]
+    assert [(number, purpose) for number, purpose, _ in timeline] == [
         (1, "settle"),
         (1, "look"),
         (2, "wait"),
@@ -210,8 +210,8 @@ def test_waiting_and_settling(tmp_path: Path) -> None:
         (3, "settle"),
         (3, "look"),
     ]
-    assert found[0][2] == pytest.approx(SETTLED_S / 10)
-    assert found[1][2] + found[2][2] == pytest.approx(60.0)  # from the first row, of which some was spent looking
+    assert timeline[0][2] == pytest.approx(SETTLED_S / 10)
+    assert timeline[1][2] + timeline[2][2] == pytest.approx(60.0)  # from the first row, of which some was spent looking
 
 
 def test_a_row_on_the_move_is_passed_at_its_speed(tmp_path: Path) -> None:
@@ -227,30 +227,33 @@ def test_a_row_on_the_move_is_passed_at_its_speed(tmp_path: Path) -> None:
 def test_the_drives_follow_the_stages_in_any_steps(tmp_path: Path) -> None:
     rows = read(plan_file(tmp_path / "next.csv", [{"tip_x_mm": 20.0}, {"tip_x_mm": -20.0, "time_s": 30.0}]))
     held: list[object] = []
-    drives = [PlanMotion(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
+    motions = [PlanMotion(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
     whole_s = sum(stage.duration_s for stage in plan_stages(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]))
-    assert drives[0].progress() == {"row": 1, "rows": 2, "purpose": "a test", "doing": "walk", "done": False}
-    moved_s = [drives[0].advance(whole_s + 0.001), sum(drives[1].advance(0.02) for _ in range(int(whole_s / 0.02) + 1))]
+    assert motions[0].progress() == {"row": 1, "rows": 2, "purpose": "a test", "doing": "walk", "done": False}
+    moved_s = [
+        motions[0].advance(whole_s + 0.001),
+        sum(motions[1].advance(0.02) for _ in range(int(whole_s / 0.02) + 1)),
+    ]
     assert moved_s[0] == pytest.approx(moved_s[1])
-    for one in drives:
-        assert one.position_mm == pytest.approx(rows[1].scale_mm)
-        assert (one.progress()["row"], one.progress()["doing"], one.phase) == (2, "done", "dwelling")
+    for motion in motions:
+        assert motion.position_mm == pytest.approx(rows[1].scale_mm)
+        assert (motion.progress()["row"], motion.progress()["doing"], motion.phase) == (2, "done", "dwelling")
 
 
 def test_what_is_held_is_as_told(tmp_path: Path) -> None:
     world = World(tripod(), wiring(), 1, strengths=FULLY_MEASURED_WITHOUT_NOISE)
     names = holdable_quantities(3)
-    told = {name: 20.0 + 0.3 * k for k, name in enumerate(names) if name.startswith("temperature_")}
-    told |= {"pressure_hPa": 990.0, "humidity_pct": 61.0, "force_x_N": 5.0, "force_y_N": -6.0, "force_z_N": 7.0}
-    world.hold(told)
+    quantities = {name: 20.0 + 0.3 * k for k, name in enumerate(names) if name.startswith("temperature_")}
+    quantities |= {"pressure_hPa": 990.0, "humidity_pct": 61.0, "force_x_N": 5.0, "force_y_N": -6.0, "force_z_N": 7.0}
+    world.hold(quantities)
     world.advance_to(world.scale_mm, world.posture, SETTLED_S, 0.0)
-    for name, value in told.items():
+    for name, value in quantities.items():
         assert world.sense(name) == pytest.approx(value, abs=0.12), name
     world.hold({})
     world.advance_to(world.scale_mm, world.posture, 48 * 3600.0, 0.0)
     assert world.sense("pressure_hPa") > 1000.0
     assert world.sense("force_x_N") == 0.0
-    assert abs(world.sense("temperature_plate_bottom_degC") - told["temperature_plate_bottom_degC"]) > 1.0
+    assert abs(world.sense("temperature_plate_bottom_degC") - quantities["temperature_plate_bottom_degC"]) > 1.0
 
 
 # --- the recording that comes of it -----------------------------------------------------------------------------
@@ -274,8 +277,8 @@ def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> 
         ],
         ["force_z_N", *WARM],
     )
-    found = campaign(path)
-    columns = {name: np.array(values) for name, values in found.columns.items()}
+    recorded = campaign(path)
+    columns = {name: np.array(values) for name, values in recorded.columns.items()}
     measured = np.isfinite(columns["reference_x_mm"])
     assert measured.sum() == 5  # twice at rest, once on the move
     assert np.all(np.diff(columns["time_s"]) > 0)
@@ -290,8 +293,8 @@ def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> 
     # while the links warmed up the gauges were read often enough to see how
     assert (~measured & (columns["temperature_link_1_degC"] > 21) & (columns["temperature_link_1_degC"] < 24.5)).any()
     other = simulate_recording(load(TRIPOD), 4, [HiddenCause("backlash", 3.0)])
-    assert {cause.id: cause.values for cause in found.weak} == {cause.id: cause.values for cause in other.weak}
-    assert found.hidden[0].cause.values == other.hidden[0].cause.values
+    assert {cause.id: cause.values for cause in recorded.weak} == {cause.id: cause.values for cause in other.weak}
+    assert recorded.hidden[0].cause.values == other.hidden[0].cause.values
 
 
 def test_the_same_seed_measures_the_same_and_another_day_does_not(tmp_path: Path) -> None:
