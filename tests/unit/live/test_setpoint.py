@@ -133,10 +133,3 @@ def test_packet_with_the_tool_on_the_plate_carries_the_touched_place_and_says_so
     packet = setpoint(numbers(tip_P_mm=np.array([5.0, 6.0, 7.0]))).to_packet(HASH)
     assert struct.unpack_from("<H", packet, 40) == (3,)
     assert struct.unpack_from("<3d", packet, 48) == (5.0, 6.0, 7.0)
-
-
-def test_state_codes_are_part_of_the_protocol_and_do_not_move():
-    names = ["starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused"]
-    for code, name in enumerate(names):
-        assert setpoint(None, State(name)).to_packet(HASH)[42] == code
-    assert len(State) == len(names)
