@@ -12,9 +12,11 @@ from compd.configuration import load
 from compd.errors import Problem, StateError
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
+from compd.live.loop.cycle import step
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.setpoint import Mode
 from compd.live.loop.states import State
+from compd.live.service.state_json import to_plain
 from tests.support.live_machine import CONFIG, HOLD_S, PERIOD_S, RAW_AT_ZERO_MM, STEP_MM, Machine, machine
 
 ZERO_TIP_M_MM = [0.0, 0.0, 190.0]
@@ -289,6 +291,27 @@ def test_the_same_snapshots_give_the_same_setpoints_bit_for_bit():
         a, b = one.step(), other.step()
         assert a.to_json() == b.to_json()
         assert a.to_packet(bytes(8)) == b.to_packet(bytes(8))
+
+
+def test_a_step_changes_neither_state_nor_inputs_and_may_be_repeated(tripod):
+    tripod.change_mm |= {"joints.4": 0.02, "cabinet.t1": 0.004}
+    tripod.settle()
+    before, setpoint = tripod.state, tripod.step()
+    first, after = step(before, setpoint.inputs, tripod.settings)
+    step(after, setpoint.inputs._replace(tick=tripod.tick + 1), tripod.settings)
+    second, after_again = step(before, setpoint.inputs, tripod.settings)
+    assert first.to_packet(bytes(8)) == second.to_packet(bytes(8)) == setpoint.to_packet(bytes(8))
+    states = [to_plain(state._replace(zero=None)) for state in (after, after_again, tripod.state)]
+    assert states[0] == states[1] == states[2]
+
+
+def test_an_invalid_setpoint_keeps_the_correction_that_is_applied(tripod):
+    tripod.change_mm["joints.4"] = 0.02
+    tripod.settle()
+    before = tripod.state
+    tripod.faults["scale_1.position"] = Quality.TIMEOUT
+    assert not tripod.step().valid
+    assert tripod.state.correction_mm is before.correction_mm
 
 
 def test_a_new_zero_leaves_nothing_of_the_old_one_and_does_not_jump(tripod):

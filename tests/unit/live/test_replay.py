@@ -103,6 +103,18 @@ def test_what_effects_remember_goes_to_json_and_back():
         from_plain({"strange": 1})
 
 
+def test_the_names_in_a_recording_stay_whatever_the_classes_are_called():
+    run = Run(machine())
+    _, message, _ = list(run.quiet(2))[-1]
+    carried = message["carried"]
+    names = {"kind", "zero", "warm", "correction_mm", "last_good", "scales_seen", "shadow", "adopting", "u_tip_um"}
+    assert set(carried) == names
+    kinds = {name: carried[name]["kind"] for name in ("warm", "last_good", "shadow")}
+    assert kinds == {"warm": "WarmStart", "last_good": "Comparators", "shadow": "Remembered"}
+    assert carried["kind"] == "Carried"
+    assert set(carried["last_good"]) == {"kind", "change_mm", "time_s", "oldest_s", "quantities"}
+
+
 def test_a_cycle_without_zero_reads_back_as_it_was():
     run = Run(machine())
     run.machine.commands.zero = StateError(
