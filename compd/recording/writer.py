@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
+from compd.files import write_files
 from compd.recording.columns import is_covariate, known
 from compd.units import unit_of
 
@@ -43,7 +42,11 @@ def write_recording(
     lines = [",".join(arrays), *map(",".join, zip(*cells, strict=True))]
     csv_text = "\n".join(lines) + "\n"
     yaml_text = yaml.safe_dump(dict(sidecar), sort_keys=False, allow_unicode=True)
-    _write_all(path, csv_text, path.with_suffix(".yaml"), yaml_text)
+    try:
+        # whoever works on the recording must be able to read it
+        write_files({path.with_suffix(".yaml"): yaml_text, path: csv_text}, mode=0o644)
+    except OSError as error:
+        raise RecordingError(Problem(where=str(path.parent), what=f"cannot be written to: {error.strerror}")) from error
 
 
 def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
@@ -86,38 +89,3 @@ def _rounded(name: str, values: FloatArray) -> FloatArray:
 def _cells(name: str, values: FloatArray) -> list[str]:
     """A column as it is written: the shortest text that reads back as the same number, without a needless ".0"."""
     return ["" if math.isnan(value) else repr(value).removesuffix(".0") for value in _rounded(name, values).tolist()]
-
-
-def _write_all(csv_path: Path, csv_text: str, yaml_path: Path, yaml_text: str) -> None:
-    """Both files or none: temporary files beside them, flushed, then renamed; the sidecar is put back if the
-    last step fails."""
-    temporary: list[Path] = []
-    try:
-        new_csv = _written(csv_path, csv_text, temporary)
-        new_yaml = _written(yaml_path, yaml_text, temporary)
-        old_yaml = yaml_path.read_bytes() if yaml_path.exists() else None
-        new_yaml.replace(yaml_path)
-        try:
-            new_csv.replace(csv_path)
-        except OSError:
-            yaml_path.unlink() if old_yaml is None else yaml_path.write_bytes(old_yaml)
-            raise
-    except OSError as error:
-        for path in temporary:
-            path.unlink(missing_ok=True)
-        raise RecordingError(
-            Problem(where=str(csv_path.parent), what=f"cannot be written to: {error.strerror}")
-        ) from error
-
-
-def _written(target: Path, text: str, temporary: list[Path]) -> Path:
-    """A file beside `target` that holds `text`, on the disk."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    temporary.append(Path(name))
-    with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    # a temporary file is for its owner alone; a recording is read like any other file
-    temporary[-1].chmod(0o644)
-    return temporary[-1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 import zlib
@@ -13,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.json_text import encode_compact
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.states import State
 
@@ -44,8 +44,6 @@ _FLAG_VALID = 1
 _FLAG_TOOL_ON_PLATE = 2  # the tip's three coordinates are then tip_P
 PACKET_SIZE = _PACKET.size + 4
 _LINKS = 6
-# One encoder for all: json.dumps() makes a new one for every call that is not plain.
-_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 _NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * _LINKS)
 
 
@@ -152,7 +150,7 @@ class Setpoint(NamedTuple):
             message["age_s"] = round(self.age_s, _DECIMALS_S)
         if self.values is not None:
             message |= _json_values(self.values)
-        return _encode(message).encode() + b"\n"
+        return encode_compact(message).encode() + b"\n"
 
     def to_packet(self, config_hash: bytes) -> bytes:
         """`PACKET_SIZE` bytes, little-endian; the links a machine does not have are nan.

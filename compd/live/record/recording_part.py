@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from io import FileIO
@@ -12,6 +11,8 @@ from typing import Any
 
 import yaml
 
+from compd.files import sync_directory, write_new_file
+from compd.json_text import encode_compact
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]
@@ -44,7 +45,7 @@ class RecordingPart:
         self._columns: Sequence[Message] = watch["columns"]
         self._origin_s = origin_s
         sidecar = yaml.safe_dump(self._sidecar(version, watch, started_at), sort_keys=False).encode()
-        opened = b"".join(json.dumps(message, separators=(",", ":")).encode() + b"\n" for message in opening)
+        opened = b"".join(encode_compact(message).encode() + b"\n" for message in opening)
         self._links = len(first.get("approach", ()))
         approach = [f"approach_{i + 1}" for i in range(self._links)]
         header = ",".join(["time_s", *(column["column"] for column in self._columns), *approach]).encode() + b"\n"
@@ -57,7 +58,7 @@ class RecordingPart:
         self._cycles.add(opened)
         self._csv.add(header)
         self.sync()
-        _sync_directory(stem.parent)
+        sync_directory(stem.parent)
 
     @property
     def size(self) -> int:
@@ -104,10 +105,7 @@ class RecordingPart:
             path.unlink(missing_ok=True)
 
     def _write_whole(self, path: Path, content: bytes) -> None:
-        with path.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+        write_new_file(path, content)
         self._whole_size += len(content)
 
     def _row(self, message: Message) -> str:
@@ -190,12 +188,3 @@ class LinesFile:
 def _number(value: float, decimals: int) -> str:
     """The shortest text that reads back as the same number, without a needless ".0"."""
     return repr(round(value, decimals) + 0.0).removesuffix(".0")
-
-
-def _sync_directory(directory: Path) -> None:
-    """New files are on disk only once their directory is."""
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

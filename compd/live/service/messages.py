@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NoReturn
 
+from compd.json_text import encode_compact
 from compd.live.loop.commands import Target
 
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096
 # 1e9 mm is 1000 km: a number beyond it is not a coordinate, a rate or an angle.
 _LARGEST_NUMBER = 1e9
-# One encoder for all: json.dumps() makes a new one for every call that is not plain.
-_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
 
 class ErrorCode(StrEnum):
@@ -66,7 +65,7 @@ class ModelOrder:
 
 def line(message: Mapping[str, Any]) -> bytes:
     """One message as it goes over the wire."""
-    return _encode(message).encode() + b"\n"
+    return encode_compact(message).encode() + b"\n"
 
 
 def parse(data: bytes) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.gauge import Quality
+from compd.json_text import omit_unknown
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.wiring import MachineWires
@@ -53,7 +54,7 @@ class StatusReport:
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
         }
-        known: dict[str, Any] = _known(message)
+        known: dict[str, Any] = omit_unknown(message)
         return known
 
     def _zero(self) -> dict[str, Any]:
@@ -86,16 +87,3 @@ class StatusReport:
                 entry["detail"] = reading.detail
             found.append(entry)
         return found
-
-
-def _known(value: Any) -> Any:
-    """Without what is not finite: JSON has no word for it, and absent means unknown."""
-    match value:
-        case Mapping():
-            pairs = ((str(key), _known(part)) for key, part in value.items())
-            return {key: part for key, part in pairs if part is not None}
-        case list() | tuple():
-            return [_known(part) for part in value]
-        case float() if not math.isfinite(value):
-            return None
-    return value
