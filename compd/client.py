@@ -6,9 +6,6 @@ with connect("127.0.0.1:7750") as client:
     for setpoint in client.watch(rate_hz=10):
         if setpoint["valid"]:
             print(setpoint["tip_M_mm"])
-
-`watch` gives setpoints as the daemon sends them. A setpoint whose `state` the reader does not know comes from a newer
-daemon and must be taken for invalid.
 """
 
 from __future__ import annotations
