@@ -137,6 +137,10 @@ class Recording:
         sigma_um = self.reference.sigma_um if self.reference else (np.nan,)
         return np.broadcast_to(np.array(sigma_um) / 1000.0, (count,)).astype(np.float64)
 
+    def exclusions_by_position(self) -> dict[int, str]:
+        """Spreadsheet row -> reason, as the rows are numbered when this recording's N rows alone are written."""
+        return {int(i) + 2: self.sidecar.excluded[int(self.row[i])] for i in np.flatnonzero(self.excluded)}
+
     def usable(self, needed: Iterable[str]) -> UsableRows:
         """Rows that nobody excluded and that have a value in every column of `needed` (full names).
 
