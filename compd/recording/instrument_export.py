@@ -12,7 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.errors import RecordingError
 from compd.recording.columns import AXES
-from compd.recording.csv_cell import NUMBER
+from compd.recording.csv_cells import NUMBER
 from compd.recording.csv_table import CsvTable, read_table
 from compd.recording.problem_list import ProblemList, rows_text
 from compd.units import KINDS, factor
@@ -69,22 +69,22 @@ def read_track(path: Path, names: Mapping[str, str], unit: str | None = None) ->
         and units, unless any of x, y, z, length is given.
     unit : of the lengths, where the columns' names do not end in one.
     """
-    faults = ProblemList(path)
-    table = read_table(path, faults, _is_header)
+    problems = ProblemList(path)
+    table = read_table(path, problems, _is_header)
     if table is None:
-        raise RecordingError(faults.problems)
-    found = _roles(table, names, faults)
-    scaled = {role: _scaled(table, name, role, unit, faults) for role, name in found.items()}
-    if faults.problems:
-        raise RecordingError(faults.problems)
+        raise RecordingError(problems.problems)
+    found = _roles(table, names, problems)
+    scaled = {role: _scaled(table, name, role, unit, problems) for role, name in found.items()}
+    if problems.problems:
+        raise RecordingError(problems.problems)
     axes = tuple(role for role in (*AXES, LENGTH) if role in found)
     values = np.column_stack([scaled[TIME], *(scaled[axis] for axis in axes)])
     whole = ~np.isnan(values).any(axis=1)
-    _check_time(table, found[TIME], faults)
+    _check_time(table, found[TIME], problems)
     if whole.sum() < 3:
-        faults.add("", f"{int(whole.sum())} rows have a time and {', '.join(axes)}", allowed="three rows or more")
-    if faults.problems:
-        raise RecordingError(faults.problems)
+        problems.add("", f"{int(whole.sum())} rows have a time and {', '.join(axes)}", allowed="three rows or more")
+    if problems.problems:
+        raise RecordingError(problems.problems)
     return Track(path, values[whole, 0], values[whole, 1:], axes, found, int((~whole).sum()))
 
 
@@ -102,12 +102,12 @@ def _split(name: str) -> tuple[str, str]:
     return tidy.lower(), ""
 
 
-def _roles(table: CsvTable, names: Mapping[str, str], faults: ProblemList) -> dict[str, str]:
+def _roles(table: CsvTable, names: Mapping[str, str], problems: ProblemList) -> dict[str, str]:
     """Role -> column: those that a person named, the rest guessed; what is not there or not clear is reported."""
     columns = ", ".join(table.letters)
     for role, name in names.items():
         if name not in table.letters:
-            faults.add("", f"has no column for {role}", name, columns, f"name one with --{role}")
+            problems.add("", f"has no column for {role}", name, columns, f"name one with --{role}")
     said = {role: name for role, name in names.items() if name in table.letters}
     guesses = _guesses(table.letters)
     wanted = [TIME, *((*AXES, LENGTH) if not set(names) - {TIME} else ())]
@@ -118,11 +118,13 @@ def _roles(table: CsvTable, names: Mapping[str, str], faults: ProblemList) -> di
         if role not in names and len(several) == 1:
             said[role] = several[0]
         elif role not in names and several:
-            faults.add("", f"{len(several)} columns may be {role}", ", ".join(several), "one", f"name it with --{role}")
+            problems.add(
+                "", f"{len(several)} columns may be {role}", ", ".join(several), "one", f"name it with --{role}"
+            )
     if TIME not in names and TIME not in guesses:
-        faults.add("", "no column is a time by its name", columns, "e.g. time_s", "name it with --time")
-    if not set(said) - {TIME} and not faults.problems:
-        faults.add(
+        problems.add("", "no column is a time by its name", columns, "e.g. time_s", "name it with --time")
+    if not set(said) - {TIME} and not problems.problems:
+        problems.add(
             "",
             "no column is a position or a length by its name",
             columns,
@@ -147,14 +149,14 @@ def _guesses(columns: Iterable[str]) -> dict[str, list[str]]:
     return guesses
 
 
-def _scaled(table: CsvTable, name: str, role: str, unit: str | None, faults: ProblemList) -> FloatArray:
+def _scaled(table: CsvTable, name: str, role: str, unit: str | None, problems: ProblemList) -> FloatArray:
     """The column in s or mm."""
     wanted = "s" if role == TIME else "mm"
     _, own = _split(name)
     ratio = factor(own or (unit or "" if role != TIME else ""), wanted)
     if ratio is None:
         units = _TIME_UNITS if role == TIME else _LENGTH_UNITS
-        faults.add(
+        problems.add(
             table.place(name),
             f"has no unit of {role} in its name",
             name,
@@ -165,11 +167,11 @@ def _scaled(table: CsvTable, name: str, role: str, unit: str | None, faults: Pro
     return table.columns[name] * ratio
 
 
-def _check_time(table: CsvTable, name: str, faults: ProblemList) -> None:
+def _check_time(table: CsvTable, name: str, problems: ProblemList) -> None:
     there = np.flatnonzero(~np.isnan(table.columns[name]))
     late = there[1:][np.diff(table.columns[name][there]) <= 0]
     if len(late):
-        faults.add(
+        problems.add(
             f"{table.place(name)}, {rows_text(table.row[late].tolist())}",
             "time does not rise",
             allowed="later than the row above",
