@@ -179,7 +179,7 @@ class _SharedMotion:
         basis, _ = np.linalg.qr(self.terms[rows])
         result = np.empty(len(offsets_s))
         for i, offset_s in enumerate(offsets_s):
-            position_mm = self.track.at(self.time_s[rows] - offset_s)
+            position_mm = self.track.position_at(self.time_s[rows] - offset_s)
             position_mm -= position_mm.mean(axis=0)
             residual_mm = position_mm - basis @ (basis.T @ position_mm)
             total = max(float(np.sum(position_mm**2)), 1e-30)
@@ -301,7 +301,7 @@ def _refine(motion: _SharedMotion, start_s: float, window_s: float) -> tuple[flo
 def _indistinguishable_range_s(motion: _SharedMotion, offset_s: float, window_s: float) -> tuple[float, float]:
     """(earlier, later) how far the offset may move before the rows' positions change by more than can be seen."""
     rows = motion.covered(offset_s - window_s, offset_s + window_s)
-    position_mm = motion.track.at(motion.time_s[rows] - offset_s)
+    position_mm = motion.track.position_at(motion.time_s[rows] - offset_s)
     # three standard errors of what the polynomial leaves over (it is no noise), or two of the instrument's noise
     variance_mm2 = (1.0 - motion.agreement(offset_s)) * np.mean(np.var(position_mm, axis=0))
     misfit_mm = np.sqrt(variance_mm2 / len(position_mm))
@@ -310,7 +310,7 @@ def _indistinguishable_range_s(motion: _SharedMotion, offset_s: float, window_s:
 
     def reach_s(sign: float) -> float:
         for step_s in steps_s:
-            shifted_mm = motion.track.at(motion.time_s[rows] - (offset_s + sign * step_s))
+            shifted_mm = motion.track.position_at(motion.time_s[rows] - (offset_s + sign * step_s))
             if np.sqrt(np.mean((shifted_mm - position_mm) ** 2)) > limit_mm:
                 return float(step_s - steps_s[0] / 2.0)
         return window_s
@@ -324,13 +324,13 @@ def _standard_error_s(motion: _SharedMotion, offset_s: float, window_s: float) -
     if motion.terms is None:
         return np.nan
     terms = motion.terms[rows]
-    fitted_mm = terms @ np.linalg.lstsq(terms, motion.track.at(motion.time_s[rows] - offset_s), rcond=None)[0]
+    fitted_mm = terms @ np.linalg.lstsq(terms, motion.track.position_at(motion.time_s[rows] - offset_s), rcond=None)[0]
     block = np.arange(len(terms)) * _BLOCKS // len(terms)
     span_s = max(20.0 * motion.track.period_s, window_s / 4.0)
     offsets_s = offset_s + np.linspace(-span_s, span_s, 4 * _SCAN)
     squares = np.empty((len(offsets_s), _BLOCKS))
     for i, trial_s in enumerate(offsets_s):
-        residual_mm = motion.track.at(motion.time_s[rows] - trial_s) - fitted_mm
+        residual_mm = motion.track.position_at(motion.time_s[rows] - trial_s) - fitted_mm
         squares[i] = np.bincount(block, np.sum(residual_mm**2, axis=1), _BLOCKS)
     best_s = offsets_s[np.argmin(squares, axis=0)]
     return float(np.std(best_s, ddof=1) / np.sqrt(_BLOCKS))

@@ -167,12 +167,12 @@ def _reference_at_rows(
     after = np.searchsorted(track.time_s, time_s).clip(1, len(track.time_s) - 1)
     outside = (time_s < track.time_s[0]) | (time_s > track.time_s[-1])
     gap = ~outside & (track.time_s[after] - track.time_s[after - 1] > _GAP_PERIODS * track.period_s)
-    position_mm = track.at(time_s)
+    position_mm = track.position_at(time_s)
     # an offset that a person gave has no uncertainty: then only the neighbouring samples must agree
     reach_s = max(0.0 if np.isnan(offset.std_s) else 2.0 * offset.std_s, 1.5 * track.period_s)
     moved_mm = np.zeros(len(time_s))
     for shift_s in np.linspace(-reach_s, reach_s, _INSTANTS):
-        moved_mm = np.maximum(moved_mm, np.abs(track.at(time_s + shift_s) - position_mm).max(axis=1))
+        moved_mm = np.maximum(moved_mm, np.abs(track.position_at(time_s + shift_s) - position_mm).max(axis=1))
     motion = ~outside & ~gap & (moved_mm > still_mm)
     position_mm[outside | gap | motion] = np.nan
     reasons = {"outside the instrument's time": outside, "in a gap of the instrument": gap, "in motion": motion}
