@@ -5,8 +5,6 @@ One YAML file, written whole or not at all. Each step keeps what it replaced, so
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -18,6 +16,7 @@ import yaml
 from compd import __version__
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
+from compd.files import write_files
 from compd.model.effect import FittedEffect
 from compd.model.library import find
 
@@ -216,19 +215,10 @@ def write_stored(path: Path, stored: Stored) -> None:
         "steps": [{**asdict(step), "replaced": dict(step.replaced)} for step in stored.steps],
     }
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-    temporary = ""
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        # a temporary file is for its owner alone; the daemon reads this one under another name
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
+        # the daemon, another user, must be able to read it
+        write_files({path: text}, mode=0o644)
     except OSError as error:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
         raise StateError(
             Problem(
                 where=str(path),

@@ -19,6 +19,7 @@ from compd.comparison.noise_floor import NoiseFloor, noise_floor, outlier_rows, 
 from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, first_order, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
+from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
 from compd.model.prediction import pull_back
 from compd.units import UM_PER_MM
@@ -142,7 +143,7 @@ class Comparison:
         if self.attitude_residual_urad is not None:
             turned = self.attitude_residual_urad[self.used]
             found["attitude_rms_urad"] = float(np.sqrt(np.nanmean(turned**2)))
-        finite: dict[str, Any] = _finite(found)
+        finite: dict[str, Any] = nan_to_null(found)
         return finite
 
     def _by_axis(self, values: FloatArray) -> dict[str, float]:
@@ -278,12 +279,3 @@ def _blocks(parts: Sequence[FloatArray]) -> FloatArray:
 
 def _typical(values_um: FloatArray) -> float:
     return float(np.sqrt(np.mean(values_um**2)))
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no nan: null where a number is not known."""
-    if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

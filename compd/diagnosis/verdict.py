@@ -11,6 +11,7 @@ from compd.comparison.compare import Comparison
 from compd.diagnosis.empirical_search import EmpiricalFinding
 from compd.diagnosis.rivals import Rival
 from compd.diagnosis.selection import Number
+from compd.json_text import nan_to_null
 from compd.model.effect import Effect, FittedEffect
 
 Verdict = Literal["adequate", "identified", "ambiguous", "unexplained", "not_testable"]
@@ -112,7 +113,7 @@ class Diagnosis:
             "outlier_rows": self.after.aligned.recording.row[self.after.outlier].tolist(),
             "rows_used": int(self.after.used.sum()),
         }
-        finite: dict[str, Any] = _finite(found)
+        finite: dict[str, Any] = nan_to_null(found)
         return finite
 
     @property
@@ -163,14 +164,3 @@ def _listed(names: Sequence[str], word: str = "and") -> str:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no nan: null where a number is not known."""
-    if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_finite(one) for one in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -19,7 +19,8 @@ from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.loop.setpoint import Setpoint, State
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.states import State
 from compd.live.pipeline import build_pipeline
 from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
@@ -47,9 +48,10 @@ class Daemon:
         self.configuration = configuration
         self._notifier = notifier or Notifier.from_environment()
         gauges = configuration.gauge_objects()
-        self.latest, self._wires, cycle, shelf = build_pipeline(configuration, gauges)
-        self.orders = Commands(self._zero_on_disk(), models=_first_models(configuration, shelf))
-        self._model_adopter = ModelSwitch(shelf, self.orders)
+        pipeline = build_pipeline(configuration, gauges)
+        self.latest, self._wires = pipeline.latest, pipeline.wires
+        self.commands = Commands(self._zero_on_disk(), models=_first_models(configuration, pipeline.loader))
+        self._model_adopter = ModelSwitch(pipeline.loader, self.commands)
         by_line = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
@@ -61,10 +63,10 @@ class Daemon:
         self._packets = UdpSender(udp, configuration.config_hash) if udp is not None else None
         directions = Directions(self._wires.scale.wires)
         packets = [] if self._packets is None else [self._packets.deliver]
-        outlets = [*packets, directions.saw, self.publisher.deliver]
-        self.loop = Loop(configuration.loop, cycle, self.latest, self.orders, outlets, self._notifier, clock)
+        sinks = [*packets, directions.update, self.publisher.deliver]
+        self.loop = Loop(pipeline.settings, self.latest, self.commands, sinks, self._notifier, clock)
         self._zero_taker = ZeroCapture(
-            self._wires, self.latest, self.orders, _directory(configuration), configuration.zero_hash, clock
+            self._wires, self.latest, self.commands, _directory(configuration), configuration.zero_hash, clock
         )
         version: dict[str, Any] = {
             "class": "VERSION",
@@ -79,7 +81,7 @@ class Daemon:
             configuration,
             self.latest,
             self._wires,
-            self.orders,
+            self.commands,
             self.loop,
             self.publisher,
             self._packets,
@@ -93,7 +95,7 @@ class Daemon:
         self._requests = Requests(
             version,
             keys,
-            self.orders,
+            self.commands,
             report.message,
             self._zero_taker.start,
             ReadingsMessage(self._wires, self.latest.channels, directions),
@@ -182,12 +184,12 @@ def run(configuration: Configuration) -> bool:
     return not healthy
 
 
-def _first_models(configuration: Configuration, shelf: ModelLoader) -> Models:
+def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
     """Those of the configuration. Raises CompdError for a model file that cannot be used: it was asked for."""
     file = configuration.state.model_file
     if file is None:
-        return Models(shelf.bare)
-    model = shelf.read(Path(file))
+        return Models(loader.without_effects)
+    model = loader.read(Path(file))
     _log.info("model", file=file, hash=model.hash, effects=[one.effect.id for one in model.machine.acting])
     return Models(model)
 

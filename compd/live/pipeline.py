@@ -1,4 +1,4 @@
-"""From a configuration to what computes its setpoints; the daemon and replay build it here, so it is the same."""
+"""What computes the setpoints of a configuration, built in the same way for the daemon and for a replay."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from compd.configuration import Configuration
 from compd.gauge import Gauge
-from compd.live.loop.cycle import Cycle
-from compd.live.loop.model_loader import ModelLoader
+from compd.live.loop.cycle_state import CycleSettings
+from compd.live.loop.model_loader import ModelLoader, Models
 from compd.live.loop.tip_uncertainty import declared_noise
 from compd.live.loop.wiring import MachineWires
 from compd.machine_builder import build_model
@@ -16,27 +16,34 @@ from compd.readings import Latest
 
 
 class Pipeline(NamedTuple):
-    """Readings go into `latest`; `wires` say what they measure; `cycle` makes setpoints of its snapshots, with the
-    models that `shelf` reads."""
+    """What a configuration's setpoints are computed with.
+
+    latest : where the readings of every channel go. settings : of the cycle. loader : of model files.
+    """
 
     latest: Latest
-    wires: MachineWires
-    cycle: Cycle
-    shelf: ModelLoader
+    settings: CycleSettings
+    loader: ModelLoader
+
+    @property
+    def wires(self) -> MachineWires:
+        """What each channel measures."""
+        return self.settings.wires
 
 
 def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) -> Pipeline:
-    """`gauges`: the configuration's own, by name. Raises KinematicsError for a machine that cannot be."""
+    """`gauges`: those of the configuration, by name. Raises KinematicsError for a geometry that is impossible."""
     latest = Latest([f"{name}.{channel.name}" for name, gauge in gauges.items() for channel in gauge.channels])
     wires = MachineWires(configuration, latest)
     model = build_model(configuration.geometry, configuration.wiring)
-    cycle = Cycle(
-        model,
-        wires,
-        configuration.loop,
-        configuration.limits,
-        configuration.sockets.valid_for_s,
-        configuration.geometry.link_length_mm,
-        declared_noise(configuration),
+    loader = ModelLoader(model, configuration.machine, configuration.geometry_hash, wires)
+    settings = CycleSettings(
+        without_effects=Models(loader.without_effects),
+        wires=wires,
+        loop=configuration.loop,
+        limits=configuration.limits,
+        valid_for_s=configuration.sockets.valid_for_s,
+        stroke_mm=configuration.geometry.link_length_mm,
+        noise=declared_noise(configuration),
     )
-    return Pipeline(latest, wires, cycle, ModelLoader(model, configuration.machine, configuration.geometry_hash, wires))
+    return Pipeline(latest, settings, loader)

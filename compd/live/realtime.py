@@ -100,7 +100,7 @@ class QuietCollector:
         self._next_s = now_s + _COLLECT_EVERY_S
         return Permission(True, f"{gc.get_freeze_count()} objects frozen, collected in the loop's slack")
 
-    def rest(self, now_s: float) -> None:
+    def collect_if_due(self, now_s: float) -> None:
         """The cycle is done: collect, when it is time."""
         if now_s >= self._next_s:
             self._next_s = now_s + _COLLECT_EVERY_S

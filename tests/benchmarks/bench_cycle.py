@@ -40,7 +40,7 @@ def main() -> None:
             measured = machine(name)
             measured.settle()
             if mode == "machine_tool":
-                measured.orders.target = _target(measured)
+                measured.commands.target = _target(measured)
             rows += [
                 [f"{name.removesuffix('.yaml')}, {mode}: {part}", *_row(durations)]
                 for part, durations in _cycles(measured).items()
@@ -52,8 +52,8 @@ def main() -> None:
             for count in (0, 3, len(EFFECTS)):
                 measured = machine(name)
                 if mode == "machine_tool":
-                    measured.orders.target = _target(measured)
-                measured.orders.models = _with_effects(measured, count)
+                    measured.commands.target = _target(measured)
+                measured.commands.models = _with_effects(measured, count)
                 measured.settle()
                 durations = _cycles(measured)["snapshot to bytes"]
                 rows.append([f"{name.removesuffix('.yaml')}, {mode}, {count} effects", *_row(durations)])
@@ -92,8 +92,9 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
         for channel, slot in measured.latest.index.items():
             value = RAW_AT_ZERO_MM + (tick % 7) * ARRIVING_MM if channel in measured.change_mm else 20.0
             measured.latest.put(slot, good(value, measured.now_s - 0.001))
+        measured.tick = tick
         begin = time.perf_counter()
-        setpoint = measured.cycle.run(tick, measured.latest.snapshot(measured.now_s), measured.orders)
+        setpoint = measured.run_cycle()
         computed = time.perf_counter()
         setpoint.to_json()
         encoded = time.perf_counter()

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 from compd.clock import MonotonicClock
@@ -61,10 +62,9 @@ def measure(rate_hz: float) -> list[tuple[float, ...]]:
         publisher = Publisher(SocketSettings(unix={"path": str(path)}, valid_for_s=0.1), 1 / rate_hz, lambda _: None)
         version = {"class": "VERSION"}
         keys = TargetKeys("tip_B0_mm", rotation=False)
-        publisher.start(Requests(version, keys, measured.orders, dict, lambda _: None))
-        loop = Loop(
-            settings, measured.cycle, measured.latest, measured.orders, [publisher.deliver], Notifier(""), clock
-        )
+        publisher.start(Requests(version, keys, measured.commands, dict, lambda _: None))
+        cycle = replace(measured.settings, loop=settings)
+        loop = Loop(cycle, measured.latest, measured.commands, [publisher.deliver], Notifier(""), clock)
         loop.start()
         reader = threading.Thread(target=read_gauges)
         reader.start()

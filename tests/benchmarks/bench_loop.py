@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 
 from compd.clock import MonotonicClock
 from compd.configuration.operation import LoopSettings
@@ -121,16 +122,15 @@ def run_loop(rate_hz: float) -> tuple[Loop, Histogram | None]:
     ticks = round(SECONDS * rate_hz)
     encoded_bytes = 0
 
-    def outlet(setpoint) -> None:
+    def sink(setpoint) -> None:
         nonlocal encoded_bytes
         encoded_bytes += len(setpoint.to_json())
         if setpoint.seq >= ticks:
             done.set()
 
     with busy_drivers(measured.latest) as polls:
-        loop = Loop(
-            settings, measured.cycle, measured.latest, measured.orders, [outlet], Notifier(""), MonotonicClock()
-        )
+        cycle = replace(measured.settings, loop=settings)
+        loop = Loop(cycle, measured.latest, measured.commands, [sink], Notifier(""), MonotonicClock())
         beside = cyclictest(rate_hz)
         loop.start()
         done.wait()

@@ -7,13 +7,11 @@ from dataclasses import replace
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
-from compd.live.loop.cycle import Cycle
+from compd.live.loop.cycle import step
+from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.setpoint import State
-from compd.live.loop.tip_uncertainty import declared_noise
-from compd.live.loop.wiring import MachineWires
-from compd.machine_builder import build_model
-from compd.readings import Latest
+from compd.live.loop.states import State
+from compd.live.pipeline import build_pipeline
 from tests.support.paths import CONFIG
 
 RATE_HZ = 200
@@ -29,22 +27,13 @@ class Machine:
 
     def __init__(self, configuration: Configuration):
         self.configuration = configuration
-        gauges = configuration.gauge_objects()
-        self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
-        self.wires = MachineWires(configuration, self.latest)
-        self.model = build_model(configuration.geometry, configuration.wiring)
-        stroke_mm = configuration.geometry.link_length_mm
-        self.cycle = Cycle(
-            self.model,
-            self.wires,
-            configuration.loop,
-            configuration.limits,
-            0.1,
-            stroke_mm,
-            declared_noise(configuration),
-        )
+        pipeline = build_pipeline(configuration, configuration.gauge_objects())
+        self.latest, self.wires, self.loader = pipeline.latest, pipeline.wires, pipeline.loader
+        self.model = pipeline.settings.model
+        self.settings = replace(pipeline.settings, valid_for_s=0.1)
+        self.state = CycleState.at_start(self.model)
         zero = dict.fromkeys(self.wires.length_channels, RAW_AT_ZERO_MM)
-        self.orders = Commands(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
+        self.commands = Commands(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
         self.now_s = 1000.0
         self.tick = 0
         self.change_mm = dict.fromkeys(self.wires.length_channels, 0.0)
@@ -61,7 +50,15 @@ class Machine:
             elif channel not in self.frozen:
                 value = RAW_AT_ZERO_MM + self.change_mm[channel] if channel in self.change_mm else 20.0
                 self.latest.put(slot, good(value, self.now_s - 0.001))
-        return self.cycle.run(self.tick, self.latest.snapshot(self.now_s), self.orders)
+        return self.run_cycle()
+
+    def run_cycle(self):
+        """One cycle with the readings as they are: its setpoint."""
+        commands = self.commands
+        snapshot = self.latest.snapshot(self.now_s)
+        inputs = CycleInputs(self.tick, snapshot, commands.zero, commands.target, commands.models)
+        setpoint, self.state = step(self.state, inputs, self.settings)
+        return setpoint
 
     def settle(self):
         """Until the correction has arrived."""

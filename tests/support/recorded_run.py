@@ -60,7 +60,7 @@ class Run:
             assert machine.tick == recorded[1]["seq"]
 
     def recorded(self, setpoint):
-        self.directions.saw(setpoint)
+        self.directions.update(setpoint)
         line = self.transcript.line(setpoint)
         return line, json.loads(line), setpoint
 
@@ -87,14 +87,14 @@ class Run:
         tip_mm = tip_mm + self.random.uniform(-20, 20, 3)
         turned = self.machine.model.attitude_is_free and self.random.random() < 0.5
         rotation = tuple(self.random.uniform(-0.05, 0.05, 3).tolist()) if turned else None
-        self.machine.orders.target = Target(tuple(tip_mm.tolist()), rotation)
+        self.machine.commands.target = Target(tuple(tip_mm.tolist()), rotation)
 
     def release(self):
-        self.machine.orders.target = None
+        self.machine.commands.target = None
 
     def take_zero(self):
         readings = {name: RAW_AT_ZERO_MM + change for name, change in self.machine.change_mm.items()}
-        self.machine.orders.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
+        self.machine.commands.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
 
     @contextmanager
     def recorder(self, name: Path, keeping=ROOMY, say=None, **watch):

@@ -1,4 +1,4 @@
-"""What clients ask of the loop: machine zero, a target, models; adopted between two ticks."""
+"""Commands of clients to the loop: machine zero, target and models."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from compd.live.loop.model_loader import Models
 
 @dataclass(frozen=True)
 class Target:
-    """Where the controller wants the tip.
+    """Where a controller wants the tip.
 
-    tip_mm : in {B0}, or in {P} with the tool on the plate. rotation_B0_rad : rotation vector of {P} in {B0};
-    None for the attitude at machine zero (a tripod's follows from its tip).
+    tip_mm : (3), in {B0}; with the tool on the plate the place on the work, in {P}.
+    rotation_B0_rad : (3), rotation vector of {P} in {B0}; None for the attitude at machine zero. The attitude of a
+        tripod follows from its tip.
     """
 
     tip_mm: tuple[float, ...]
@@ -23,11 +24,11 @@ class Target:
 
 @dataclass
 class Commands:
-    """What the loop adopts between two ticks. Each slot holds an immutable value, swapped by reference.
+    """What the loop reads at the start of every cycle. Each field has one writer, which replaces an immutable value.
 
-    zero : written by whoever takes machine zero; StateError says why there is none.
+    zero : written where machine zero is taken; StateError says why there is none.
     target : written by the publisher for the controller; None is CMM mode.
-    models : written by whoever adopts models; None is the machine without effects.
+    models : written where models are read; None is the machine without effects.
     """
 
     zero: MachineZero | StateError

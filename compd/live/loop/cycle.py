@@ -1,4 +1,10 @@
-"""One cycle: from a snapshot to a setpoint. No clock, no I/O: a recorded run replays bit for bit."""
+"""One cycle of the loop as a function: `step(state, inputs, settings)` gives the setpoint and the next state.
+
+`step` reads no clock and does no I/O, and every value that goes in or comes out is immutable. The loop keeps the state
+and calls it; a replay calls it with states and inputs from a recording, and gets the same setpoints bit for bit.
+
+    machine zero -> comparators (stale policy) -> scales -> compensation -> limits -> uncertainty, shadow -> setpoint
+"""
 
 from __future__ import annotations
 
@@ -9,305 +15,229 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.configuration.operation import LimitSettings, LoopSettings
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
 from compd.errors import StateError
-from compd.live.loop.commands import Commands, Target
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.limits import beyond_stroke, limited
+from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
+from compd.live.loop.limits import limit_correction, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues, ShadowResult, State
-from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, usable
+from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
+from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues, ShadowResult
+from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
+from compd.live.loop.states import State
 from compd.live.loop.tip_uncertainty import uncertainty_um
-from compd.live.loop.wiring import MachineWires, WiredValues
-from compd.model.apply_effects import EffectMemory, kept
-from compd.model.machine import MachineModel
+from compd.live.loop.wiring import MachineWires
 from compd.model.solve_status import MEANING, Reason
-from compd.model.uncertainty import GaugeNoise
 from compd.readings import Snapshot
 
-# An uncertainty changes as the machine warms up or crosses its workspace: in seconds.
-UNCERTAINTY_EVERY_S = 1.0
 
+class _Outcome(NamedTuple):
+    """State and reason of a setpoint, with its values where they are valid.
 
-class _ZeroVectors(NamedTuple):
-    """Raw readings at machine zero, in the wiring's order."""
-
-    scale_mm: FloatArray
-    comparators_mm: FloatArray
-
-
-class _Invalid(Exception):
-    """No setpoint can be had this time; the state and the reason that clients are told."""
-
-    def __init__(self, state: State, reason: str) -> None:
-        super().__init__(reason)
-        self.state = state
-        self.reason = reason
-
-
-class Cycle:
-    """Computes setpoints one after another; keeps what one cycle hands to the next. Only the loop's thread runs it.
-
-    What it keeps: the warm start with what effects remember, the last good set of comparators, and the correction
-    that stands. An invalid setpoint leaves the correction standing, so that the next valid one slews from it.
+    oldest_s : monotonic time of the oldest reading used. expires_s : from when the readings must not be used any more.
     """
 
-    def __init__(
-        self,
-        model: MachineModel,
-        wires: MachineWires,
-        loop: LoopSettings,
-        limits: LimitSettings,
-        valid_for_s: float,
-        stroke_mm: tuple[float, float] | None = None,
-        noise: GaugeNoise | None = None,
-    ) -> None:
-        """`model`: without effects, which come by orders; `stroke_mm`: shortest and longest link, `noise`: of the
-        gauges; None where the configuration does not say.
-        """
-        self._model = model
-        self._bare = Models(LiveModel(model, "", "", (), wires.quantity_wires(())))
-        self._models: Models | None = None
-        self._noise = noise
-        self._uncertainty_every = max(1, round(UNCERTAINTY_EVERY_S * loop.rate_hz))
-        self._wires = wires
-        self._loop = loop
-        self._limits = limits
-        self._valid_for_s = valid_for_s
-        self._stroke_mm = stroke_mm
-        self._period_s = 1.0 / loop.rate_hz
-        self._no_scales = np.full(model.links, math.nan)
-        self._no_comparators = GaugeValues(
-            self._no_scales, np.zeros(wires.joints), np.zeros(len(wires.comparators.wires) - wires.joints), {}
-        )
-        self._warm = WarmStart.at_zero(model)
-        self._correction_mm: FloatArray = np.zeros(model.links)
-        self._zero: MachineZero | None = None
-        self._zero_vectors: _ZeroVectors | None = None
-        self._last_good: ComparatorSet | None = None
-        self._scales_seen = False
-        self._shadow = EffectMemory()
-        self._adopting = False
-        self._u_tip_um: FloatArray | None = None
-
-    def run(self, tick: int, snapshot: Snapshot, orders: Commands) -> Setpoint:
-        """The setpoint of one tick; an invalid one says why."""
-        # the orders are read once: their writers do not wait for the cycle
-        models = orders.models or self._bare
-        if models is not self._models:
-            self._adopt(models)
-        inputs = CycleInputs(snapshot, orders.zero, orders.target, self._carried(), models)
-        mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
-        try:
-            return self._compute(tick, inputs, mode)
-        except _Invalid as why:
-            now_s = snapshot.time_s
-            return Setpoint(
-                tick, now_s, now_s, math.nan, why.state, why.reason, mode, None, inputs, models.applied.hash
-            )
-
-    def resume(self, carried: CycleState, models: Models | None = None) -> None:
-        """Go on as if the cycle before, with the same models, had left this behind; None is without effects."""
-        self._models = models or self._bare
-        (
-            self._zero,
-            self._warm,
-            self._correction_mm,
-            self._last_good,
-            self._scales_seen,
-            self._shadow,
-            self._adopting,
-            self._u_tip_um,
-        ) = carried
-        self._zero_vectors = None if carried.zero is None else self._vectors(carried.zero)
-
-    def _carried(self) -> CycleState:
-        return CycleState(
-            self._zero,
-            self._warm,
-            self._correction_mm,
-            self._last_good,
-            self._scales_seen,
-            self._shadow,
-            self._adopting,
-            self._u_tip_um,
-        )
-
-    def _adopt(self, models: Models) -> None:
-        """Other models from this tick on; effects of the same definition keep what they remember."""
-        old, new = self._models or self._bare, models
-        was, effects = old.applied.machine, self._warm.effects
-        if old.shadow is not None and new.applied is old.shadow:
-            was, effects = old.shadow.machine, self._shadow
-        elif new.shadow is not None and new.shadow is not old.shadow:
-            self._shadow = kept(effects, was, new.shadow.machine)
-        if new.applied is not old.applied:
-            self._warm = self._warm._replace(effects=kept(effects, was, new.applied.machine))
-            self._adopting = self._models is not None
-            self._u_tip_um = None
-            if self._last_good is not None and not set(new.applied.quantities) <= set(self._last_good.quantities):
-                self._last_good = None
-        self._models = models
-
-    def _compute(self, tick: int, inputs: CycleInputs, mode: Mode) -> Setpoint:
-        snapshot, zero, target, _, models = inputs
-        assert models is not None
-        vectors = self._adopted(zero)
-        set_ = self._comparators(snapshot, vectors, models.applied)
-        assert set_.comparators is not None
-        oldest_s = set_.comparators.oldest_s
-        scale_mm = self._no_scales
-        if target is None:
-            scales = self._scales(snapshot, vectors)
-            scale_mm, oldest_s = scales.change_mm, min(oldest_s, scales.oldest_s)
-        change_mm, joints = set_.comparators.change_mm, self._wires.joints
-        values = GaugeValues(
-            scale_mm, change_mm[:joints], change_mm[joints:], set_.comparators.quantities, snapshot.time_s
-        )
-        before, machine = self._warm, _counting(models.applied, set_.weight)
-        found = self._compensation(machine, values, target)
-        if target is not None and (beyond := beyond_stroke(found.link_length_mm, self._stroke_mm)):
-            raise _Invalid(State.REFUSED, f"this target is out of reach: {beyond}")
-        allowed = limited(found.correction_mm, self._correction_mm, self._period_s, self._limits)
-        if allowed.state is State.REFUSED:
-            raise _Invalid(State.REFUSED, allowed.reason)
-        self._correction_mm = allowed.applied_mm
-        state, reason = _worse(set_, allowed.state, allowed.reason)
-        self._note_uncertainty(tick, machine, values, found)
-        shadow = None if models.shadow is None else self._beside(models.shadow, values, target, snapshot, before)
-        if target is None and (allowed.state is State.CLAMPED or (self._adopting and allowed.state is State.SLEWING)):
-            found = self._held_back(found, scale_mm, allowed.applied_mm)
-        self._adopting = self._adopting and allowed.state is not State.OK
-        now_s = snapshot.time_s
-        valid_until_s = min(now_s + self._valid_for_s, set_.expires_s)
-        numbers = self._numbers(found, allowed.applied_mm, shadow)
-        return Setpoint(
-            tick, now_s, valid_until_s, now_s - oldest_s, state, reason, mode, numbers, inputs, models.applied.hash
-        )
-
-    def _adopted(self, zero: MachineZero | StateError) -> _ZeroVectors:
-        """The zero of this tick; with a new one nothing that was measured from the old one is kept."""
-        if not isinstance(zero, MachineZero):
-            problem = zero.problems[0]
-            raise _Invalid(State.NO_ZERO, f"{problem.what}; {problem.next_step}" if problem.next_step else problem.what)
-        if zero is not self._zero or self._zero_vectors is None:
-            self._zero = zero
-            self._zero_vectors = self._vectors(zero)
-            self._last_good = None
-            self._warm = WarmStart.at_zero(self._model)
-        return self._zero_vectors
-
-    def _vectors(self, zero: MachineZero) -> _ZeroVectors:
-        return _ZeroVectors(self._wires.scale.zero_vector(zero), self._wires.comparators.zero_vector(zero))
-
-    def _comparators(self, snapshot: Snapshot, zero: _ZeroVectors, applied: LiveModel) -> UsableComparators:
-        """Joint and frame comparators, and what the effects need, as a set: the live one, or what `on_stale` makes
-        of the last."""
-        read = self._wires.comparators.read(snapshot, zero.comparators_mm)
-        lost, oldest_s = read.lost, read.oldest_s
-        quantities: Mapping[str, FloatArray] = {}
-        if applied.quantities:
-            needed = applied.read(snapshot)
-            lost = ", ".join(filter(None, (lost, needed.lost)))
-            oldest_s = min(oldest_s, needed.oldest_s)
-            quantities = applied.named(needed)
-        live = None if lost else ComparatorSet(read.change_mm, snapshot.time_s, oldest_s, quantities)
-        set_ = usable(live, self._last_good, lost, snapshot.time_s, self._loop)
-        if live is not None:
-            self._last_good = live
-        if set_.comparators is None:
-            raise _Invalid(set_.state, set_.reason)
-        return set_
-
-    def _scales(self, snapshot: Snapshot, zero: _ZeroVectors) -> WiredValues:
-        """Live or not at all: without its scales nobody knows where the tip is."""
-        scales = self._wires.scale.read(snapshot, zero.scale_mm)
-        if scales.lost:
-            raise _Invalid(State.STOP if self._scales_seen else State.STARTING, f"the tip is not known: {scales.lost}")
-        self._scales_seen = True
-        return scales
-
-    def _compensation(self, machine: MachineModel, values: GaugeValues, target: Target | None) -> Compensation:
-        found, warm = _compensated(machine, values, target, self._warm)
-        code = int(found.reason)
-        if code:
-            # the next cycle starts from machine zero: a start that failed once may fail for ever
-            self._warm = WarmStart.at_zero(self._model)._replace(effects=warm.effects)
-            what = "this pose" if target is None else "this target"
-            raise _Invalid(State.REFUSED, f"{what} cannot be computed: {MEANING[Reason(code)]}")
-        self._warm = warm
-        return found
-
-    def _beside(
-        self, shadow: LiveModel, values: GaugeValues, target: Target | None, snapshot: Snapshot, before: WarmStart
-    ) -> ShadowResult:
-        """What the shadow makes of the same cycle; whatever fails in it changes nothing else."""
-        needed = shadow.read(snapshot)
-        if needed.lost:
-            return ShadowResult(shadow.hash, needed.lost)
-        start = before._replace(effects=self._shadow)
-        found, after = _compensated(shadow.machine, values._replace(quantities=shadow.named(needed)), target, start)
-        self._shadow = after.effects
-        if int(found.reason):
-            return ShadowResult(shadow.hash, MEANING[Reason(int(found.reason))])
-        tip_P_mm = found.tip_P_mm if self._wires.tool_on_plate else None
-        return ShadowResult(shadow.hash, "", found.correction_mm, found.tip_M_mm, tip_P_mm)
-
-    def _note_uncertainty(self, tick: int, machine: MachineModel, values: GaugeValues, found: Compensation) -> None:
-        """Once a second, of the pose that the cycle has found; where the gauges' noise is declared."""
-        if self._noise is None or (self._u_tip_um is not None and tick % self._uncertainty_every):
-            return
-        self._u_tip_um = uncertainty_um(machine, self._noise, values, found.scale_setpoint_mm, self._warm.effects)
-
-    def _held_back(self, found: Compensation, scale_mm: FloatArray, applied_mm: FloatArray) -> Compensation:
-        """CMM mode at the limit: the tip moves with what is applied, not with what the comparators ask for.
-
-        The scales less the correction, by uncompensated kinematics: the tip to second order in the correction.
-        """
-        believed = self._no_comparators._replace(scale_mm=scale_mm - applied_mm)
-        tip, _ = compensate_cmm(self._model, believed, self._warm)
-        if int(tip.reason):
-            raise _Invalid(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(int(tip.reason))]}")
-        return found._replace(
-            tip_M_mm=tip.tip_M_mm, tip_B0_mm=tip.tip_B0_mm, tip_P_mm=tip.tip_P_mm, link_length_mm=tip.link_length_mm
-        )
-
-    def _numbers(self, found: Compensation, applied_mm: FloatArray, shadow: ShadowResult | None) -> SetpointValues:
-        frame = found.frame
-        return SetpointValues(
-            found.tip_M_mm,
-            found.tip_B0_mm,
-            found.tip_P_mm if self._wires.tool_on_plate else None,
-            frame.origin_M_mm,
-            frame.displacement_M_mm,
-            frame.rotation_M_rad,
-            found.link_length_mm,
-            found.nominal_scale_mm + applied_mm,
-            applied_mm,
-            found.sources,
-            self._u_tip_um,
-            shadow,
-        )
+    state: State
+    reason: str
+    values: SetpointValues | None = None
+    oldest_s: float = math.nan
+    expires_s: float = math.nan
 
 
-def _counting(applied: LiveModel, weight: float) -> MachineModel:
-    """Its effects fade with the set that they belong to."""
-    return applied.machine if weight == 1.0 else applied.machine.fading(weight)
+def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tuple[Setpoint, CycleState]:
+    """Compute one setpoint.
+
+    Parameters
+    ----------
+    state : what the cycle before returned; `CycleState.at_start` for the first.
+    inputs : this cycle's number, snapshot and commands.
+    settings : of the machine and its loop.
+
+    Returns
+    -------
+    setpoint : an invalid one says why in its `reason`. It keeps `inputs` and the state from which it was computed.
+    state : for the next cycle. An invalid setpoint keeps the correction that is applied, so that the next valid one
+        slews from it.
+    """
+    models = inputs.models or settings.without_effects
+    if models is not state.models:
+        state = adopt_models(state, models)
+    outcome, next_state = _compute(state, inputs, models, settings)
+    now_s = inputs.snapshot.time_s
+    valid_until_s = now_s if outcome.values is None else min(now_s + settings.valid_for_s, outcome.expires_s)
+    mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
+    age_s = now_s - outcome.oldest_s
+    # positional, as in `_setpoint_values`: keywords cost twice the time
+    setpoint = Setpoint(
+        inputs.tick,
+        now_s,
+        valid_until_s,
+        age_s,
+        outcome.state,
+        outcome.reason,
+        mode,
+        outcome.values,
+        models.applied.hash,
+        inputs,
+        state,
+    )
+    return setpoint, next_state
 
 
-def _compensated(
-    machine: MachineModel, values: GaugeValues, target: Target | None, warm: WarmStart
-) -> tuple[Compensation, WarmStart]:
+def _compute(
+    state: CycleState, inputs: CycleInputs, models: Models, settings: CycleSettings
+) -> tuple[_Outcome, CycleState]:
+    """The outcome of a cycle, and the next state; every step that fails returns what the steps before it have left."""
+    tick, snapshot, zero, target, _ = inputs
+    applied, wires = models.applied, settings.wires
+
+    if not isinstance(zero, MachineZero):
+        return _Outcome(State.NO_ZERO, _explanation(zero)), state
+    zero_vectors = state.zero_vectors
+    if zero is not state.zero or zero_vectors is None:
+        zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
+        state = _with_zero(state, zero, zero_vectors, settings)
+
+    live, lost = _live_comparators(snapshot, zero_vectors.comparators_mm, applied, wires)
+    usable = usable_comparators(live, state.last_good, lost, snapshot.time_s, settings.loop)
+    comparators = usable.comparators
+    if comparators is None:
+        return _Outcome(usable.state, usable.reason), state
+    last_good = state.last_good if live is None else live
+
+    scale_mm, oldest_s = settings.unread_scales_mm, comparators.oldest_s
     if target is None:
-        return compensate_cmm(machine, values, warm)
-    return compensate_machine_tool(machine, np.array(target.tip_mm), target.rotation_B0_rad, values, warm)
+        scales = wires.scale.read(snapshot, zero_vectors.scale_mm)
+        if scales.lost:
+            # no policy replaces a scale: without it the tip is not known
+            lost_state = State.STOP if state.scales_seen else State.STARTING
+            return _Outcome(lost_state, f"the tip is not known: {scales.lost}"), state._replace(last_good=last_good)
+        scale_mm, oldest_s = scales.values, min(oldest_s, scales.oldest_s)
+
+    change_mm, joints = comparators.change_mm, wires.joints
+    values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
+    machine = applied.machine if usable.weight == 1.0 else applied.machine.fading(usable.weight)
+    compensation, warm_start = compensate(machine, values, target, state.warm_start)
+    scales_seen = state.scales_seen or target is None
+    if code := int(compensation.reason):
+        # a warm start that failed once may fail for ever: the next cycle starts from machine zero
+        warm_start = WarmStart.at_zero(settings.model)._replace(effects=warm_start.effects)
+        state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
+        what = "this pose" if target is None else "this target"
+        return _Outcome(State.REFUSED, f"{what} cannot be computed: {MEANING[Reason(code)]}"), state
+
+    correction_mm = compensation.correction_mm
+    limited = limit_correction(correction_mm, state.correction_mm, settings.period_s, settings.limits)
+    refusal = limited.reason if limited.state is State.REFUSED else ""
+    if target is not None and (problem := stroke_problem(compensation.link_length_mm, settings.stroke_mm)):
+        refusal = f"this target is out of reach: {problem}"
+    if refusal:
+        state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
+        return _Outcome(State.REFUSED, refusal), state
+    correction_mm = limited.applied_mm
+
+    u_tip_um, scale_setpoint_mm = state.u_tip_um, compensation.scale_setpoint_mm
+    if settings.noise is not None and (u_tip_um is None or tick % settings.uncertainty_every == 0):
+        u_tip_um = uncertainty_um(machine, settings.noise, values, scale_setpoint_mm, warm_start.effects)
+    shadow, shadow_memory = None, state.shadow_memory
+    if models.shadow is not None:
+        shadow, shadow_memory = evaluate_shadow(
+            models.shadow, values, target, snapshot, state.warm_start, shadow_memory, wires.tool_on_plate
+        )
+
+    adopting = state.adopting and limited.state is not State.OK
+    next_state = CycleState(
+        zero, warm_start, correction_mm, last_good, scales_seen, shadow_memory, adopting, u_tip_um, zero_vectors, models
+    )
+    if target is None and (limited.state is State.CLAMPED or (adopting and limited.state is State.SLEWING)):
+        compensation = _with_tip_as_applied(compensation, scale_mm, correction_mm, warm_start, settings)
+        if code := int(compensation.reason):
+            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
+    reported = limited.state if limited.state.rank >= usable.state.rank else usable.state
+    reason = "; ".join(filter(None, (usable.reason, limited.reason)))
+    setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
+    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), next_state
 
 
-def _worse(set_: UsableComparators, state: State, reason: str) -> tuple[State, str]:
-    """One state for the stale policy and the limits: a clamp is told first, then hold or fade, then slewing."""
-    if set_.state is State.OK:
-        return state, reason
-    told = state if state is State.CLAMPED else set_.state
-    return told, f"{set_.reason}; {reason}" if reason else set_.reason
+def _explanation(error: StateError) -> str:
+    """Why there is no machine zero, and what to do."""
+    problem = error.problems[0]
+    return f"{problem.what}; {problem.next_step}" if problem.next_step else problem.what
+
+
+def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, settings: CycleSettings) -> CycleState:
+    """The state with this machine zero; of another one before it nothing is kept that was measured from it."""
+    if zero is state.zero:
+        return state._replace(zero_vectors=zero_vectors)
+    warm_start = WarmStart.at_zero(settings.model)
+    return state._replace(zero=zero, zero_vectors=zero_vectors, last_good=None, warm_start=warm_start)
+
+
+def _live_comparators(
+    snapshot: Snapshot, zero_mm: FloatArray, applied: LiveModel, wires: MachineWires
+) -> tuple[ComparatorSet | None, str]:
+    """Joint and frame comparators with the quantities that the effects need, as a set.
+
+    None where one of them cannot be used; the text then says which, and why.
+    """
+    lengths = wires.comparators.read(snapshot, zero_mm)
+    lost, oldest_s = lengths.lost, lengths.oldest_s
+    quantities: Mapping[str, FloatArray] = {}
+    if applied.quantities:
+        needed = applied.read(snapshot)
+        lost = ", ".join(filter(None, (lost, needed.lost)))
+        oldest_s = min(oldest_s, needed.oldest_s)
+        quantities = applied.by_name(needed)
+    if lost:
+        return None, lost
+    return ComparatorSet(lengths.values, snapshot.time_s, oldest_s, quantities), ""
+
+
+def _with_tip_as_applied(
+    compensation: Compensation,
+    scale_mm: FloatArray,
+    applied_mm: FloatArray,
+    warm_start: WarmStart,
+    settings: CycleSettings,
+) -> Compensation:
+    """The compensation with the tip that belongs to the correction which is applied, not to the one asked for.
+
+    For CMM mode while the correction is limited. The tip follows from the scales less the correction by the kinematics
+    without compensation, which is right to second order in the correction. `reason` says whether it could be computed.
+    """
+    wires = settings.wires
+    without_comparators = GaugeValues(
+        scale_mm - applied_mm, np.zeros(wires.joints), np.zeros(len(wires.comparators.wires) - wires.joints), {}
+    )
+    tip, _ = compensate_cmm(settings.model, without_comparators, warm_start)
+    return compensation._replace(
+        tip_M_mm=tip.tip_M_mm,
+        tip_B0_mm=tip.tip_B0_mm,
+        tip_P_mm=tip.tip_P_mm,
+        link_length_mm=tip.link_length_mm,
+        reason=tip.reason,
+    )
+
+
+def _setpoint_values(
+    compensation: Compensation,
+    applied_mm: FloatArray,
+    u_tip_um: FloatArray | None,
+    shadow: ShadowResult | None,
+    tool_on_plate: bool,
+) -> SetpointValues:
+    frame = compensation.frame
+    return SetpointValues(
+        compensation.tip_M_mm,
+        compensation.tip_B0_mm,
+        compensation.tip_P_mm if tool_on_plate else None,
+        frame.origin_M_mm,
+        frame.displacement_M_mm,
+        frame.rotation_M_rad,
+        compensation.link_length_mm,
+        compensation.nominal_scale_mm + applied_mm,
+        applied_mm,
+        compensation.sources,
+        u_tip_um,
+        shadow,
+    )

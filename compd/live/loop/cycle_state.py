@@ -1,46 +1,124 @@
-"""All that one cycle computes from: with it, its setpoint can be computed again, bit for bit."""
+"""What goes into a cycle: the state that the last one left, this cycle's inputs, and settings that stay."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation import WarmStart
+from compd.configuration.operation import LimitSettings, LoopSettings
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
+from compd.live.loop.wiring import MachineWires
 from compd.model.apply_effects import EffectMemory
+from compd.model.machine import MachineModel
+from compd.model.uncertainty import GaugeNoise
 from compd.readings import Snapshot
+
+# The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
+_UNCERTAINTY_EVERY_S = 1.0
+
+
+class ZeroVectors(NamedTuple):
+    """Raw readings at machine zero in the order of the wiring: scale_mm (n), comparators_mm (k + 9)."""
+
+    scale_mm: FloatArray
+    comparators_mm: FloatArray
 
 
 class CycleState(NamedTuple):
-    """What a cycle has from the one before it. Nothing in it is ever changed in place.
+    """What one cycle hands to the next. Nothing in it is ever changed in place.
 
-    zero : the machine zero that was used; None before the first. A new one makes the cycle forget.
-    warm : where Newton starts. correction_mm (n) : the correction that stands, from which the next one slews.
+    A recording keeps all fields but two. `zero_vectors` and `models` follow from the inputs of the same cycle.
+
+    Attributes
+    ----------
+    zero : the machine zero that was used last; None before the first. With another one, the cycle forgets what was
+        measured from it.
+    warm_start : where Newton's iterations start, with the memory of the applied model's effects.
+    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it.
     last_good : the newest complete set of comparators; None before the first.
-    scales_seen : whether the scales have ever been good: lost ones are then `stop`, not `starting`.
-    shadow : what the shadow's effects remember.  adopting : the correction is on its way to a new model's.
-    u_tip_um (3) : the tip's standard uncertainty; None where it has not been computed.
+    scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
+    shadow_memory : memory of the shadow model's effects.
+    adopting : whether the correction is still slewing towards that of a newly adopted model.
+    u_tip_um : (3), standard uncertainty of the tip; None where it has not been computed.
+    zero_vectors : the readings of `zero`; None where they have yet to be read from it.
+    models : those of the last cycle; None before the first.
     """
 
     zero: MachineZero | None
-    warm: WarmStart
+    warm_start: WarmStart
     correction_mm: FloatArray
-    last_good: ComparatorSet | None
-    scales_seen: bool
-    shadow: EffectMemory = EffectMemory()
+    last_good: ComparatorSet | None = None
+    scales_seen: bool = False
+    shadow_memory: EffectMemory = EffectMemory()
     adopting: bool = False
     u_tip_um: FloatArray | None = None
+    zero_vectors: ZeroVectors | None = None
+    models: Models | None = None
+
+    @classmethod
+    def at_start(cls, model: MachineModel) -> Self:
+        """The state before the first cycle: at machine zero, with no correction applied."""
+        return cls(None, WarmStart.at_zero(model), np.zeros(model.links))
 
 
 class CycleInputs(NamedTuple):
-    """One cycle's snapshot, orders as they were read, and what it had from the cycle before."""
+    """What is new in one cycle: its number, the gauges, and the commands as they are at its start.
 
+    tick : number of the cycle. zero : StateError says why there is none. target : None in CMM mode.
+    models : None is the machine without effects.
+    """
+
+    tick: int
     snapshot: Snapshot
     zero: MachineZero | StateError
-    target: Target | None
-    carried: CycleState
+    target: Target | None = None
     models: Models | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CycleSettings:
+    """What does not change from cycle to cycle.
+
+    without_effects : the machine's model without effects, which is used where no other is commanded.
+    valid_for_s : how long a setpoint may be used.
+    stroke_mm : shortest and longest link; None where the configuration does not give them.
+    noise : standard deviations of the gauges; None where one of them is not given: no uncertainty is computed then.
+    """
+
+    without_effects: Models
+    wires: MachineWires
+    loop: LoopSettings
+    limits: LimitSettings
+    valid_for_s: float
+    stroke_mm: tuple[float, float] | None = None
+    noise: GaugeNoise | None = None
+
+    @cached_property
+    def model(self) -> MachineModel:
+        """The machine without effects."""
+        return self.without_effects.applied.machine
+
+    @cached_property
+    def period_s(self) -> float:
+        """Seconds from tick to tick."""
+        return 1.0 / self.loop.rate_hz
+
+    @cached_property
+    def uncertainty_every(self) -> int:
+        """Cycles from one computation of the tip's uncertainty to the next."""
+        return max(1, round(_UNCERTAINTY_EVERY_S * self.loop.rate_hz))
+
+    @cached_property
+    def unread_scales_mm(self) -> FloatArray:
+        """(n,) nan: scales in machine-tool mode, which does not use them."""
+        return np.full(self.model.links, math.nan)

@@ -1,4 +1,4 @@
-"""Which way each link moved last: seen in every cycle, told in the few that are recorded."""
+"""Direction of travel of each link, updated in every cycle so that thinned recordings keep it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from compd.model.observations import REVERSAL_MM
 
 
 class Directions:
-    """An outlet of the loop: a recording at a few Hz would miss a link that went out and came back between two rows.
+    """Direction of travel of each link from its scale; a sink of the loop.
 
-    now : +1 or -1 for each link, 0 before it has moved. A link has turned round when it has come back by more than
-    REVERSAL_MM, as for the effects.
+    A recording of a few rows per second would miss a link that goes out and comes back between two rows. A link has
+    reversed when its scale has come back by more than REVERSAL_MM from the farthest point, as for the effects.
     """
 
     def __init__(self, scales: Sequence[Wire]) -> None:
@@ -24,11 +24,11 @@ class Directions:
 
     @property
     def now(self) -> list[int]:
-        """(n,)."""
+        """(n,) +1 or -1; 0 before the link has moved."""
         return list(self._now)
 
-    def saw(self, setpoint: Setpoint) -> None:
-        """One cycle; plain numbers, since this is within the loop's time."""
+    def update(self, setpoint: Setpoint) -> None:
+        """Take the readings of one cycle. Plain floats are faster here than arrays."""
         assert setpoint.inputs is not None
         readings = setpoint.inputs.snapshot.readings
         for link, (slot, sign) in enumerate(self._wires):
@@ -44,6 +44,6 @@ class Directions:
                 self._now[link] = 1
             elif since_mm < -REVERSAL_MM:
                 self._now[link] = -1
-            # onwards the farthest point goes with the link; while it comes back by less, it stays
+            # the farthest point moves on with the link, and stays while the link comes back by less than the threshold
             if self._now[link] != before or since_mm * before > 0:
                 self._turning_mm[link] = here_mm

@@ -1,4 +1,4 @@
-"""The limits of a correction: its size and its slew, per link. What they change, they say."""
+"""The limits of a correction: its size and its rate of change (slew), for each link."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import LimitSettings
-from compd.live.loop.setpoint import State
+from compd.live.loop.states import State
 
-# A step that exceeds the slew limit by rounding alone is no slewing.
+# A step may exceed the slew limit by this much, which is rounding, without being reported as slewing.
 _ROUNDING_MM = 1e-12
 
 
-class Limited(NamedTuple):
-    """What may be applied.
+class LimitedCorrection(NamedTuple):
+    """The correction that may be applied.
 
     applied_mm : (n) correction within its limits; the previous one where `state` is REFUSED.
     state : OK, SLEWING, CLAMPED or REFUSED.
@@ -28,33 +28,39 @@ class Limited(NamedTuple):
     reason: str
 
 
-def limited(wanted_mm: FloatArray, previous_mm: FloatArray, period_s: float, limits: LimitSettings) -> Limited:
+def limit_correction(
+    wanted_mm: FloatArray, previous_mm: FloatArray, period_s: float, limits: LimitSettings
+) -> LimitedCorrection:
     """The correction (n) that may follow `previous_mm` (n), one period later.
 
-    The period is the loop's own, not the time that passed: after missed cycles a correction takes
-    longer, it does not take a larger step.
+    `period_s` is the nominal period of the loop, not the time that has passed: after missed cycles a correction takes
+    longer, its steps do not grow.
     """
     wanted = wanted_mm.tolist()
     previous = previous_mm.tolist()
     largest, step = limits.correction_mm, limits.slew_mm_per_s * period_s
     if not all(map(math.isfinite, wanted)):
-        return Limited(previous_mm, State.REFUSED, f"{_first_not_finite(wanted)}, refused; the last one is kept")
+        return LimitedCorrection(
+            previous_mm, State.REFUSED, f"{_first_not_finite(wanted)}, refused; the last one is kept"
+        )
     beyond = [link for link, value in enumerate(wanted) if abs(value) > largest]
     if beyond and limits.on_limit == "refuse":
-        return Limited(previous_mm, State.REFUSED, _beyond(beyond, wanted, largest, "refused"))
+        return LimitedCorrection(previous_mm, State.REFUSED, _beyond(beyond, wanted, largest, "refused"))
     allowed = [min(max(value, -largest), largest) for value in wanted]
     late = [i for i, value in enumerate(allowed) if abs(value - previous[i]) > step + _ROUNDING_MM]
     for i in late:
         allowed[i] = previous[i] + math.copysign(step, allowed[i] - previous[i])
     if beyond:
-        return Limited(np.array(allowed), State.CLAMPED, _beyond(beyond, wanted, largest, "clamped"))
+        return LimitedCorrection(np.array(allowed), State.CLAMPED, _beyond(beyond, wanted, largest, "clamped"))
     if late:
-        return Limited(np.array(allowed), State.SLEWING, _slewing(late[0], wanted, allowed, limits.slew_mm_per_s))
-    return Limited(wanted_mm, State.OK, "")
+        return LimitedCorrection(
+            np.array(allowed), State.SLEWING, _slewing(late[0], wanted, allowed, limits.slew_mm_per_s)
+        )
+    return LimitedCorrection(wanted_mm, State.OK, "")
 
 
-def beyond_stroke(length_mm: FloatArray, stroke_mm: tuple[float, float] | None) -> str:
-    """Which links (n) would be shorter or longer than they can be, in words; "" when none, or no stroke is known."""
+def stroke_problem(length_mm: FloatArray, stroke_mm: tuple[float, float] | None) -> str:
+    """Text that names the links (n) outside the stroke (shortest, longest); "" where none is, or no stroke is known."""
     if stroke_mm is None:
         return ""
     shortest, longest = stroke_mm
@@ -65,9 +71,9 @@ def beyond_stroke(length_mm: FloatArray, stroke_mm: tuple[float, float] | None) 
     )
 
 
-def _beyond(links: list[int], wanted: list[float], largest: float, done: str) -> str:
+def _beyond(links: list[int], wanted: list[float], largest: float, action: str) -> str:
     return "; ".join(
-        f"link {i + 1}: correction {wanted[i]:.3f} mm beyond {math.copysign(largest, wanted[i]):.3f} mm, {done}"
+        f"link {i + 1}: correction {wanted[i]:.3f} mm beyond {math.copysign(largest, wanted[i]):.3f} mm, {action}"
         for i in links
     )
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from compd.errors import Problem, StateError
+from compd.files import write_files
 
 FILE_NAME = "machine-zero.json"
 _FORMAT = 1
@@ -39,17 +39,10 @@ class MachineZero:
         Raises StateError when the disk refuses.
         """
         path = directory / FILE_NAME
-        temporary = directory / f".{FILE_NAME}.new"
-        content = {"format": _FORMAT, **self.to_json()}
+        text = json.dumps({"format": _FORMAT, **self.to_json()}, indent=1, allow_nan=False) + "\n"
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            with temporary.open("w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1, allow_nan=False)
-                file.write("\n")
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(path)
-            _sync_directory(directory)
+            write_files({path: text})
         except OSError as error:
             raise StateError(
                 Problem(
@@ -109,12 +102,3 @@ def _checked(content: Any, path: Path) -> MachineZero:
             if len(numbers) == len(readings) and all(map(math.isfinite, numbers)):
                 return MachineZero(zero_hash, taken_at, {name: float(value) for name, value in readings.items()})
     raise StateError(Problem(where=str(path), what="is not a machine zero of this release", next_step=_TAKE_ONE))
-
-
-def _sync_directory(directory: Path) -> None:
-    """A rename is on disk only once its directory is."""
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

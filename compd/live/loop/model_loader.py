@@ -1,4 +1,4 @@
-"""The models that the loop computes with: the one whose correction is applied, and one that runs beside it."""
+"""Model files read for the loop: a model is applied, or runs beside the applied one as a shadow."""
 
 from __future__ import annotations
 
@@ -21,115 +21,121 @@ from compd.model_file import read_model_file
 from compd.readings import Snapshot
 
 _HASH_DIGITS = 16
-# What a faulty effect of a person's own code raises.
+# Exceptions by which an effect of a user's own code may fail.
 _FAULTS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 @dataclass(frozen=True, eq=False)
 class LiveModel:
-    """A machine model, ready for the loop; frozen.
+    """A machine model that can be used in the loop.
 
-    file, hash : of its model file; "" without effects.
-    needs : the wires of the quantities that its effects need, in the order of `quantities`.
+    Attributes
+    ----------
+    machine : with its effects.
+    file, hash : path and first digits of the SHA-256 of its model file; "" without effects.
+    quantities : names of the temperatures, forces and so on that its effects need.
+    wires : of these quantities, in the same order.
     """
 
     machine: MachineModel
     file: str
     hash: str
     quantities: tuple[str, ...]
-    needs: Wires
+    wires: Wires
 
     def read(self, snapshot: Snapshot) -> WiredValues:
-        """The quantities as they are now, in their own units."""
-        return self.needs.read(snapshot, np.zeros(len(self.quantities)))
+        """The quantities in a snapshot, in their own units."""
+        return self.wires.read(snapshot, np.zeros(len(self.quantities)))
 
-    def named(self, read: WiredValues) -> Mapping[str, FloatArray]:
-        """The same by name."""
-        return dict(zip(self.quantities, read.change_mm, strict=True))
+    def by_name(self, read: WiredValues) -> Mapping[str, FloatArray]:
+        """What `read` returned, by name."""
+        return dict(zip(self.quantities, read.values, strict=True))
 
     @property
     def summary(self) -> Mapping[str, Any]:
-        """For MODEL and STATUS; what happens at the reference instrument is named as not live."""
-        found: dict[str, Any] = {"effects": [one.effect.id for one in self.machine.acting]}
+        """For MODEL and STATUS. `not_live` are effects at the reference instrument, which the machine does not need."""
+        summary: dict[str, Any] = {"effects": [fitted.effect.id for fitted in self.machine.acting]}
         if self.file:
-            found |= {"model": self.hash, "file": self.file}
-        if idle := [one.effect.id for one in self.machine.effects if not one.effect.live]:
-            found["not_live"] = idle
-        return found
+            summary |= {"model": self.hash, "file": self.file}
+        if not_live := [fitted.effect.id for fitted in self.machine.effects if not fitted.effect.live]:
+            summary["not_live"] = not_live
+        return summary
 
 
 class Models(NamedTuple):
-    """What the loop adopts as one between two ticks. shadow : computed and published, never applied."""
+    """The models of one cycle: the corrections of `applied` are used, those of `shadow` only published."""
 
     applied: LiveModel
     shadow: LiveModel | None = None
 
     @property
     def hashes(self) -> dict[str, str]:
-        """For READINGS: of the model files; absent where there is none."""
-        found = {"model": self.applied.hash} if self.applied.hash else {}
-        return found if self.shadow is None else found | {"shadow": self.shadow.hash}
+        """For READINGS: hashes of the model files; a key is absent where there is no file."""
+        hashes = {"model": self.applied.hash} if self.applied.hash else {}
+        return hashes if self.shadow is None else hashes | {"shadow": self.shadow.hash}
 
     @property
     def files(self) -> dict[str, str]:
-        """For READINGS: where each model file was read, by its hash; for whoever must keep a copy."""
+        """For READINGS: path of each model file by its hash, for whoever keeps a copy."""
         return {model.hash: model.file for model in self if model is not None and model.hash}
 
     @property
     def summary(self) -> dict[str, Any]:
         """For MODEL and STATUS."""
-        found: dict[str, Any] = {"applied": self.applied.summary}
-        return found if self.shadow is None else found | {"shadow": self.shadow.summary}
+        summary: dict[str, Any] = {"applied": self.applied.summary}
+        return summary if self.shadow is None else summary | {"shadow": self.shadow.summary}
 
 
 class ModelLoader:
-    """Reads model files for one machine, and refuses those that it cannot use live."""
+    """Reads model files for one machine, and refuses those that cannot be used live."""
 
-    def __init__(self, bare: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
-        """`bare`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
-        self.bare = LiveModel(bare, "", "", (), wires.quantity_wires(()))
+    def __init__(self, model: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
+        """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
+        self.without_effects = LiveModel(model, "", "", (), wires.quantity_wires(()))
         self._machine = machine
         self._geometry = geometry
         self._wires = wires
 
     def read(self, path: Path) -> LiveModel:
-        """The model in a file; every effect of it has what it needs.
+        """The model in a file.
 
-        Raises CompdError with every problem: what `read_model_file` refuses, a gauge to add, an effect that fails.
+        Raises CompdError with every problem: what `read_model_file` refuses, gauges that the effects need and the
+        machine does not have, an effect that fails.
         """
-        before = _hash(path)
-        bare = self.bare.machine
-        file = read_model_file(path, self._machine, bare.links, self._geometry)
-        if problems := [*self._unusable(file.fitted), *_misnamed(file.fitted)]:
+        file_hash = _hash(path)
+        model = self.without_effects.machine
+        file = read_model_file(path, self._machine, model.links, self._geometry)
+        if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
-        machine = replace(bare, effects=file.fitted, covariance=file.covariance)
-        names = dict.fromkeys(name for one in machine.acting for name in quantities(one.effect, bare.links))
-        try_out(machine, tuple(names), str(path))
-        if _hash(path) != before:
+        machine = replace(model, effects=file.fitted, covariance=file.covariance)
+        acting = machine.acting
+        names = tuple(dict.fromkeys(name for fitted in acting for name in quantities(fitted.effect, model.links)))
+        try_model(machine, names, str(path))
+        if _hash(path) != file_hash:
             raise StateError(Problem(where=str(path), what="has changed while it was read", next_step="ask again"))
-        return LiveModel(machine, str(path), before, tuple(names), self._wires.quantity_wires(tuple(names)))
+        return LiveModel(machine, str(path), file_hash, names, self._wires.quantity_wires(names))
 
-    def _unusable(self, fitted: tuple[FittedEffect, ...]) -> list[Problem]:
-        """Live effects that lack a gauge, a setting or the recording's own clock."""
-        bare = self.bare.machine
-        assert bare.constants is not None
-        available = {*self._wires.quantity_names, *settings(bare.constants)}
-        live = [one for one in fitted if one.effect.live]
-        problems = [problem for one in live for problem in missing(one.effect, available, bare.links)]
+    def _unmet_needs(self, effects: tuple[FittedEffect, ...]) -> list[Problem]:
+        """Live effects that need a gauge or a setting which is not there, or the time since a recording's start."""
+        model = self.without_effects.machine
+        assert model.constants is not None
+        available = {*self._wires.quantity_names, *settings(model.constants)}
+        live = [fitted for fitted in effects if fitted.effect.live]
+        problems = [problem for fitted in live for problem in missing(fitted.effect, available, model.links)]
         return problems + [
             Problem(
-                where=f"effect {one.effect.id}",
+                where=f"effect {fitted.effect.id}",
                 what="reads time_s, which counts from the start of a recording",
                 next_step="write it with what changes in that time, a temperature for instance",
             )
-            for one in live
-            if "time_s" in one.effect.symbols
+            for fitted in live
+            if "time_s" in fitted.effect.symbols
         ]
 
 
-def _misnamed(fitted: tuple[FittedEffect, ...]) -> list[Problem]:
-    """Ids that could not be told apart among a correction's sources; numbers that are none."""
-    ids = [one.effect.id for one in fitted]
+def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
+    """Ids that cannot be told apart in `sources_mm` of a setpoint, and parameters that are not finite."""
+    ids = [fitted.effect.id for fitted in effects]
     problems = [
         Problem(where=f"effect {name}", what="is in the model twice", next_step="remove one of them")
         for name in dict.fromkeys(ids)
@@ -148,21 +154,23 @@ def _misnamed(fitted: tuple[FittedEffect, ...]) -> list[Problem]:
     ]
     return problems + [
         Problem(
-            where=f"effect {one.effect.id}",
+            where=f"effect {fitted.effect.id}",
             what="has a parameter or constant that is not a finite number",
             next_step="fit it again with `compd effect fit`",
         )
-        for one in fitted
-        if not np.isfinite([*one.theta, *one.shape.values()]).all()
+        for fitted in effects
+        if not np.isfinite([*fitted.theta, *fitted.shape.values()]).all()
     ]
 
 
-def try_out(machine: MachineModel, names: tuple[str, ...], where: str) -> None:
-    """One cycle in each mode at machine zero with unknown quantities: a faulty effect fails here, not in the loop.
+def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None:
+    """Compute one cycle in each mode, at machine zero with quantities that are nan.
 
-    Raises StateError.
+    A faulty effect of a user's own code then fails here and not in the loop. Raises StateError.
+
+    names : of the quantities. where : the model file, for the message.
     """
-    unread = GaugeValues(
+    values = GaugeValues(
         np.zeros(machine.links),
         np.zeros(machine.joint_weights.shape[1]),
         np.zeros(9),
@@ -172,8 +180,8 @@ def try_out(machine: MachineModel, names: tuple[str, ...], where: str) -> None:
     zero = machine.zero.contact
     target_mm = zero.tip_P_mm if hasattr(machine.arrangement, "tool_M_mm") else zero.tip_M_mm
     try:
-        _, warm = compensate_cmm(machine, unread, WarmStart.at_zero(machine))
-        compensate_machine_tool(machine, target_mm, None, unread._replace(time_s=1.0), warm)
+        _, warm = compensate_cmm(machine, values, WarmStart.at_zero(machine))
+        compensate_machine_tool(machine, target_mm, None, values._replace(time_s=1.0), warm)
     except _FAULTS as error:
         raise StateError(
             Problem(

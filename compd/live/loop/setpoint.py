@@ -1,53 +1,37 @@
-"""A setpoint: what one cycle found, as a line of JSON and as one fixed-size packet."""
+"""The setpoint, which is the result of one cycle, and its encodings: a line of JSON and a packet of fixed size."""
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from compd.live.loop.cycle_state import CycleInputs
-
-
-class State(StrEnum):
-    """How a setpoint came about. The order gives the state's code in the packet: append, never reorder."""
-
-    STARTING = "starting"  # not every gauge has been read yet
-    NO_ZERO = "no_zero"  # no machine zero fits this configuration: take one
-    OK = "ok"
-    SLEWING = "slewing"  # the correction is on its way, at the slew limit
-    CLAMPED = "clamped"  # the correction is held at its limit
-    HOLD = "hold"  # a comparator is lost: the last good set is used
-    FADE = "fade"  # a comparator is lost: the last good set is taken back to zero
-    STOP = "stop"  # a gauge is lost and nothing replaces it
-    REFUSED = "refused"  # beyond a limit, unreachable, or not finite
+from compd.json_text import encode_compact
+from compd.live.loop.cycle_state import CycleInputs, CycleState
+from compd.live.loop.states import State
 
 
 class Mode(StrEnum):
-    """Who gives the tip: the scales (cmm) or a controller's target (machine_tool)."""
+    """What determines the tip: the scales as they are read (cmm), or the target of a controller (machine_tool)."""
 
     CMM = "cmm"
     MACHINE_TOOL = "machine_tool"
 
 
-STATE_CODES: Mapping[State, int] = {state: code for code, state in enumerate(State)}
-MODE_CODES: Mapping[Mode, int] = {mode: code for code, mode in enumerate(Mode)}
+_MODE_CODES: Mapping[Mode, int] = {Mode.CMM: 0, Mode.MACHINE_TOOL: 1}
 
-# 0.1 pm would be noise; 0.1 nm is a hundredth of the best comparator's step.
+# 0.1 nm: a hundredth of the resolution of the best comparators.
 _DECIMALS_MM = 7
-# 0.1 nrad on a 1 m lever is 0.1 nm.
+# 0.1 nrad: 0.1 nm at the end of a lever of 1 m.
 _DECIMALS_RAD = 10
 _DECIMALS_S = 6
-# An uncertainty is known to two digits.
+# 0.1 nm, as lengths: an uncertainty is not known better.
 _DECIMALS_UM = 4
 
 # magic, version, size, seq, time, valid_until, age, flags, state, mode, links, 3 spare bytes, tip 3, frame
@@ -57,19 +41,22 @@ _PACKET = struct.Struct("<4sHHQdddHBBB3x3d3d3d6d6d6d8s")
 _MAGIC = b"CMPD"
 _VERSION = 1
 _FLAG_VALID = 1
-_FLAG_TOOL_ON_PLATE = 2  # the tip's three numbers are then tip_P
+_FLAG_TOOL_ON_PLATE = 2  # the tip's three coordinates are then tip_P
 PACKET_SIZE = _PACKET.size + 4
 _LINKS = 6
-# One encoder for all: json.dumps() makes a new one for every call that is not plain.
-_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
-_NO_NUMBERS = (math.nan,) * (9 + 3 * _LINKS)
+_NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * _LINKS)
 
 
 class ShadowResult(NamedTuple):
-    """What a model that is not applied asks for in the same cycle.
+    """What the shadow model asks for in the same cycle; nothing of it is applied.
 
-    model : hash of its file.  reason : why it has no numbers; "" when it has.
-    correction_mm (n) before limits, tip_M_mm (3); tip_P_mm (3) with the tool on the plate.
+    Attributes
+    ----------
+    model : hash of its file.
+    reason : why there are no values; "" where there are.
+    correction_mm : (n), before the limits.
+    tip_M_mm : (3).
+    tip_P_mm : (3), with the tool on the plate.
     """
 
     model: str
@@ -80,15 +67,20 @@ class ShadowResult(NamedTuple):
 
 
 class SetpointValues(NamedTuple):
-    """What a valid setpoint says; n links.
+    """The values of a valid setpoint; n links.
 
-    tip_M_mm (3), tip_B0_mm (3): the tool tip in {M} and, equation (9), in {B0}; with the tool on the plate
-    instead tip_P_mm (3), the touched place on the work. frame_origin_M_mm (3): origin of {B}.
-    frame_displacement_M_mm (3), frame_rotation_M_rad (3): displacement and rotation vector of {B} since machine zero.
-    link_length_mm, scale_setpoint_mm, correction_mm (n): the correction is what is added to the command,
-    after its limits. sources_mm: how much joints, frame and each effect ask for, before the limits.
-    u_tip_um (3): standard uncertainty of the tip in {M}, with the tool on the plate of the place in {P}; None unknown.
-    shadow: what another model asks for.
+    Attributes
+    ----------
+    tip_M_mm, tip_B0_mm : (3), the tool tip in {M}, and in {B0} by equation (9).
+    tip_P_mm : (3), with the tool on the plate the place on the work that the tip touches; None otherwise.
+    frame_origin_M_mm : (3), origin of {B}.
+    frame_displacement_M_mm, frame_rotation_M_rad : (3), displacement and rotation vector of {B} since machine zero.
+    link_length_mm, scale_setpoint_mm : (n).
+    correction_mm : (n), what is added to the command, within its limits.
+    sources_mm : (n) for joints, frame and each effect: what each asks for, before the limits.
+    u_tip_um : (3), standard uncertainty of `tip_P_mm` with the tool on the plate, else of `tip_M_mm`; nan or None
+        where it is not known.
+    shadow : result of the model that runs beside the applied one; None without one.
     """
 
     tip_M_mm: FloatArray
@@ -106,15 +98,19 @@ class SetpointValues(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """One cycle's result.
+    """Result of one cycle.
 
-    seq : counts cycles, also invalid ones; a gap is a missed cycle or a dropped message.
+    Attributes
+    ----------
+    seq : number of the cycle, whether valid or not; a gap is a missed cycle or a dropped message.
     time_s, valid_until_s : monotonic seconds; an invalid setpoint has expired when it is made.
-    age_s : of the oldest gauge used; nan where none was.
+    age_s : age of the oldest reading used; nan where none was.
+    state : how it came about.
     reason : why the state is not ok; "" when it is.
-    numbers : None unless valid, so that no number looks alive that is not.
-    inputs : what it was computed from, for whoever watches the readings; no part of a SETPOINT message.
+    mode : what determined the tip.
+    values : None unless valid, so that no value can be taken for a good one.
     model : hash of the model file that was applied; "" without effects.
+    inputs, state_before : what it was computed from, for READINGS messages; they are no part of a SETPOINT.
     """
 
     seq: int
@@ -124,16 +120,20 @@ class Setpoint(NamedTuple):
     state: State
     reason: str
     mode: Mode
-    numbers: SetpointValues | None
-    inputs: CycleInputs | None = None
+    values: SetpointValues | None
     model: str = ""
+    inputs: CycleInputs | None = None
+    state_before: CycleState | None = None
 
     @property
     def valid(self) -> bool:
-        return self.numbers is not None
+        return self.values is not None
 
     def to_json(self) -> bytes:
-        """One line, with its newline. What does not exist is left out; there is no null and no NaN."""
+        """One line of JSON, with its newline. Keys without a value are absent: there is no null and no NaN.
+
+        Raises ValueError where a value is not finite.
+        """
         message: dict[str, Any] = {
             "class": "SETPOINT",
             "seq": self.seq,
@@ -148,31 +148,32 @@ class Setpoint(NamedTuple):
             message["model"] = self.model
         if math.isfinite(self.age_s):
             message["age_s"] = round(self.age_s, _DECIMALS_S)
-        if self.numbers is not None:
-            message |= _plain(self.numbers)
-        return _encode(message).encode() + b"\n"
+        if self.values is not None:
+            message |= _json_values(self.values)
+        return encode_compact(message).encode() + b"\n"
 
     def to_packet(self, config_hash: bytes) -> bytes:
         """`PACKET_SIZE` bytes, little-endian; the links a machine does not have are nan.
 
         config_hash : the first 8 bytes of the configuration's hash.
         """
-        numbers = self.numbers
-        values: tuple[float, ...] = _NO_NUMBERS
+        values = self.values
+        vectors = _NO_VECTORS
         links = flags = 0
-        if numbers is not None:
-            links = len(numbers.correction_mm)
-            flags = _FLAG_VALID if numbers.tip_P_mm is None else _FLAG_VALID | _FLAG_TOOL_ON_PLATE
+        if values is not None:
+            tip_mm = values.tip_M_mm if values.tip_P_mm is None else values.tip_P_mm
+            links = len(values.correction_mm)
+            flags = _FLAG_VALID if values.tip_P_mm is None else _FLAG_VALID | _FLAG_TOOL_ON_PLATE
             unused = (math.nan,) * (_LINKS - links)
-            values = (
-                *(numbers.tip_M_mm if numbers.tip_P_mm is None else numbers.tip_P_mm).tolist(),
-                *numbers.frame_displacement_M_mm.tolist(),
-                *numbers.frame_rotation_M_rad.tolist(),
-                *numbers.link_length_mm.tolist(),
+            vectors = (
+                *tip_mm.tolist(),
+                *values.frame_displacement_M_mm.tolist(),
+                *values.frame_rotation_M_rad.tolist(),
+                *values.link_length_mm.tolist(),
                 *unused,
-                *numbers.scale_setpoint_mm.tolist(),
+                *values.scale_setpoint_mm.tolist(),
                 *unused,
-                *numbers.correction_mm.tolist(),
+                *values.correction_mm.tolist(),
                 *unused,
             )
         body = _PACKET.pack(
@@ -184,58 +185,58 @@ class Setpoint(NamedTuple):
             self.valid_until_s,
             self.age_s,
             flags,
-            STATE_CODES[self.state],
-            MODE_CODES[self.mode],
+            self.state.code,
+            _MODE_CODES[self.mode],
             links,
-            *values,
+            *vectors,
             config_hash,
         )
         return body + zlib.crc32(body).to_bytes(4, "little")
 
 
-def _plain(numbers: SetpointValues) -> dict[str, Any]:
-    """The numbers as lists, rounded: vectors of a machine without a tool on the plate have no tip_P_mm."""
+def _json_values(values: SetpointValues) -> dict[str, Any]:
+    """The values as rounded lists, under their keys in the message."""
     lengths = {
-        "tip_M_mm": numbers.tip_M_mm,
-        "tip_B0_mm": numbers.tip_B0_mm,
-        "link_length_mm": numbers.link_length_mm,
-        "scale_setpoint_mm": numbers.scale_setpoint_mm,
-        "correction_mm": numbers.correction_mm,
+        "tip_M_mm": values.tip_M_mm,
+        "tip_B0_mm": values.tip_B0_mm,
+        "link_length_mm": values.link_length_mm,
+        "scale_setpoint_mm": values.scale_setpoint_mm,
+        "correction_mm": values.correction_mm,
     }
-    if numbers.tip_P_mm is not None:
-        lengths["tip_P_mm"] = numbers.tip_P_mm
-    frame = {"origin_M_mm": numbers.frame_origin_M_mm, "displacement_M_mm": numbers.frame_displacement_M_mm}
-    # one call on one long array costs what one call on three numbers does
-    plain = _rounded([*lengths.values(), *frame.values(), *numbers.sources_mm.values()])
-    return _known(numbers) | {
-        **dict(zip(lengths, plain, strict=False)),
+    if values.tip_P_mm is not None:
+        lengths["tip_P_mm"] = values.tip_P_mm
+    frame = {"origin_M_mm": values.frame_origin_M_mm, "displacement_M_mm": values.frame_displacement_M_mm}
+    # rounding one long array costs as much as rounding one of three elements
+    rounded = _rounded([*lengths.values(), *frame.values(), *values.sources_mm.values()])
+    return _json_optional_values(values) | {
+        **dict(zip(lengths, rounded, strict=False)),
         "frame": {
-            **dict(zip(frame, plain, strict=False)),
-            "rotation_M_rad": numbers.frame_rotation_M_rad.round(_DECIMALS_RAD).tolist(),
+            **dict(zip(frame, rounded, strict=False)),
+            "rotation_M_rad": values.frame_rotation_M_rad.round(_DECIMALS_RAD).tolist(),
         },
-        "sources_mm": dict(zip(numbers.sources_mm, plain, strict=True)),
+        "sources_mm": dict(zip(values.sources_mm, rounded, strict=True)),
     }
 
 
-def _known(numbers: SetpointValues) -> dict[str, Any]:
-    """What not every machine has: the uncertainty, another model's correction."""
-    found: dict[str, Any] = {}
-    if numbers.u_tip_um is not None and math.isfinite(numbers.u_tip_um.sum()):
-        found["u_tip_um"] = numbers.u_tip_um.round(_DECIMALS_UM).tolist()
-    if numbers.shadow is not None:
-        parts = numbers.shadow._asdict().items()
-        found["shadow"] = {
-            name: part if isinstance(part, str) else part.round(_DECIMALS_MM).tolist()
-            for name, part in parts
-            if part is not None
+def _json_optional_values(values: SetpointValues) -> dict[str, Any]:
+    """The uncertainty where it is known, and the shadow's result where there is a shadow."""
+    message: dict[str, Any] = {}
+    if values.u_tip_um is not None and math.isfinite(values.u_tip_um.sum()):
+        message["u_tip_um"] = values.u_tip_um.round(_DECIMALS_UM).tolist()
+    if values.shadow is not None:
+        message["shadow"] = {
+            name: field if isinstance(field, str) else field.round(_DECIMALS_MM).tolist()
+            for name, field in values.shadow._asdict().items()
+            if field is not None
         }
-    return found
+    return message
 
 
 def _rounded(vectors: list[FloatArray]) -> Iterator[list[float]]:
-    flat = np.concatenate(vectors).round(_DECIMALS_MM).tolist()
+    """Each vector as a list, rounded to `_DECIMALS_MM`."""
+    elements = np.concatenate(vectors).round(_DECIMALS_MM).tolist()
     start = 0
     for vector in vectors:
         end = start + len(vector)
-        yield flat[start:end]
+        yield elements[start:end]
         start = end

@@ -1,4 +1,4 @@
-"""What happens when a comparator is lost: `hold`, `fade` or `stop`, as the configuration says."""
+"""The stale policy: what replaces the comparators when one is lost (`loop.on_stale`: hold, fade or stop)."""
 
 from __future__ import annotations
 
@@ -7,29 +7,38 @@ from typing import NamedTuple
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import LoopSettings
-from compd.live.loop.setpoint import State
+from compd.live.loop.states import State
 
-_NONE: Mapping[str, FloatArray] = {}
+_NO_QUANTITIES: Mapping[str, FloatArray] = {}
 
 
 class ComparatorSet(NamedTuple):
-    """Joint and frame comparators of one snapshot, all good: they are used as a set or not at all.
+    """Joint and frame comparators of one snapshot, all good. They are used together or not at all.
 
-    change_mm (k + 9): joints, then frame, since machine zero. time_s : of the snapshot. oldest_s : of its
-    oldest reading. quantities : those that the model's effects need; they belong to the set.
+    Attributes
+    ----------
+    change_mm : (k + 9), joints, then frame, since machine zero.
+    time_s : monotonic time of the snapshot.
+    oldest_s : monotonic time of the oldest reading in the set.
+    quantities : temperatures, forces and the rest that the effects of the applied model need.
     """
 
     change_mm: FloatArray
     time_s: float
     oldest_s: float
-    quantities: Mapping[str, FloatArray] = _NONE
+    quantities: Mapping[str, FloatArray] = _NO_QUANTITIES
 
 
 class UsableComparators(NamedTuple):
-    """The set to compute with; None when there is none and the setpoint is invalid.
+    """The comparators with which to compute.
 
-    expires_s : monotonic time from which the set must not be used any more; inf for a live one.
-    weight : how much the model's effects count, as the set itself does already.
+    Attributes
+    ----------
+    comparators : None where there are none to use; the setpoint is then invalid.
+    state, reason : OK and "", or what replaces the lost comparators and why.
+    expires_s : monotonic time from which `comparators` must not be used any more; inf where they are live.
+    weight : factor between 0 and 1 by which the corrections of the effects are multiplied. `comparators` have been
+        multiplied by it already.
     """
 
     comparators: ComparatorSet | None
@@ -39,26 +48,33 @@ class UsableComparators(NamedTuple):
     weight: float = 1.0
 
 
-def usable(
-    live: ComparatorSet | None, last: ComparatorSet | None, lost: str, now_s: float, loop: LoopSettings
+def usable_comparators(
+    live: ComparatorSet | None, last_good: ComparatorSet | None, lost: str, now_s: float, settings: LoopSettings
 ) -> UsableComparators:
     """The live set, or what `on_stale` makes of the last good one.
 
-    live : this cycle's set; None when a comparator is not good, and `lost` then says which and why.
-    last : the newest set that was good; None before the first.
+    `hold` uses the last good set as it is, `fade` multiplies it by 1 - elapsed / hold_s; both end after `hold_s`.
+
+    Parameters
+    ----------
+    live : the set of this cycle; None when a comparator cannot be used.
+    last_good : the newest complete set; None before the first.
+    lost : which comparators cannot be used, and why; "" for a live set.
+    now_s : monotonic time of the snapshot.
     """
     if live is not None:
         return UsableComparators(live, State.OK, "", float("inf"))
-    if last is None:
+    if last_good is None:
         return UsableComparators(None, State.STARTING, f"no complete set of comparators yet: {lost}", now_s)
-    elapsed_s = now_s - last.time_s
-    expires_s = last.time_s + loop.hold_s
-    if loop.on_stale == "stop":
+    elapsed_s = now_s - last_good.time_s
+    expires_s = last_good.time_s + settings.hold_s
+    if settings.on_stale == "stop":
         return UsableComparators(None, State.STOP, lost, now_s)
-    if elapsed_s >= loop.hold_s:
-        return UsableComparators(None, State.STOP, f"{lost}; {loop.on_stale} ended after {loop.hold_s:g} s", now_s)
-    if loop.on_stale == "hold":
-        return UsableComparators(last, State.HOLD, f"{lost}; the last good set is held", expires_s)
-    weight = 1.0 - elapsed_s / loop.hold_s
-    faded = last._replace(change_mm=last.change_mm * weight)
+    if elapsed_s >= settings.hold_s:
+        reason = f"{lost}; {settings.on_stale} ended after {settings.hold_s:g} s"
+        return UsableComparators(None, State.STOP, reason, now_s)
+    if settings.on_stale == "hold":
+        return UsableComparators(last_good, State.HOLD, f"{lost}; the last good set is held", expires_s)
+    weight = 1.0 - elapsed_s / settings.hold_s
+    faded = last_good._replace(change_mm=last_good.change_mm * weight)
     return UsableComparators(faded, State.FADE, f"{lost}; the last good set counts {weight:.0%}", expires_s, weight)

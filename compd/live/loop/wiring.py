@@ -1,4 +1,4 @@
-"""From the readings of a snapshot to the machine's quantities: which gauge, which sign, minus machine zero."""
+"""The wiring: which channel measures what, and the signed values since machine zero in a snapshot of readings."""
 
 from __future__ import annotations
 
@@ -10,27 +10,33 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.configuration.crosscheck import DISTANCES, resolve
-from compd.configuration.operation import FrameWire
+from compd.configuration.crosscheck import resolve
+from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
 from compd.readings import Latest, Snapshot
 
 
 class WiredValues(NamedTuple):
-    """Length gauges of one kind: changes since machine zero.
+    """The values of k wires in one snapshot.
 
-    change_mm : (k); nan where the reading is not good. oldest_s : monotonic time of the oldest reading.
-    lost : "" when every reading is good, otherwise which is not and why.
+    values : (k), sign * (reading - zero) in the unit of each wire: mm since machine zero for lengths, the gauge's own
+        for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
+    oldest_s : monotonic time of the oldest reading; inf without wires.
+    lost : which readings cannot be used, and why; "" where all can.
     """
 
-    change_mm: FloatArray
+    values: FloatArray
     oldest_s: float
     lost: str
 
 
 class Wire(NamedTuple):
-    """One channel's place in the machine: "joints.4", what it is for a person, its slot, sign and age limit."""
+    """What one channel measures.
+
+    channel : "gauge.channel". meaning : for people, as "joint 4". slot : its index in a snapshot. sign : +1 or -1.
+    stale_after_s : age from which a reading must not be used.
+    """
 
     channel: str
     meaning: str
@@ -40,35 +46,36 @@ class Wire(NamedTuple):
 
 
 class Wires:
-    """The wires of one kind, in the machine's order."""
+    """The wires of one kind (scales, comparators or quantities), in the order of the machine's numbering."""
 
     def __init__(self, wires: Sequence[Wire]) -> None:
         self.wires = tuple(wires)
-        self._watch = tuple((wire.slot, wire.stale_after_s) for wire in wires)
+        self._slots = tuple((wire.slot, wire.stale_after_s) for wire in wires)
         self._sign = np.array([wire.sign for wire in wires], dtype=float)
 
     def zero_vector(self, zero: MachineZero) -> FloatArray:
-        """Raw readings at machine zero (k), mm."""
+        """(k,) raw readings (mm) at machine zero."""
         return np.array([zero.readings_mm[wire.channel] for wire in self.wires])
 
-    def read(self, snapshot: Snapshot, zero_mm: FloatArray) -> WiredValues:
-        """Changes since machine zero; `zero_mm` (k) from `zero_vector`."""
+    def read(self, snapshot: Snapshot, zero: FloatArray) -> WiredValues:
+        """The values in a snapshot; `zero` (k) from `zero_vector`, or zeros for quantities."""
         now_s, readings = snapshot
-        used = [readings[slot] for slot, _ in self._watch]
-        change_mm = (np.array([reading[0] for reading in used]) - zero_mm) * self._sign
+        used = [readings[slot] for slot, _ in self._slots]
+        values = (np.array([reading[0] for reading in used]) - zero) * self._sign
         oldest_s = min([reading[1] for reading in used], default=math.inf)
         lost = self.lost(snapshot)
         if lost:
             bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s)]
-            change_mm[bad] = math.nan
-        return WiredValues(change_mm, oldest_s, lost)
+            values[bad] = math.nan
+        return WiredValues(values, oldest_s, lost)
 
     def lost(self, snapshot: Snapshot) -> str:
-        """ "" when every reading is good and young enough; otherwise which are not, and why."""
+        """Which readings are not good or too old, and why; "" where all can be used."""
         now_s, readings = snapshot
-        for slot, stale_after_s in self._watch:
+        ok = Quality.OK  # in a local variable: the lookup in an Enum costs more than the rest of this loop
+        for slot, stale_after_s in self._slots:
             _, time_s, quality, _ = readings[slot]
-            if quality is not Quality.OK or now_s - time_s > stale_after_s:
+            if quality is not ok or now_s - time_s > stale_after_s:
                 faults = (_fault(wire, readings[wire.slot], now_s) for wire in self.wires)
                 return ", ".join(fault for fault in faults if fault)
         return ""
@@ -86,9 +93,13 @@ def _fault(wire: Wire, reading: Reading, now_s: float) -> str:
 
 
 class MachineWires:
-    """The whole wiring of one configuration.
+    """The wiring of one configuration.
 
-    scale : in the order of links. comparators : first the `joints` joint comparators, then t1..t3, u1..u6.
+    Attributes
+    ----------
+    scale : in the order of the links.
+    comparators : first the k = `joints` joint comparators, then t1..t3 and u1..u6 of the frame.
+    tool_on_plate : whether the tool stands on the plate and the moving platform carries the work.
     """
 
     def __init__(self, configuration: Configuration, latest: Latest) -> None:
@@ -97,8 +108,8 @@ class MachineWires:
         def wire(reference: str, meaning: str, sign: int = 1) -> Wire:
             channel = resolve(reference, configuration.gauges, configuration.drivers)
             assert channel is not None, f"{reference} was checked when the configuration was loaded"
-            own = configuration.gauges[channel.split(".")[0]].stale_after_s
-            stale_after_s = own if own is not None else configuration.loop.stale_after_s
+            own_limit_s = configuration.gauges[channel.split(".")[0]].stale_after_s
+            stale_after_s = configuration.loop.stale_after_s if own_limit_s is None else own_limit_s
             return Wire(channel, meaning, latest.index[channel], sign, stale_after_s)
 
         frame: dict[str, FrameWire] = {entry.distance: entry for entry in wiring.frame}
@@ -107,7 +118,7 @@ class MachineWires:
         self.comparators = Wires(
             [
                 *(wire(w.gauge, f"joint {k}", w.sign) for k, w in enumerate(wiring.joint, start=1)),
-                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in DISTANCES),
+                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in FRAME_DISTANCES),
             ]
         )
         self.joints = len(wiring.joint)
@@ -130,14 +141,14 @@ class MachineWires:
         return (*self.length_wires, *self._quantities.values())
 
     def lost(self, snapshot: Snapshot) -> str:
-        """ "" when every length gauge can be used; otherwise which cannot, and why."""
+        """Which length gauges cannot be used, and why; "" where all can."""
         return ", ".join(filter(None, (self.scale.lost(snapshot), self.comparators.lost(snapshot))))
 
     @property
     def quantity_names(self) -> tuple[str, ...]:
-        """Temperatures, forces and the rest."""
+        """Names of temperatures, forces and the rest."""
         return tuple(self._quantities)
 
     def quantity_wires(self, names: Sequence[str]) -> Wires:
-        """The wires of some quantities, in this order. They have no zero. Raises KeyError for one not wired."""
+        """The wires of these quantities, in this order. Raises KeyError for one that is not wired."""
         return Wires([self._quantities[name] for name in names])

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
-from compd.live.loop.commands import Commands
+from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.pipeline import Pipeline, build_pipeline
+from compd.live.pipeline import build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 
@@ -93,7 +93,7 @@ class RecordedCycles:
 
 
 def replay(
-    configuration: Configuration, transcripts: RecordedCycles, model_files: Sequence[Path] = ()
+    configuration: Configuration, recording: RecordedCycles, model_files: Sequence[Path] = ()
 ) -> Iterator[ReplayedCycle]:
     """Every recorded cycle, computed anew by the daemon's own cycle from what it computed from then.
 
@@ -101,26 +101,22 @@ def replay(
     Raises RecordingError for a damaged line, readings of another machine or a model that is not given, StateError
     for a model file that cannot be used.
     """
-    chain = build_pipeline(configuration, configuration.gauge_objects())
-    files = [*transcripts.model_files(), *model_files]
-    models = {"": chain.shelf.bare} | {model.hash: model for model in map(chain.shelf.read, files)}
-    for where, message in transcripts.cycles():
-        recorded = _parsed(where, message, chain, configuration)
-        inputs = recorded.inputs
+    pipeline = build_pipeline(configuration, configuration.gauge_objects())
+    files = [*recording.model_files(), *model_files]
+    models = {"": pipeline.loader.without_effects} | {model.hash: model for model in map(pipeline.loader.read, files)}
+    for where, message in recording.cycles():
+        recorded = _recorded_cycle(where, message, pipeline.latest.channels, configuration.geometry.links)
         applied = _model(where, message.get("model", ""), models)
         shadow = _model(where, message["shadow"], models) if "shadow" in message else None
         used = Models(applied, shadow)
-        for slot, reading in enumerate(inputs.snapshot.readings):
-            chain.latest.put(slot, reading)
-        chain.cycle.resume(inputs.carried, used)
-        snapshot = chain.latest.snapshot(inputs.snapshot.time_s)
-        setpoint = chain.cycle.run(recorded.tick, snapshot, Commands(inputs.zero, inputs.target, used))
-        yield ReplayedCycle(where, recorded.tick, recorded.setpoint_line, setpoint.to_json())
+        # the recorded state is that after the models were adopted
+        state, inputs = recorded.state._replace(models=used), recorded.inputs._replace(models=used)
+        setpoint, _ = step(state, inputs, pipeline.settings)
+        yield ReplayedCycle(where, inputs.tick, recorded.setpoint_line, setpoint.to_json())
 
 
-def _parsed(where: str, message: Message, chain: Pipeline, configuration: Configuration) -> RecordedCycle:
-    channels = chain.latest.channels
-    links = configuration.geometry.links
+def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links: int) -> RecordedCycle:
+    """The cycle in a READINGS message. Raises RecordingError for a damaged message, or one of another machine."""
     try:
         if missing := [channel for channel in channels if channel not in message["readings"]]:
             raise RecordingError(
@@ -131,7 +127,7 @@ def _parsed(where: str, message: Message, chain: Pipeline, configuration: Config
                 )
             )
         recorded = parse_readings(message, channels)
-        if len(recorded.inputs.carried.correction_mm) != links:
+        if len(recorded.state.correction_mm) != links:
             raise _damaged(where, f"is of a machine without {links} links")
     except (KeyError, TypeError, ValueError) as error:
         raise _damaged(where, f"{type(error).__name__}: {error}") from error

@@ -14,7 +14,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from compd.gauge import Quality
-from compd.live.loop.setpoint import Mode, State
+from compd.live.loop.setpoint import Mode
+from compd.live.loop.states import State
 from compd.live.service.messages import ErrorCode
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]

@@ -14,14 +14,14 @@ from typing import Any, NamedTuple, NoReturn
 
 from pydantic import ValidationError
 
+from compd.json_text import encode_compact
+
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096
 # 1e9 mm is 1000 km: a number beyond it is not a coordinate, a rate or an angle.
 LARGEST_NUMBER = 1e9
 # How much of a faulty text is repeated in an error.
 QUOTED_CHARACTERS = 40
-# json.dumps() makes a new encoder for every call with options; this one is shared.
-_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
 
 class ErrorCode(StrEnum):
@@ -62,7 +62,7 @@ class ParsedLine(NamedTuple):
 
 def line(message: Mapping[str, Any]) -> bytes:
     """Encode one message, with its newline. Raises ValueError for a number that is not finite."""
-    return _encode(message).encode() + b"\n"
+    return encode_compact(message).encode() + b"\n"
 
 
 def parse(data: bytes) -> ParsedLine:

@@ -22,9 +22,9 @@ class ModelSwitch:
     It is the only writer of `Commands.models`.
     """
 
-    def __init__(self, loader: ModelLoader, orders: Commands) -> None:
+    def __init__(self, loader: ModelLoader, commands: Commands) -> None:
         self._loader = loader
-        self._orders = orders
+        self._commands = commands
         self._job = BackgroundJob("model", "another model is being read")
 
     def start(self, file: str, shadow: bool, answer: Callable[[bytes], None]) -> None:
@@ -45,16 +45,16 @@ class ModelSwitch:
             _log.warning("model refused", file=file, reason=str(error))
             return ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json()
         models = self._next_models(model, shadow)
-        self._orders.models = models
+        self._commands.models = models
         _log.info("shadow" if shadow else "model adopted", file=file or "none")
         return line({"class": "MODEL", **models.summary})
 
     def _next_models(self, model: LiveModel | None, shadow: bool) -> Models:
         """The pair of applied and shadow model with `model` (None: no effects, or no shadow) in its place."""
-        applied, running_shadow = self._orders.models or Models(self._loader.bare)
+        applied, running_shadow = self._commands.models or Models(self._loader.without_effects)
         if shadow:
             return Models(applied, model)
         if model is not None and running_shadow is not None and model.hash == running_shadow.hash:
             # The same object that ran as a shadow: its effects keep their memory.
             return Models(running_shadow)
-        return Models(model or self._loader.bare, running_shadow)
+        return Models(model or self._loader.without_effects, running_shadow)

@@ -21,7 +21,8 @@ import structlog
 
 from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError
-from compd.live.loop.setpoint import Setpoint, State
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.states import State
 from compd.live.service.client_session import ClientSession
 from compd.live.service.listeners import listen_tcp, listen_unix
 from compd.live.service.messages import ErrorCode, ProtocolError

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from compd.configuration.crosscheck import DISTANCES
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading
 from compd.live.loop.commands import Target
@@ -23,6 +22,7 @@ from compd.live.loop.wiring import MachineWires
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
 from compd.readings import Snapshot
+from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
 
 
 class RecordedCycle(NamedTuple):
@@ -30,12 +30,14 @@ class RecordedCycle(NamedTuple):
 
     Attributes
     ----------
-    tick : number of the cycle.
+    state : the state that the cycle had from the one before it.
     inputs : what the cycle computed from.
     setpoint_line : the SETPOINT line that it made, with its newline.
+
+    The models are None in both: the message has their hashes only.
     """
 
-    tick: int
+    state: CycleState
     inputs: CycleInputs
     setpoint_line: bytes
 
@@ -54,8 +56,9 @@ class ReadingsMessage:
 
         Called with the setpoints of a run in order, since the direction of travel is that of the newest cycle.
         """
-        inputs = setpoint.inputs
+        inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
+        assert state is not None, "and its state"
         message: dict[str, Any] = {
             "class": "READINGS",
             "seq": setpoint.seq,
@@ -75,7 +78,7 @@ class ReadingsMessage:
             message |= inputs.models.hashes
             if files := inputs.models.files:
                 message["model_files"] = files
-        message["carried"] = _carried(inputs)
+        message["carried"] = _carried(state, inputs)
         return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
 
 
@@ -85,12 +88,7 @@ def columns(wires: MachineWires) -> list[dict[str, Any]]:
     A length's column is sign * (reading - machine zero), in the unit at the end of its name. Any other quantity has no
     sign here and is recorded as it is read.
     """
-    joints = wires.joints
-    names = [
-        *(f"scale_{i}_mm" for i, _ in enumerate(wires.scale.wires, start=1)),
-        *(f"joint_{k}_um" for k in range(1, joints + 1)),
-        *(f"frame_{distance}_um" for distance in DISTANCES),
-    ]
+    names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints), *FRAME_COLUMNS]
     lengths: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)
@@ -110,12 +108,12 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
     zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
     target = message.get("target")
     inputs = CycleInputs(
+        message["seq"],
         Snapshot(message["time_s"], readings),
         zero,
         None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
-        _parsed_carried(message["carried"], zero),
     )
-    return RecordedCycle(message["seq"], inputs, line(message["setpoint"]))
+    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
 
 
 def _reading(reading: Reading) -> dict[str, Any]:
@@ -139,15 +137,14 @@ def _target(target: Target) -> dict[str, Any]:
     return tip | {"rotation_B0_rad": target.rotation_B0_rad}
 
 
-def _carried(inputs: CycleInputs) -> Any:
+def _carried(state: CycleState, inputs: CycleInputs) -> Any:
     """The state from the cycle before, as plain data.
 
     Of its machine zero only whether it is this cycle's own: a cycle uses nothing that was computed with another.
     """
-    carried = inputs.carried
-    return to_plain(carried._replace(zero=None)) | {"zero": carried.zero is inputs.zero}
+    return to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
 
 
 def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> CycleState:
-    carried: CycleState = from_plain(data)
-    return carried._replace(zero=zero if carried.zero and isinstance(zero, MachineZero) else None)
+    state: CycleState = from_plain(data)
+    return state._replace(zero=zero if state.zero and isinstance(zero, MachineZero) else None)

@@ -29,6 +29,18 @@ _KINDS: Mapping[str, Any] = {
     "Motion": Motion,
 }
 _TAGS: Mapping[type, str] = {kind: tag for tag, kind in _KINDS.items()}
+# Names of the fields in recordings, and in the class; fields that are not listed are not written. The other classes
+# have the same names in both.
+_CYCLE_STATE_FIELDS: Mapping[str, str] = {
+    "zero": "zero",
+    "warm": "warm_start",
+    "correction_mm": "correction_mm",
+    "last_good": "last_good",
+    "scales_seen": "scales_seen",
+    "shadow": "shadow_memory",
+    "adopting": "adopting",
+    "u_tip_um": "u_tip_um",
+}
 
 
 def to_plain(value: Any) -> Any:
@@ -46,7 +58,8 @@ def to_plain(value: Any) -> Any:
                 "shape": list(array.shape),
             }
         case tuple() if hasattr(value, "_fields"):
-            fields = {name: to_plain(part) for name, part in zip(value._fields, value, strict=True)}
+            names = _CYCLE_STATE_FIELDS if isinstance(value, CycleState) else {name: name for name in value._fields}
+            fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
         case tuple():
             return [to_plain(part) for part in value]
@@ -66,8 +79,10 @@ def from_plain(data: Any) -> Any:
     match data:
         case {"array": text, "type": dtype, "shape": shape}:
             return np.frombuffer(base64.b64decode(text), dtype=dtype).reshape(shape)
-        case {"kind": name, **fields}:
-            return _KINDS[name](**{str(key): from_plain(part) for key, part in fields.items()})
+        case {"kind": tag, **fields}:
+            kind = _KINDS[tag]
+            names = _CYCLE_STATE_FIELDS if kind is CycleState else {name: name for name in kind._fields}
+            return kind(**{names[str(name)]: from_plain(part) for name, part in fields.items()})
         case {"mapping": items}:
             return {name: from_plain(part) for name, part in items.items()}
         case {"float": text}:

@@ -11,6 +11,7 @@ from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.gauge import Quality
+from compd.json_text import omit_unknown
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.wiring import MachineWires
@@ -26,7 +27,7 @@ class StatusReport:
     Attributes
     ----------
     version : the VERSION message, whose keys STATUS repeats.
-    orders, latest, wires, loop, publisher : the daemon's own.
+    commands, latest, wires, loop, publisher : the daemon's own.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
     """
@@ -35,7 +36,7 @@ class StatusReport:
     configuration: Configuration
     latest: Latest
     wires: MachineWires
-    orders: Commands
+    commands: Commands
     loop: Loop
     publisher: Publisher
     packets: UdpSender | None
@@ -52,7 +53,7 @@ class StatusReport:
             **self.version,
             "class": "STATUS",
             "time_s": round(now_s, 6),
-            "mode": "cmm" if self.orders.target is None else "machine_tool",
+            "mode": "cmm" if self.commands.target is None else "machine_tool",
             "zero": self._zero(),
             "model": self._model(),
             "loop": self.loop.timing.summary(),
@@ -61,18 +62,18 @@ class StatusReport:
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
         }
-        known: dict[str, Any] = _without_unknown(message)
+        known: dict[str, Any] = omit_unknown(message)
         return known
 
     def _zero(self) -> dict[str, Any]:
-        zero = self.orders.zero
+        zero = self.commands.zero
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
         return {"taken": True, "taken_at": zero.taken_at}
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
-        summary = {} if self.orders.models is None else self.orders.models.summary
+        summary = {} if self.commands.models is None else self.commands.models.summary
         return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
@@ -94,16 +95,3 @@ class StatusReport:
                 entry["detail"] = reading.detail
             gauges.append(entry)
         return gauges
-
-
-def _without_unknown(value: Any) -> Any:
-    """`value` without the numbers in it that are not finite: JSON has none, and what is absent is unknown."""
-    match value:
-        case Mapping():
-            pairs = ((str(key), _without_unknown(part)) for key, part in value.items())
-            return {key: part for key, part in pairs if part is not None}
-        case list() | tuple():
-            return [_without_unknown(part) for part in value]
-        case float() if not math.isfinite(value):
-            return None
-    return value

@@ -35,11 +35,11 @@ class ZeroCapture:
     """
 
     def __init__(
-        self, wires: MachineWires, latest: Latest, orders: Commands, directory: Path, zero_hash: str, clock: Clock
+        self, wires: MachineWires, latest: Latest, commands: Commands, directory: Path, zero_hash: str, clock: Clock
     ) -> None:
         self._wires = wires
         self._latest = latest
-        self._orders = orders
+        self._commands = commands
         self._directory = directory
         self._zero_hash = zero_hash
         self._clock = clock
@@ -62,7 +62,7 @@ class ZeroCapture:
         except StateError as error:
             _log.warning("machine zero refused", reason=str(error))
             return ProtocolError(ErrorCode.ZERO_REFUSED, str(error)).to_json()
-        self._orders.zero = zero
+        self._commands.zero = zero
         _log.info("machine zero taken", path=str(path))
         return line(
             {"class": "ZERO", "taken_at": zero.taken_at, "path": str(path), "readings_mm": dict(zero.readings_mm)}

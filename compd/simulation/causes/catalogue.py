@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.errors import CompdError, Problem
+from compd.files import write_files
 from compd.simulation.causes import gauges, joints, link, outside_library, reference, scale
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
@@ -93,7 +94,7 @@ def seal(path: Path, causes: Sequence[Cause], floors: Sequence[float], weak: Seq
         "error_in_floors": {cause.id: round(f, 3) for cause, f in zip(causes, floors, strict=True)},
         "weak_disturbances": {cause.id: _plain(cause) for cause in weak},
     }
-    path.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+    write_files({path: json.dumps(answer, indent=1) + "\n"})
 
 
 def _plain(cause: Cause) -> float | list[float]:

@@ -16,10 +16,11 @@ from compd.errors import CompdError, DaemonError, StateError
 from compd.gauge import Quality
 from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
-from compd.live.loop.commands import Commands, Target
+from compd.live.loop.commands import Target
+from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
-from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.loop.setpoint import State
+from compd.live.loop.model_loader import Models
+from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.model.effect import FittedEffect
 from compd.model.library import find
@@ -45,10 +46,6 @@ def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Pat
     return path
 
 
-def shelf(live: Machine) -> ModelLoader:
-    return ModelLoader(live.model, live.configuration.machine, live.configuration.geometry_hash, live.wires)
-
-
 @pytest.fixture
 def tripod():
     return machine()
@@ -62,38 +59,38 @@ def still(monkeypatch):
 def test_a_model_is_adopted_between_two_ticks_slewing_never_jumping(tripod, tmp_path):
     file = file_with(tmp_path / "m.yaml", "link_zero", "tool_offset", link_zero=LINK_ZERO_UM, tool_offset=[3, -2, 5])
     before = tripod.settle()
-    tripod.orders.models = Models(shelf(tripod).read(file))
+    tripod.commands.models = Models(tripod.loader.read(file))
     seen = [before]
     while len(seen) < 200 and (len(seen) < 3 or seen[-1].state is not State.OK):
         seen.append(tripod.step())
     assert seen[1].state is State.SLEWING
     assert seen[-1].state is State.OK
-    corrections = np.array([one.numbers.correction_mm for one in seen])
+    corrections = np.array([one.values.correction_mm for one in seen])
     assert np.abs(np.diff(corrections, axis=0)).max() <= STEP_MM + 1e-12
-    tips = np.array([one.numbers.tip_M_mm for one in seen])
+    tips = np.array([one.values.tip_M_mm for one in seen])
     assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() <= 5 * STEP_MM, "nor does the tip that is told"
     assert np.linalg.norm(tips[-1] - tips[0]) > 0.02
-    sources = seen[-1].numbers.sources_mm
+    sources = seen[-1].values.sources_mm
     assert list(sources) == ["joints", "frame", "link_zero", "tool_offset"]
     assert sources["link_zero"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-9)
-    assert sum(sources.values()) == pytest.approx(seen[-1].numbers.correction_mm, abs=1e-12)
-    assert (before.model, seen[1].model) == ("", tripod.orders.models.applied.hash)
-    tripod.orders.models = None
-    assert tripod.settle().numbers.correction_mm == pytest.approx(np.zeros(3), abs=1e-12)
+    assert sum(sources.values()) == pytest.approx(seen[-1].values.correction_mm, abs=1e-12)
+    assert (before.model, seen[1].model) == ("", tripod.commands.models.applied.hash)
+    tripod.commands.models = None
+    assert tripod.settle().values.correction_mm == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 def test_in_machine_tool_mode_the_scale_setpoint_slews_to_the_new_model(tripod, tmp_path):
     file = file_with(tmp_path / "m.yaml", "link_zero", link_zero=LINK_ZERO_UM)
-    tripod.orders.target = Target((5.0, -3.0, -505.0))
+    tripod.commands.target = Target((5.0, -3.0, -505.0))
     before = tripod.settle()
-    tripod.orders.models = Models(shelf(tripod).read(file))
+    tripod.commands.models = Models(tripod.loader.read(file))
     first_ = tripod.step()
-    moved_mm = first_.numbers.scale_setpoint_mm - before.numbers.scale_setpoint_mm
+    moved_mm = first_.values.scale_setpoint_mm - before.values.scale_setpoint_mm
     assert np.abs(moved_mm).max() == pytest.approx(STEP_MM)
     after = tripod.settle()
-    moved_mm = after.numbers.scale_setpoint_mm - before.numbers.scale_setpoint_mm
+    moved_mm = after.values.scale_setpoint_mm - before.values.scale_setpoint_mm
     assert moved_mm == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-9)
-    assert after.numbers.tip_B0_mm == pytest.approx([5.0, -3.0, -505.0])
+    assert after.values.tip_B0_mm == pytest.approx([5.0, -3.0, -505.0])
 
 
 FORMULA = {
@@ -119,20 +116,20 @@ NAMED_AS_A_PART = {**FORMULA, "id": "frame", "formula": "k * tip_x_mm"}
 )
 def test_an_effect_that_cannot_run_here_is_refused_with_what_to_do(tripod, tmp_path, declared, told):
     with pytest.raises(StateError) as caught:
-        shelf(tripod).read(file_with(tmp_path / "m.yaml", declared, "link_zero"))
+        tripod.loader.read(file_with(tmp_path / "m.yaml", declared, "link_zero"))
     assert told in str(caught.value)
 
 
 def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tripod, tmp_path):
     with pytest.raises(StateError) as caught:
-        shelf(tripod).read(file_with(tmp_path / "m.yaml", "link_elasticity", "link_zero", IN_TIME, link_zero=np.nan))
+        tripod.loader.read(file_with(tmp_path / "m.yaml", "link_elasticity", "link_zero", IN_TIME, link_zero=np.nan))
     told = str(caught.value)
     for part in ("force_x_N", "force_y_N", "force_z_N", "time_s", "effect link_zero: has a parameter"):
         assert part in told
     with pytest.raises(StateError, match="belongs to another machine"):
-        shelf(tripod).read(file_with(tmp_path / "other.yaml", "link_zero", name="hexapod", links=6))
+        tripod.loader.read(file_with(tmp_path / "other.yaml", "link_zero", name="hexapod", links=6))
     with pytest.raises(StateError, match="cannot be read"):
-        shelf(tripod).read(tmp_path / "none.yaml")
+        tripod.loader.read(tmp_path / "none.yaml")
 
 
 @pytest.mark.parametrize(
@@ -146,11 +143,11 @@ def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tri
 )
 def test_a_damaged_model_file_is_refused_in_words(tripod, tmp_path, old, new, told):
     file = file_with(tmp_path / "m.yaml", "link_sag")
-    assert shelf(tripod).read(file).summary["effects"] == ["link_sag"]
+    assert tripod.loader.read(file).summary["effects"] == ["link_sag"]
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(StateError, match=told):
-        shelf(tripod).read(file)
+        tripod.loader.read(file)
 
 
 def test_an_effect_of_faulty_code_is_refused_before_the_loop_meets_it(tripod, tmp_path):
@@ -163,17 +160,17 @@ def test_an_effect_of_faulty_code_is_refused_before_the_loop_meets_it(tripod, tm
     )
     code.chmod(0o644)
     with pytest.raises(StateError, match="an effect fails: ValueError"):
-        shelf(tripod).read(file_with(tmp_path / "m.yaml", f"{code}:MINE"))
+        tripod.loader.read(file_with(tmp_path / "m.yaml", f"{code}:MINE"))
 
 
 def test_effects_at_the_reference_are_told_as_not_live(tripod, tmp_path):
-    model = shelf(tripod).read(file_with(tmp_path / "m.yaml", "reference_drift", "link_zero"))
+    model = tripod.loader.read(file_with(tmp_path / "m.yaml", "reference_drift", "link_zero"))
     assert model.summary["effects"] == ["link_zero"]
     assert model.summary["not_live"] == ["reference_drift"]
 
 
 def thermal(live: Machine, tmp_path: Path, effect="link_expansion") -> Models:
-    return Models(shelf(live).read(file_with(tmp_path / "thermal.yaml", effect, **{effect: 10.0})))
+    return Models(live.loader.read(file_with(tmp_path / "thermal.yaml", effect, **{effect: 10.0})))
 
 
 def warm(live: Machine, degC: float) -> None:
@@ -194,16 +191,16 @@ def test_a_thermometer_that_an_effect_uses_belongs_to_the_set(tmp_path):
     live.faults["cabinet.link_2"] = Quality.SENSOR_FAULT
     assert live.step().state is State.OK, "nothing uses it yet"
     live.faults.clear()
-    live.orders.models = thermal(live, tmp_path)
+    live.commands.models = thermal(live, tmp_path)
     good = live.settle()
-    assert np.abs(good.numbers.sources_mm["link_expansion"]).min() > 0.01
+    assert np.abs(good.values.sources_mm["link_expansion"]).min() > 0.01
     live.faults["cabinet.room"] = Quality.SENSOR_FAULT
     assert live.step().state is State.OK, "no effect uses the room's"
     live.faults["cabinet.link_2"] = Quality.SENSOR_FAULT
     held = live.step()
     assert held.state is State.HOLD
     assert "temperature_link_2_degC (cabinet.link_2): sensor_fault" in held.reason
-    assert held.numbers.correction_mm == pytest.approx(good.numbers.correction_mm)
+    assert held.values.correction_mm == pytest.approx(good.values.correction_mm)
     live.now_s += HOLD_S
     assert live.step().state is State.STOP
 
@@ -211,14 +208,14 @@ def test_a_thermometer_that_an_effect_uses_belongs_to_the_set(tmp_path):
 def test_fading_takes_the_effects_back_too(tmp_path):
     live = machine(on_stale="fade")
     warm(live, WARM_degC)
-    live.orders.models = thermal(live, tmp_path)
+    live.commands.models = thermal(live, tmp_path)
     good = live.settle()
     live.faults["cabinet.link_1"] = Quality.TIMEOUT
     live.step()
     for _ in range(round(0.5 * HOLD_S / PERIOD_S)):
         half = live.step()
     assert half.state is State.FADE
-    assert half.numbers.correction_mm == pytest.approx(0.5 * good.numbers.correction_mm, rel=0.02)
+    assert half.values.correction_mm == pytest.approx(0.5 * good.values.correction_mm, rel=0.02)
 
 
 def test_a_model_that_needs_more_than_the_last_good_set_has_waits_for_a_new_one(tmp_path):
@@ -226,7 +223,7 @@ def test_a_model_that_needs_more_than_the_last_good_set_has_waits_for_a_new_one(
     live.settle()
     live.faults["joints.1"] = Quality.TIMEOUT
     assert live.step().state is State.HOLD
-    live.orders.models = thermal(live, tmp_path)
+    live.commands.models = thermal(live, tmp_path)
     waiting = live.step()
     assert (waiting.state, waiting.valid) == (State.STARTING, False)
     live.faults.clear()
@@ -236,41 +233,41 @@ def test_a_model_that_needs_more_than_the_last_good_set_has_waits_for_a_new_one(
 def test_a_shadow_changes_nothing_and_tells_what_it_would_do(tmp_path):
     alone, beside = machine(), machine()
     warm(beside, WARM_degC)
-    models = Models(shelf(beside).bare, thermal(beside, tmp_path).applied)
-    beside.orders.models = models
+    models = Models(beside.loader.without_effects, thermal(beside, tmp_path).applied)
+    beside.commands.models = models
     for tick in range(20):
         for live in (alone, beside):
             live.change_mm["joints.4"] = 0.001 * (tick % 5)
         plain, both = alone.step(), beside.step()
-        assert both.numbers._replace(shadow=None).correction_mm.tobytes() == plain.numbers.correction_mm.tobytes()
-        assert both.numbers.tip_M_mm.tobytes() == plain.numbers.tip_M_mm.tobytes()
-        assert (both.state, both.model, list(both.numbers.sources_mm)) == (plain.state, "", ["joints", "frame"])
-    told = both.numbers.shadow
+        assert both.values._replace(shadow=None).correction_mm.tobytes() == plain.values.correction_mm.tobytes()
+        assert both.values.tip_M_mm.tobytes() == plain.values.tip_M_mm.tobytes()
+        assert (both.state, both.model, list(both.values.sources_mm)) == (plain.state, "", ["joints", "frame"])
+    told = both.values.shadow
     assert told.model == models.shadow.hash
-    difference_mm = told.correction_mm - sum(both.numbers.sources_mm.values())
-    expected_mm = -10e-6 * (WARM_degC - 20.0) * both.numbers.link_length_mm
+    difference_mm = told.correction_mm - sum(both.values.sources_mm.values())
+    expected_mm = -10e-6 * (WARM_degC - 20.0) * both.values.link_length_mm
     assert difference_mm == pytest.approx(expected_mm, rel=1e-3)
     beside.faults["cabinet.link_1"] = Quality.TIMEOUT
     lost = beside.step()
     assert lost.state is State.OK, "the applied model does not need it"
-    assert "temperature_link_1_degC" in lost.numbers.shadow.reason
-    assert lost.numbers.shadow.correction_mm is None
+    assert "temperature_link_1_degC" in lost.values.shadow.reason
+    assert lost.values.shadow.correction_mm is None
     assert b'"shadow":{"model":' in lost.to_json()
 
 
 def test_what_a_shadow_has_learnt_of_the_past_is_kept_when_it_is_adopted(tmp_path):
     live = machine()
     model = thermal(live, tmp_path, "link_expansion_lag").applied
-    live.orders.models = Models(shelf(live).bare, model)
+    live.commands.models = Models(live.loader.without_effects, model)
     live.settle()
     warm(live, WARM_degC)
     live.now_s += 30.0  # half the time constant of 60 s after the step
-    before = live.step().numbers.shadow
-    share = (before.correction_mm / (-10e-6 * 3.0 * live.settle().numbers.link_length_mm)).mean()
+    before = live.step().values.shadow
+    share = (before.correction_mm / (-10e-6 * 3.0 * live.settle().values.link_length_mm)).mean()
     assert 0.1 < share < 0.5, "the rods lag behind"
-    live.orders.models = Models(model)
+    live.commands.models = Models(model)
     after = live.settle()
-    assert after.numbers.sources_mm["link_expansion_lag"] == pytest.approx(before.correction_mm, rel=0.1)
+    assert after.values.sources_mm["link_expansion_lag"] == pytest.approx(before.correction_mm, rel=0.1)
 
 
 def with_noise(live: Machine, um: float) -> Machine:
@@ -280,7 +277,7 @@ def with_noise(live: Machine, um: float) -> Machine:
 
 
 def test_without_declared_noise_the_uncertainty_is_absent(tripod):
-    assert tripod.step().numbers.u_tip_um is None
+    assert tripod.step().values.u_tip_um is None
     assert b"u_tip_um" not in tripod.step().to_json()
 
 
@@ -294,11 +291,11 @@ def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp
     live = with_noise(machine(name), 0.2)
     machine_name = live.configuration.machine
     live.change_mm |= {channel: 0.003 * (k % 3) for k, channel in enumerate(live.wires.length_channels)}
-    gauges_alone = live.settle().numbers.u_tip_um
+    gauges_alone = live.settle().values.u_tip_um
     file = file_with(tmp_path / "m.yaml", "link_zero", "tool_offset", name=machine_name, links=links)
-    model = shelf(live).read(file)
-    live.orders.models = Models(model)
-    found = live.settle().numbers.u_tip_um
+    model = live.loader.read(file)
+    live.commands.models = Models(model)
+    found = live.settle().values.u_tip_um
 
     def tip_um(at, step):
         values = {"scale_mm": np.zeros(links), "joint_mm": np.zeros(live.wires.joints), "frame_mm": np.zeros(9)}
@@ -329,40 +326,43 @@ def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp
 
 def test_what_is_not_known_makes_the_tip_uncertain_without_a_number(tmp_path):
     live = with_noise(machine(), 0.2)
-    live.orders.models = thermal(live, tmp_path)
-    assert np.isnan(live.settle().numbers.u_tip_um).all(), "no noise is declared for the thermometers"
+    live.commands.models = thermal(live, tmp_path)
+    assert np.isnan(live.settle().values.u_tip_um).all(), "no noise is declared for the thermometers"
     assert b"u_tip_um" not in live.step().to_json()
     loaded = live.configuration
     quantities = tuple(q.model_copy(update={"noise": 0.02}) for q in loaded.wiring.quantities)
     told = Machine(replace(loaded, wiring=loaded.wiring.model_copy(update={"quantities": quantities})))
-    told.orders.models = thermal(told, tmp_path)
-    assert np.isfinite(told.settle().numbers.u_tip_um).all()
-    unsure = told.orders.models.applied
+    told.commands.models = thermal(told, tmp_path)
+    assert np.isfinite(told.settle().values.u_tip_um).all()
+    unsure = told.commands.models.applied
     unknown = replace(unsure.machine, covariance=np.full((1, 1), np.nan))
-    told.orders.models = Models(replace(unsure, machine=unknown))
-    assert np.isnan(told.settle().numbers.u_tip_um).all()
+    told.commands.models = Models(replace(unsure, machine=unknown))
+    assert np.isnan(told.settle().values.u_tip_um).all()
 
 
 def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
     live, again = (with_noise(machine(on_stale="fade"), 0.1) for _ in range(2))
-    one = shelf(live).read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
-    two = shelf(live).read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
+    one = live.loader.read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
+    two = live.loader.read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
     transcript = ReadingsMessage(live.wires, live.latest.channels, Directions(live.wires.scale.wires))
-    orders = {0: None, 20: Models(one), 60: Models(one, two), 120: Models(two), 170: Models(shelf(live).bare)}
+    commands = {
+        0: None,
+        20: Models(one),
+        60: Models(one, two),
+        120: Models(two),
+        170: Models(live.loader.without_effects),
+    }
     states = set()
     for tick in range(200):
-        live.orders.models = orders.get(tick, live.orders.models)
-        live.orders.target = Target((0.0, 0.01 * tick, -510.0)) if 90 < tick < 140 else None
+        live.commands.models = commands.get(tick, live.commands.models)
+        live.commands.target = Target((0.0, 0.01 * tick, -510.0)) if 90 < tick < 140 else None
         live.faults = {"joints.2": Quality.TIMEOUT} if 140 < tick < 150 else {}
         live.change_mm["scale_1.position"] = 0.01 * min(tick % 40, 40 - tick % 40)
         sent = live.step()
         states.add(sent.state)
         read = parse_readings(json.loads(transcript.line(sent)), live.latest.channels)
-        models = sent.inputs.models
-        again.cycle.resume(read.inputs.carried, models)
-        replayed = again.cycle.run(
-            read.tick, read.inputs.snapshot, Commands(read.inputs.zero, read.inputs.target, models)
-        )
+        models = sent.inputs.models or again.settings.without_effects
+        replayed, _ = step(read.state._replace(models=models), read.inputs._replace(models=models), again.settings)
         assert replayed.to_json() == sent.to_json(), tick
     assert {State.OK, State.SLEWING, State.FADE} <= states
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.configuration.operation import LimitSettings
-from compd.live.loop.limits import limited
-from compd.live.loop.setpoint import State
+from compd.live.loop.limits import limit_correction
+from compd.live.loop.states import State
 
 LARGEST_MM = 0.2
 SLEW_MM_PER_S = 0.5
@@ -28,7 +28,7 @@ within = st.lists(st.floats(-LARGEST_MM, LARGEST_MM), min_size=3, max_size=3)
 
 @given(wanted=any_wanted, previous=within, limits=st.sampled_from([CLAMP, REFUSE]))
 def test_whatever_is_wanted_the_applied_correction_keeps_both_limits(wanted, previous, limits):
-    result = limited(np.array(wanted), np.array(previous), PERIOD_S, limits)
+    result = limit_correction(np.array(wanted), np.array(previous), PERIOD_S, limits)
     assert np.all(np.abs(result.applied_mm) <= LARGEST_MM + ROUNDING_MM)
     assert np.all(np.abs(result.applied_mm - previous) <= STEP_MM + ROUNDING_MM)
     assert (result.state is State.OK) == (result.reason == "")
@@ -36,7 +36,7 @@ def test_whatever_is_wanted_the_applied_correction_keeps_both_limits(wanted, pre
 
 @given(wanted=any_wanted, previous=within, limits=st.sampled_from([CLAMP, REFUSE]))
 def test_ok_means_untouched_and_anything_else_is_named(wanted, previous, limits):
-    result = limited(np.array(wanted), np.array(previous), PERIOD_S, limits)
+    result = limit_correction(np.array(wanted), np.array(previous), PERIOD_S, limits)
     if result.state is State.OK:
         assert result.applied_mm.tolist() == wanted
     else:
@@ -47,7 +47,7 @@ def test_ok_means_untouched_and_anything_else_is_named(wanted, previous, limits)
 def test_a_constant_wish_is_reached_and_never_overshot(wanted):
     applied = np.zeros(3)
     for _ in range(math.ceil(LARGEST_MM / STEP_MM) + 1):
-        result = limited(np.array(wanted), applied, PERIOD_S, CLAMP)
+        result = limit_correction(np.array(wanted), applied, PERIOD_S, CLAMP)
         assert np.all(np.abs(result.applied_mm) <= np.abs(wanted) + ROUNDING_MM)
         applied = result.applied_mm
     assert applied == pytest.approx(np.array(wanted), abs=ROUNDING_MM)
@@ -55,7 +55,7 @@ def test_a_constant_wish_is_reached_and_never_overshot(wanted):
 
 
 def test_the_first_correction_starts_from_zero():
-    result = limited(np.array([0.05, 0.0, -0.05]), np.zeros(3), PERIOD_S, CLAMP)
+    result = limit_correction(np.array([0.05, 0.0, -0.05]), np.zeros(3), PERIOD_S, CLAMP)
     assert result.state is State.SLEWING
     assert result.applied_mm == pytest.approx([STEP_MM, 0.0, -STEP_MM])
     assert result.reason == "link 1: correction 0.0500 mm wanted, 0.0025 mm reached at 0.5 mm/s"
@@ -63,7 +63,7 @@ def test_the_first_correction_starts_from_zero():
 
 def test_a_clamped_correction_says_link_wanted_and_allowed():
     previous = np.array([0.0, LARGEST_MM, 0.0])
-    result = limited(np.array([0.0, 0.312, 0.0]), previous, PERIOD_S, CLAMP)
+    result = limit_correction(np.array([0.0, 0.312, 0.0]), previous, PERIOD_S, CLAMP)
     assert result.state is State.CLAMPED
     assert result.applied_mm.tolist() == previous.tolist()
     assert result.reason == "link 2: correction 0.312 mm beyond 0.200 mm, clamped"
@@ -71,7 +71,7 @@ def test_a_clamped_correction_says_link_wanted_and_allowed():
 
 def test_a_refused_correction_keeps_the_previous_one_and_says_why():
     previous = np.array([0.01, 0.02, 0.03])
-    result = limited(np.array([0.01, 0.02, -0.5]), previous, PERIOD_S, REFUSE)
+    result = limit_correction(np.array([0.01, 0.02, -0.5]), previous, PERIOD_S, REFUSE)
     assert result.state is State.REFUSED
     assert result.applied_mm is previous
     assert result.reason == "link 3: correction -0.500 mm beyond -0.200 mm, refused"
@@ -81,7 +81,7 @@ def test_a_refused_correction_keeps_the_previous_one_and_says_why():
 @pytest.mark.parametrize("limits", [CLAMP, REFUSE])
 def test_what_is_not_finite_is_refused_even_where_clamping_is_wanted(bad, limits):
     previous = np.array([0.01, 0.02, 0.03])
-    result = limited(np.array([0.01, bad, 0.03]), previous, PERIOD_S, limits)
+    result = limit_correction(np.array([0.01, bad, 0.03]), previous, PERIOD_S, limits)
     assert result.state is State.REFUSED
     assert result.applied_mm is previous
     assert "link 2" in result.reason

@@ -7,6 +7,7 @@ import math
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -14,15 +15,16 @@ from compd.configuration.operation import LoopSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
-from compd.live.loop.setpoint import Mode, Setpoint, State
+from compd.live.loop.states import State
 from compd.live.loop.timing import Histogram, LoopTiming
 from compd.live.realtime import sleep_until
 from compd.live.systemd import Notifier
-from compd.readings import Latest
+from tests.support.live_machine import machine
 
 PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==
-SETTINGS = LoopSettings(rate_hz=128, stale_after_s=0.5, on_stale="hold", hold_s=1, lock_memory=False)
+LOOP = LoopSettings(rate_hz=128, stale_after_s=0.5, on_stale="hold", hold_s=1, lock_memory=False)
 NO_ZERO = Commands(StateError(Problem(where="zero", what="none")))
+TRIPOD = machine()
 
 
 class TurnedByHand:
@@ -45,46 +47,48 @@ class TurnedByHand:
         self.now_s = max(self.now_s, time_s)
 
 
-def turn(costs_s, late_s=0.0):
-    """Run one loop for as many cycles as there are costs; the loop and the setpoints' ticks."""
+def loop_with(sink, clock, sleep_until=sleep_until):
+    """A loop whose machine has no zero, so that its cycles cost next to nothing."""
+    cycle = replace(TRIPOD.settings, loop=LOOP)
+    return Loop(cycle, TRIPOD.latest, NO_ZERO, [sink], Notifier(""), clock, sleep_until)
+
+
+def run_cycles(costs_s, late_s=0.0):
+    """Run one loop for as many cycles as there are costs; the loop, the setpoints' ticks and the clock."""
     clock = TurnedByHand(costs_s)
     ticks = []
 
-    class Cycle:
-        def run(self, tick, snapshot, orders):
-            assert orders is NO_ZERO
-            clock.now_s = snapshot.time_s + next(clock.costs_s)
-            return Setpoint(tick, snapshot.time_s, 0.0, math.nan, State.NO_ZERO, "none", Mode.CMM, None)
-
-    def outlet(setpoint):
+    def sink(setpoint):
+        assert setpoint.state is State.NO_ZERO
         ticks.append(setpoint.seq)
+        clock.now_s = setpoint.time_s + next(clock.costs_s)
         if len(ticks) == len(costs_s):
             loop._stop.set()
 
-    def sleep_until(time_s):
+    def sleep_until_late(time_s):
         clock.sleep_until(time_s + late_s)
 
-    loop = Loop(SETTINGS, Cycle(), Latest([]), NO_ZERO, [outlet], Notifier(""), clock, sleep_until)
-    loop.turn()
+    loop = loop_with(sink, clock, sleep_until_late)
+    loop.run()
     return loop, ticks, clock
 
 
 def test_wake_times_are_absolute_whatever_a_cycle_costs():
-    loop, ticks, clock = turn([0.001, 0.005, 0.0, 0.007])
+    loop, ticks, clock = run_cycles([0.001, 0.005, 0.0, 0.007])
     assert clock.woken_s == [10.0 + k * PERIOD_S for k in (1, 2, 3, 4)]
     assert ticks == [1, 2, 3, 4]
     assert loop.timing.missed == 0
 
 
 def test_a_cycle_that_takes_too_long_costs_whole_cycles_and_they_are_counted():
-    loop, ticks, clock = turn([0.001, 2.5 * PERIOD_S, 0.001])
+    loop, ticks, clock = run_cycles([0.001, 2.5 * PERIOD_S, 0.001])
     assert ticks == [1, 2, 5], "ticks 3 and 4 have passed"
     assert clock.woken_s == [10.0 + k * PERIOD_S for k in (1, 2, 5)], "and the grid stays where it was"
     assert (loop.timing.cycles, loop.timing.missed) == (3, 2)
 
 
 def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
-    loop, ticks, clock = turn([0.0] * 4, late_s=0.001)
+    loop, ticks, clock = run_cycles([0.0] * 4, late_s=0.001)
     assert ticks == [1, 2, 3, 4]
     assert clock.woken_s == [10.001 + k * PERIOD_S for k in (1, 2, 3, 4)]
     summary = loop.timing.summary()
@@ -96,11 +100,7 @@ def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
 def test_a_stop_ends_a_real_loop_and_its_thread_says_what_was_permitted():
     seen = threading.Event()
 
-    class Cycle:
-        def run(self, tick, snapshot, orders):
-            return Setpoint(tick, snapshot.time_s, 0.0, math.nan, State.NO_ZERO, "none", Mode.CMM, None)
-
-    loop = Loop(SETTINGS, Cycle(), Latest([]), NO_ZERO, [lambda setpoint: seen.set()], Notifier(""), RealClock())
+    loop = loop_with(lambda setpoint: seen.set(), RealClock())
     loop.start()
     assert seen.wait(10)
     assert loop.alive
@@ -141,7 +141,7 @@ def test_period_statistics_are_those_of_the_periods():
     timing = LoopTiming(0.01)
     starts = [0.0, 0.010, 0.021, 0.030, 0.0405]
     for start in starts:
-        timing.started(start, start)
+        timing.note_start(start, start)
     periods_ms = [(b - a) * 1e3 for a, b in itertools.pairwise(starts)]
     mean = sum(periods_ms) / len(periods_ms)
     deviation = math.sqrt(sum((p - mean) ** 2 for p in periods_ms) / (len(periods_ms) - 1))

@@ -100,13 +100,13 @@ class Taking:
         gauges = configuration.gauge_objects()
         self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
         self.wires = MachineWires(configuration, self.latest)
-        self.orders = Commands(StateError(Problem(where="zero", what="none")))
+        self.commands = Commands(StateError(Problem(where="zero", what="none")))
         self.now_s = 50.0
         self.reads = 0
         self.value_mm = lambda channel, read: 3.0 + 0.001 * (-1) ** read
         self.quality = lambda channel, read: Quality.OK
         self.answers = []
-        self.taker = ZeroCapture(self.wires, self.latest, self.orders, directory, configuration.zero_hash, self)
+        self.taker = ZeroCapture(self.wires, self.latest, self.commands, directory, configuration.zero_hash, self)
         self._read()
 
     def monotonic(self):
@@ -135,10 +135,10 @@ def test_zero_is_the_mean_of_every_gauge_saved_and_then_adopted(tmp_path):
     answer = taking.take()
     assert answer["class"] == "ZERO"
     assert taking.reads > 10
-    assert isinstance(taking.orders.zero, MachineZero)
-    assert set(taking.orders.zero.readings_mm) == set(taking.wires.length_channels)
-    assert taking.orders.zero.readings_mm["joints.4"] == pytest.approx(3.0, abs=1e-4)
-    assert load_zero(tmp_path, taking.orders.zero.zero_hash, taking.wires.length_channels) == taking.orders.zero
+    assert isinstance(taking.commands.zero, MachineZero)
+    assert set(taking.commands.zero.readings_mm) == set(taking.wires.length_channels)
+    assert taking.commands.zero.readings_mm["joints.4"] == pytest.approx(3.0, abs=1e-4)
+    assert load_zero(tmp_path, taking.commands.zero.zero_hash, taking.wires.length_channels) == taking.commands.zero
 
 
 def test_a_reading_seen_twice_counts_once(tmp_path):
@@ -153,13 +153,13 @@ def test_a_reading_seen_twice_counts_once(tmp_path):
 @pytest.mark.parametrize("channel", ["scale_2.position", "joints.9", "cabinet.t1"])
 def test_a_zero_with_a_gauge_that_is_not_good_is_refused_and_nothing_changes(tmp_path, channel, quality):
     taking = Taking(tmp_path)
-    before = taking.orders.zero
+    before = taking.commands.zero
     taking.quality = lambda name, read: quality if name == channel and read == 20 else Quality.OK
     answer = taking.take()
     assert (answer["class"], answer["code"]) == ("ERROR", "zero_refused")
     assert channel in answer["text"]
     assert quality in answer["text"]
-    assert taking.orders.zero is before
+    assert taking.commands.zero is before
     assert not (tmp_path / FILE_NAME).exists()
 
 
@@ -175,8 +175,8 @@ def test_a_disk_that_refuses_is_told_and_the_old_zero_stays(tmp_path):
     directory = tmp_path / "state"
     directory.write_text("a file where the directory should be")
     taking = Taking(directory)
-    before = taking.orders.zero
+    before = taking.commands.zero
     answer = taking.take()
     assert answer["code"] == "zero_refused"
     assert "cannot be written" in answer["text"]
-    assert taking.orders.zero is before
+    assert taking.commands.zero is before

@@ -39,7 +39,7 @@ def test_setpoints_and_readings_of_an_eventful_run(name, tmp_path):
     states, reading_keys = set(), set()
     for cycle, (line, _, setpoint) in enumerate(run.eventful(400)):
         if cycle == 300:
-            live.orders.models = Models(loader.read(shadow), loader.read(shadow))
+            live.commands.models = Models(loader.read(shadow), loader.read(shadow))
         checked(setpoint.to_json())
         message = checked(line)
         checked(json.dumps(message["setpoint"]).encode())

@@ -14,7 +14,8 @@ from compd.clock import MonotonicClock
 from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError, Problem, StateError
 from compd.live.loop.commands import Commands
-from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues, State
+from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues
+from compd.live.loop.states import State
 from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.publisher import Publisher
 from compd.live.service.requests import REQUESTS, Asker, Requests, TargetKeys
@@ -69,7 +70,7 @@ class Bench:
     def __init__(self, directory, target_keys):
         self.path = directory / "s" / "compd.sock"
         sockets = SocketSettings(tcp={"port": 0}, unix={"path": str(self.path)}, valid_for_s=0.1)
-        self.orders = Commands(NO_ZERO)
+        self.commands = Commands(NO_ZERO)
         self.observed = []
         self.zeros = []
         self.models = []
@@ -77,7 +78,7 @@ class Bench:
         requests = Requests(
             VERSION,
             target_keys,
-            self.orders,
+            self.commands,
             lambda: {"class": "STATUS"},
             self.zeros.append,
             switch_model=lambda *arguments: self.models.append(arguments),
@@ -188,7 +189,7 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(bench, message, code):
     assert peer.ask({"class": "VERSION"}) == VERSION, "the connection stays"
     bench.publisher.deliver(setpoint(1, MonotonicClock().monotonic()))
     assert other.read()["seq"] == 1
-    assert bench.orders.target is None
+    assert bench.commands.target is None
 
 
 @pytest.mark.parametrize(
@@ -255,27 +256,27 @@ def test_the_first_client_with_a_target_is_the_controller_until_it_releases(benc
     target = {"class": "TARGET", "tip_B0_mm": [1, 2.5, -510]}
     first.say(target)
     assert first.ask({"class": "STATUS"})["class"] == "STATUS"
-    assert bench.orders.target is not None
-    assert bench.orders.target.tip_mm == (1.0, 2.5, -510.0)
+    assert bench.commands.target is not None
+    assert bench.commands.target.tip_mm == (1.0, 2.5, -510.0)
     assert second.ask(target)["code"] == "role_taken"
     assert second.ask({"class": "RELEASE"})["code"] == "not_controller"
     assert first.ask({"class": "RELEASE"}) == {"class": "RELEASE"}
-    assert bench.orders.target is None
+    assert bench.commands.target is None
     second.say(target)
     second.ask({"class": "STATUS"})
-    assert bench.orders.target is not None
+    assert bench.commands.target is not None
 
 
 def test_a_controller_that_goes_leaves_cmm_mode_behind(bench):
     first, second = bench.tcp(), bench.tcp()
     first.say({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})
     first.ask({"class": "STATUS"})
-    assert bench.orders.target is not None
+    assert bench.commands.target is not None
     first.close()
     # the publisher sees the end of that stream no later than it answers the newcomer after it
     second.ask({"class": "STATUS"})
     bench.tcp().ask({"class": "STATUS"})
-    assert bench.orders.target is None
+    assert bench.commands.target is None
 
 
 def test_a_hexapod_and_a_tool_on_the_plate_take_their_own_targets(tmp_path):
@@ -283,14 +284,14 @@ def test_a_hexapod_and_a_tool_on_the_plate_take_their_own_targets(tmp_path):
         peer = hexapod.unix()
         peer.say({"class": "TARGET", "tip_B0_mm": [1, 2, 3], "rotation_B0_rad": [0, 0.1, 0]})
         peer.ask({"class": "STATUS"})
-        assert hexapod.orders.target is not None
-        assert hexapod.orders.target.rotation_B0_rad == (0.0, 0.1, 0.0)
+        assert hexapod.commands.target is not None
+        assert hexapod.commands.target.rotation_B0_rad == (0.0, 0.1, 0.0)
     with closing(Bench(tmp_path / "p", TargetKeys("tip_P_mm", rotation=False))) as plate:
         peer = plate.unix()
         assert peer.ask({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})["code"] == "bad_message"
         peer.say({"class": "TARGET", "tip_P_mm": [1, 2, 3]})
         peer.ask({"class": "STATUS"})
-        assert plate.orders.target is not None
+        assert plate.commands.target is not None
 
 
 def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(bench):

@@ -82,7 +82,7 @@ def test_it_is_the_raw_reading_not_the_corrected_one(tmp_path):
     run.machine.change_mm["joints.4"] = 0.05
     run.machine.settle()
     setpoint = run.machine.step()
-    assert setpoint.numbers.correction_mm[1] == pytest.approx(0.05, abs=1e-6)
+    assert setpoint.values.correction_mm[1] == pytest.approx(0.05, abs=1e-6)
     with run.recorder(tmp_path / "run") as recorder:
         recorder.put(*run.recorded(setpoint)[:2])
     (row,) = rows_of(tmp_path / "run-0001.csv")
@@ -198,7 +198,7 @@ def test_nothing_is_overwritten(tmp_path):
 
 def test_without_machine_zero_nothing_is_recorded_and_it_says_what_to_do(tmp_path):
     run = Run(machine())
-    run.machine.orders.zero = StateError(Problem(where="here", what="machine zero has never been taken"))
+    run.machine.commands.zero = StateError(Problem(where="here", what="machine zero has never been taken"))
     with pytest.raises(StateError, match="compd zero"):
         recorded(run, tmp_path / "run", 3)
     assert list(tmp_path.iterdir()) == []

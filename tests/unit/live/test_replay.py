@@ -11,9 +11,9 @@ import pytest
 
 from compd.cli.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
-from compd.live.loop.commands import Commands
-from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.loop.setpoint import State
+from compd.live.loop.cycle import step
+from compd.live.loop.model_loader import Models
+from compd.live.loop.states import State
 from compd.live.record.replay import RecordedCycles
 from compd.live.record.replay import replay as replay_cycles
 from compd.live.service.readings_message import parse_readings
@@ -61,19 +61,26 @@ def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):
     assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
 
 
+def again_with(recorded, setpoint, settings):
+    """The setpoint of a recorded cycle, computed again with the models of the first time."""
+    models = setpoint.inputs.models or settings.without_effects
+    again, _ = step(recorded.state._replace(models=models), recorded.inputs._replace(models=models), settings)
+    return again
+
+
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_no_bit_of_what_went_in_is_lost_on_the_way(name):
     """Stronger than setpoints, which are rounded and forgive a warm start that is not quite the same."""
-    run, other = Run(machine(name), seed=3), machine(name)
+    run, settings = Run(machine(name), seed=3), machine(name).settings
     for _, message, setpoint in run.eventful(300):
         recorded = parse_readings(message, run.machine.latest.channels)
         sent, read = setpoint.inputs, recorded.inputs
         assert repr(read.snapshot) == repr(sent.snapshot), "repr: a nan is not equal to itself"
         assert (read.zero, read.target) == (sent.zero, sent.target)
-        assert (read.carried.zero is read.zero) == (sent.carried.zero is sent.zero)
-        assert to_plain(read.carried._replace(zero=None)) == to_plain(sent.carried._replace(zero=None))
-        other.cycle.resume(read.carried, sent.models)
-        again = other.cycle.run(recorded.tick, read.snapshot, Commands(read.zero, read.target, sent.models))
+        before = setpoint.state_before
+        assert (recorded.state.zero is read.zero) == (before.zero is sent.zero)
+        assert to_plain(recorded.state._replace(zero=None)) == to_plain(before._replace(zero=None))
+        again = again_with(recorded, setpoint, settings)
         assert again.to_packet(bytes(8)) == setpoint.to_packet(bytes(8)), "float64 that are not rounded"
 
 
@@ -96,9 +103,21 @@ def test_what_effects_remember_goes_to_json_and_back():
         from_plain({"strange": 1})
 
 
+def test_the_names_in_a_recording_stay_whatever_the_classes_are_called():
+    run = Run(machine())
+    _, message, _ = list(run.quiet(2))[-1]
+    carried = message["carried"]
+    names = {"kind", "zero", "warm", "correction_mm", "last_good", "scales_seen", "shadow", "adopting", "u_tip_um"}
+    assert set(carried) == names
+    kinds = {name: carried[name]["kind"] for name in ("warm", "last_good", "shadow")}
+    assert kinds == {"warm": "WarmStart", "last_good": "Comparators", "shadow": "Remembered"}
+    assert carried["kind"] == "Carried"
+    assert set(carried["last_good"]) == {"kind", "change_mm", "time_s", "oldest_s", "quantities"}
+
+
 def test_a_cycle_without_zero_reads_back_as_it_was():
     run = Run(machine())
-    run.machine.orders.zero = StateError(
+    run.machine.commands.zero = StateError(
         Problem(where="here", what="machine zero has never been taken", next_step="take it")
     )
     _, message, setpoint = run.recorded(run.machine.step())
@@ -106,21 +125,20 @@ def test_a_cycle_without_zero_reads_back_as_it_was():
     recorded = parse_readings(message, run.machine.latest.channels)
     assert recorded.setpoint_line == setpoint.to_json()
     assert recorded.inputs.snapshot == setpoint.inputs.snapshot
-    again = run.machine.cycle.run(recorded.tick, recorded.inputs.snapshot, Commands(recorded.inputs.zero))
+    again = again_with(recorded, setpoint, run.machine.settings)
     assert again.to_json() == setpoint.to_json()
 
 
 def with_models(tmp_path):
     """A run in which a model with memory is adopted and another shadows it; its cycles' messages and setpoints."""
     run = Run(machine())
-    configuration = run.machine.configuration
-    shelf = ModelLoader(run.machine.model, configuration.machine, configuration.geometry_hash, run.machine.wires)
+    loader = run.machine.loader
     lag = file_with(tmp_path / "lag.yaml", "link_expansion_lag", "friction_hysteresis")
     backlash = file_with(tmp_path / "backlash.yaml", "backlash")
-    adopted = [None, Models(shelf.read(lag)), Models(shelf.read(lag), shelf.read(backlash))]
+    adopted = [None, Models(loader.read(lag)), Models(loader.read(lag), loader.read(backlash))]
     cycles = []
     for models in adopted:
-        run.machine.orders.models = models
+        run.machine.commands.models = models
         cycles += run.eventful(60)
     return run, cycles, (lag, backlash)
 
@@ -171,8 +189,8 @@ def change_reading(message):
 
 
 def change_carried(message):
-    carried = from_plain(message["carried"])
-    message["carried"] = to_plain(carried._replace(correction_mm=carried.correction_mm + 1.0))
+    state = from_plain(message["carried"])
+    message["carried"] = to_plain(state._replace(correction_mm=state.correction_mm + 1.0))
 
 
 def change_setpoint(message):

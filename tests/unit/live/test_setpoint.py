@@ -10,7 +10,8 @@ import zlib
 import numpy as np
 import pytest
 
-from compd.live.loop.setpoint import PACKET_SIZE, Mode, Setpoint, SetpointValues, State
+from compd.live.loop.setpoint import PACKET_SIZE, Mode, Setpoint, SetpointValues
+from compd.live.loop.states import State
 
 HASH = bytes.fromhex("0123456789abcdef")
 
@@ -108,9 +109,9 @@ def test_packet_by_the_offsets_of_its_documentation(links, mode, mode_code):
     assert at(72, "3d") == (0.001, 0.002, 0.003)
     assert at(96, "3d") == (1e-6, 2e-6, -3e-6)
     for offset, wanted in (
-        (120, sent.numbers.link_length_mm),
-        (168, sent.numbers.scale_setpoint_mm),
-        (216, sent.numbers.correction_mm),
+        (120, sent.values.link_length_mm),
+        (168, sent.values.scale_setpoint_mm),
+        (216, sent.values.correction_mm),
     ):
         found = at(offset, "6d")
         assert found[:links] == tuple(wanted)
@@ -132,10 +133,3 @@ def test_packet_with_the_tool_on_the_plate_carries_the_touched_place_and_says_so
     packet = setpoint(numbers(tip_P_mm=np.array([5.0, 6.0, 7.0]))).to_packet(HASH)
     assert struct.unpack_from("<H", packet, 40) == (3,)
     assert struct.unpack_from("<3d", packet, 48) == (5.0, 6.0, 7.0)
-
-
-def test_state_codes_are_part_of_the_protocol_and_do_not_move():
-    names = ["starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused"]
-    for code, name in enumerate(names):
-        assert setpoint(None, State(name)).to_packet(HASH)[42] == code
-    assert len(State) == len(names)

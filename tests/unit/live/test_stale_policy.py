@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.configuration.operation import LoopSettings
-from compd.live.loop.setpoint import State
-from compd.live.loop.stale_policy import ComparatorSet, usable
+from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
+from compd.live.loop.states import State
 
 HOLD_S = 4.0
 LOST = "joint 4 (joints.4): timeout"
@@ -23,32 +23,32 @@ def settings(on_stale: str) -> LoopSettings:
 @pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
 def test_a_live_set_is_used_as_it_is(on_stale):
     live = LAST._replace(time_s=101.0)
-    found = usable(live, LAST, "", 101.0, settings(on_stale))
+    found = usable_comparators(live, LAST, "", 101.0, settings(on_stale))
     assert found.comparators is live
     assert (found.state, found.reason, found.expires_s) == (State.OK, "", math.inf)
 
 
 @pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
 def test_before_the_first_whole_set_there_is_nothing_to_hold(on_stale):
-    found = usable(None, None, LOST, 100.0, settings(on_stale))
+    found = usable_comparators(None, None, LOST, 100.0, settings(on_stale))
     assert found.comparators is None
     assert found.state is State.STARTING
     assert LOST in found.reason
 
 
 def test_stop_is_at_once():
-    found = usable(None, LAST, LOST, 100.005, settings("stop"))
+    found = usable_comparators(None, LAST, LOST, 100.005, settings("stop"))
     assert found.comparators is None
     assert found.state is State.STOP
     assert LOST in found.reason
 
 
 def test_hold_keeps_the_set_whole_and_then_stops():
-    held = usable(None, LAST, LOST, 103.9, settings("hold"))
+    held = usable_comparators(None, LAST, LOST, 103.9, settings("hold"))
     assert held.comparators is LAST
     assert (held.state, held.expires_s) == (State.HOLD, 104.0)
     assert LOST in held.reason
-    ended = usable(None, LAST, LOST, 104.0, settings("hold"))
+    ended = usable_comparators(None, LAST, LOST, 104.0, settings("hold"))
     assert ended.comparators is None
     assert ended.state is State.STOP
     assert "ended after 4 s" in ended.reason
@@ -56,11 +56,11 @@ def test_hold_keeps_the_set_whole_and_then_stops():
 
 def test_fade_takes_the_set_back_in_a_straight_line_and_then_stops():
     for elapsed_s, weight in ((0.0, 1.0), (1.0, 0.75), (2.0, 0.5), (3.0, 0.25)):
-        faded = usable(None, LAST, LOST, 100.0 + elapsed_s, settings("fade"))
+        faded = usable_comparators(None, LAST, LOST, 100.0 + elapsed_s, settings("fade"))
         assert faded.state is State.FADE
         assert faded.comparators is not None
         assert faded.comparators.change_mm == pytest.approx(LAST.change_mm * weight)
         assert faded.comparators.oldest_s == LAST.oldest_s, "its age is that of the readings, not of the fading"
-    ended = usable(None, LAST, LOST, 104.0, settings("fade"))
+    ended = usable_comparators(None, LAST, LOST, 104.0, settings("fade"))
     assert ended.comparators is None
     assert ended.state is State.STOP

@@ -1,0 +1,78 @@
+"""Files on the disk: written whole or not at all, so that neither a crash nor a full disk leaves half a file."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+
+
+def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -> None:
+    """Write all of these files, or leave every one as it was.
+
+    Each file is written under a temporary name in its own directory, synced to the disk and then renamed over its
+    path, in the order of the mapping; at the end the directories are synced. A reader sees the old or the new file,
+    never a part. After a failed rename the files that were renamed before it get their previous content back.
+
+    Parameters
+    ----------
+    contents : path -> what the file is to hold; text is encoded as UTF-8, line ends are written as they are.
+    mode : permission bits of the files; None for those that the umask gives.
+
+    Raises
+    ------
+    OSError
+        Where the disk refuses; the directories must exist.
+
+    Examples
+    --------
+    >>> write_files({Path("run.yaml"): sidecar_text, Path("run.csv"): csv_text})
+    """
+    temporaries = {path: path.with_name(f".{path.name}.{secrets.token_hex(4)}") for path in contents}
+    previous: dict[Path, bytes | None] = {}
+    *earlier_paths, last_path = contents
+    try:
+        for path, temporary in temporaries.items():
+            write_new_file(temporary, contents[path])
+            if mode is not None:
+                temporary.chmod(mode)
+        for path in earlier_paths:
+            content = path.read_bytes() if path.exists() else None
+            temporaries[path].replace(path)
+            previous[path] = content
+        temporaries[last_path].replace(last_path)
+    except OSError:
+        _restore(previous)
+        raise
+    finally:
+        for temporary in temporaries.values():
+            temporary.unlink(missing_ok=True)
+    for directory in {path.parent for path in contents}:
+        sync_directory(directory)
+
+
+def write_new_file(path: Path, content: str | bytes) -> None:
+    """Write a file that must not exist yet, and sync it to the disk. Raises OSError (FileExistsError)."""
+    with path.open("xb") as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_directory(directory: Path) -> None:
+    """Sync a directory to the disk: a new or renamed file survives a power cut only after that. Raises OSError."""
+    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _restore(previous: Mapping[Path, bytes | None]) -> None:
+    """Give files their previous content back; None: there was no file."""
+    for path, content in previous.items():
+        if content is None:
+            path.unlink()
+        else:
+            path.write_bytes(content)

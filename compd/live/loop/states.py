@@ -1,0 +1,48 @@
+"""The states of a setpoint: one row for each, used by the packet, the JSON, `compd watch` and the reference.
+
+To add a state, append a row and return it where it arises (cycle.py, stale_policy.py or limits.py). Names and codes
+are part of the protocol: they never change and are never used again. A reader that meets a name or a code which it
+does not know must take the setpoint for invalid.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Self
+
+
+class State(StrEnum):
+    """How a setpoint came about.
+
+    code : number of the state in the UDP packet.
+    valid : whether a setpoint in this state has values that a controller may use.
+    rank : where several states apply to one cycle, the one of the highest rank is reported.
+    text : meaning, for people.
+    """
+
+    code: int
+    valid: bool
+    rank: int
+    text: str
+
+    def __new__(cls, name: str, code: int, valid: bool, rank: int, text: str) -> Self:
+        state = str.__new__(cls, name)
+        state._value_ = name
+        state.code, state.valid, state.rank, state.text = code, valid, rank, text
+        return state
+
+    # name in the JSON, code, valid, rank, text
+    STARTING = "starting", 0, False, 4, "not every gauge has been read yet"
+    NO_ZERO = "no_zero", 1, False, 4, "no machine zero fits this configuration; `compd zero`"
+    OK = "ok", 2, True, 0, "every gauge is good, and the correction is the one that they ask for"
+    SLEWING = "slewing", 3, True, 1, "the correction is under way at `limits.slew_mm_per_s`; it never jumps"
+    CLAMPED = "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`"
+    HOLD = "hold", 5, True, 2, "a comparator is lost; the last good set of them is used, at most `loop.hold_s`"
+    FADE = "fade", 6, True, 2, "a comparator is lost; the last good set is taken back to zero over `loop.hold_s`"
+    STOP = "stop", 7, False, 4, "a gauge is lost and nothing takes its place"
+    REFUSED = "refused", 8, False, 4, "beyond a limit with `on_limit: refuse`, out of reach, or not finite"
+
+
+def state_named(name: str) -> State | None:
+    """The state of that name; None where this release does not know it: the setpoint is then invalid."""
+    return next((state for state in State if state == name), None)
