@@ -78,7 +78,6 @@ class Daemon:
         }
         report = StatusReport(
             version,
-            configuration,
             self.latest,
             self._wires,
             self.commands,

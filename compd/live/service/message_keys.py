@@ -1,14 +1,13 @@
-"""The keys of every message that the daemon sends, with meaning and unit: one model per message.
+"""The keys of the messages that the daemon sends, with meaning and unit: one model per message.
 
 The models are the reference of the protocol; nothing that is sent passes through them. SETPOINT and READINGS are
 written once per cycle, and are made by `Setpoint.to_json` and `ReadingsMessage.line` directly; tests hold every message
 to its model, so that no key is sent that is not described here. A key with a default is absent where it is not known.
-What a client sends is described by the requests in `compd.live.service.requests`.
+What a client sends, and answers that belong to one request alone, are described in `compd.live.service.requests`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -53,39 +52,6 @@ class ErrorKeys(SentMessage):
     text: str = Field(description="what was wrong, for a person")
 
 
-class ColumnKeys(Keys):
-    """One column of a recording: sign * (value - machine zero) for a length, the value itself for anything else."""
-
-    column: str = Field(description="the column's name, which ends in its unit")
-    channel: str = Field(description='the gauge\'s channel, "gauge.channel", as in READINGS')
-    sign: Literal[1, -1] | None = Field(default=None, description="lengths: -1 where the display falls as it grows")
-    stale_after_s: float = Field(description="a reading older than this is stale, s")
-
-
-class WatchKeys(SentMessage):
-    """Answers WATCH, with the keys of the request."""
-
-    wire_name = "WATCH"
-    what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
-    rate_hz: float | None = Field(default=None, description="as in the request, Hz")
-    columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
-
-
-class ReleaseKeys(SentMessage):
-    """Answers RELEASE: the mode is CMM again."""
-
-    wire_name = "RELEASE"
-
-
-class ZeroKeys(SentMessage):
-    """Answers ZERO when machine zero has been taken."""
-
-    wire_name = "ZERO"
-    taken_at: str = Field(description="when, UTC, ISO 8601")
-    path: str = Field(description="the file in which it is kept")
-    readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
-
-
 class ModelSummaryKeys(Keys):
     """One model."""
 
@@ -100,12 +66,6 @@ class ModelsKeys(Keys):
 
     applied: ModelSummaryKeys | None = Field(default=None, description="the model whose correction is applied")
     shadow: ModelSummaryKeys | None = Field(default=None, description="a model that is computed and not applied")
-
-
-class ModelKeys(SentMessage, ModelsKeys):
-    """Answers MODEL."""
-
-    wire_name = "MODEL"
 
 
 class FrameKeys(Keys):
@@ -303,17 +263,3 @@ class StatusKeys(VersionKeys):
     publisher: PublisherStatusKeys
     lines: dict[str, LineStatusKeys] = Field(description="by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")
-
-
-_KINDS: tuple[type[SentMessage], ...] = (
-    VersionKeys,
-    WatchKeys,
-    ReleaseKeys,
-    ZeroKeys,
-    ModelKeys,
-    ErrorKeys,
-    StatusKeys,
-    SetpointKeys,
-    ReadingsKeys,
-)
-SENT_MESSAGES: Mapping[str, type[SentMessage]] = {kind.wire_name: kind for kind in _KINDS}

@@ -8,8 +8,9 @@ import pytest
 from pydantic import ValidationError
 
 from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.service.message_keys import SENT_MESSAGES, Keys
+from compd.live.service.message_keys import Keys
 from compd.live.service.messages import ErrorCode, ProtocolError
+from compd.live.service.requests import SENT_MESSAGES
 from tests.support.live_machine import machine
 from tests.support.recorded_run import Run
 from tests.unit.live.test_daemon import configuration, running, still
@@ -86,5 +87,14 @@ def kinds(kind: type[Keys]) -> set[type[Keys]]:
 
 def test_every_message_and_part_is_described():
     assert all(kind.__doc__ for kind in kinds(Keys))
-    for name, kind in SENT_MESSAGES.items():
-        assert kind.wire_name == name
+    assert list(SENT_MESSAGES) == [
+        "WATCH",
+        "RELEASE",
+        "STATUS",
+        "VERSION",
+        "ZERO",
+        "MODEL",
+        "ERROR",
+        "SETPOINT",
+        "READINGS",
+    ]
