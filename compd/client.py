@@ -1,4 +1,4 @@
-"""A client of the running daemon: blocking, one connection, the standard library alone.
+"""A client of the running daemon: blocking, one connection, no dependency beyond the standard library.
 
 A program that drives a machine, or only watches it, connects to the daemon's TCP port or Unix socket and receives
 setpoints::
