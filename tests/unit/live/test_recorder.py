@@ -14,9 +14,8 @@ import yaml
 from compd.clock import MonotonicClock
 from compd.errors import Problem, RecordingError, StateError
 from compd.gauge import Quality
-from compd.live.record.recorder import Keeping, Recorder
-from compd.live.record.replay import RecordedCycles
-from compd.live.record.replay import replay as replay_cycles
+from compd.live.record.recorder import Recorder, RecordingLimits
+from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.recording.reader import read_recording
 from tests.support.live_machine import Machine, machine
 from tests.support.recorded_run import ROOMY, Run
@@ -158,7 +157,7 @@ def test_parts_by_size_and_by_time_lose_no_row(tmp_path, keeping):
 
 def test_at_the_limit_it_ends_and_says_so_and_what_was_written_is_whole(tmp_path):
     run = Run(machine())
-    keeping = Keeping(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=False)
+    keeping = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=False)
     with pytest.raises(RecordingError, match="reached its limit on disk") as ended:
         recorded(run, tmp_path / "run", 100, keeping)
     assert "0.1 MB" in str(ended.value)
@@ -171,7 +170,7 @@ def test_at_the_limit_it_ends_and_says_so_and_what_was_written_is_whole(tmp_path
 
 def test_dropping_the_oldest_keeps_the_limit_and_says_what_went(tmp_path):
     said = []
-    keeping = Keeping(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=True)
+    keeping = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=True)
     messages = recorded(Run(machine()), tmp_path / "run", 100, keeping, said)
     paths = sorted(tmp_path.iterdir())
     assert sum(path.stat().st_size for path in paths) <= 100_000
@@ -185,7 +184,7 @@ def test_dropping_the_oldest_keeps_the_limit_and_says_what_went(tmp_path):
 
 def test_parts_too_large_for_dropping_the_oldest_are_refused():
     with pytest.raises(RecordingError, match="half of the limit"):
-        Keeping(part_bytes=60, part_s=1, limit_bytes=100, drop_oldest=True)
+        RecordingLimits(part_bytes=60, part_s=1, limit_bytes=100, drop_oldest=True)
 
 
 def test_nothing_is_overwritten(tmp_path):

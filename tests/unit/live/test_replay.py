@@ -14,8 +14,7 @@ from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import Models
 from compd.live.loop.states import State
-from compd.live.record.replay import RecordedCycles
-from compd.live.record.replay import replay as replay_cycles
+from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
 from compd.model.apply_effects import EffectMemory
