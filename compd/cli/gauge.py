@@ -66,9 +66,9 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, look which preset gets an answer."""
-    from compd.commissioning.scan import candidates, ports, probe_port
+    from compd.commissioning.scan import preset_candidates, probe_port, serial_ports
 
-    found = ports()
+    found = serial_ports()
     if not found:
         typer.echo("no serial port found; is the adapter plugged in, and are you in group dialout?")
         return
@@ -82,7 +82,7 @@ def scan(
     )
     typer.confirm("Is nothing dangerous connected?", abort=True)
     for port in found:
-        for candidate in candidates():
+        for candidate in preset_candidates():
             typer.echo(
                 f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: "
                 f"{probe_port(port.path, candidate)}"
@@ -101,7 +101,7 @@ def read(
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
     from compd.clock import MonotonicClock
-    from compd.commissioning.open_gauge import open_seen
+    from compd.commissioning.open_gauge import open_tapped_line
     from compd.gauge import LineFault
 
     found = _target(target, name, port, baud, format_, timeout_s, assignments)
@@ -112,7 +112,7 @@ def read(
         typer.echo(f"{(clock.monotonic() - started_s) * 1e3:8.1f} ms {direction} {data.hex(' ')}   {data!r}")
 
     try:
-        line = open_seen(found.line, clock, show)
+        line = open_tapped_line(found.line, clock, show)
         try:
             readings = found.gauge.read(line)
         finally:
@@ -142,7 +142,7 @@ def watch(
 
     from compd.clock import MonotonicClock
     from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import polled
+    from compd.commissioning.open_gauge import poll_gauge
 
     found = _target(target, name, port, baud, format_, timeout_s, assignments)
     clock = MonotonicClock()
@@ -150,7 +150,7 @@ def watch(
     console = Console()
     with Live(console=console, refresh_per_second=5) as live:
         try:
-            for readings in polled(found, clock, polls):
+            for readings in poll_gauge(found, clock, polls):
                 statistics.add(readings, clock.monotonic())
                 live.update(_watched(found.name, statistics, clock.monotonic()))
         except KeyboardInterrupt:
@@ -177,15 +177,15 @@ def learn(
     import yaml
 
     from compd.commissioning.capture import capture_live, read_capture
-    from compd.commissioning.describe import learn as learn_from
-    from compd.commissioning.describe import verify
-    from compd.commissioning.open_gauge import TappedWire, byte_settings_of
+    from compd.commissioning.describe import describe_replies as learn_from
+    from compd.commissioning.describe import read_replies
+    from compd.commissioning.open_gauge import PortArguments, byte_line_settings
     from compd.plugins import GAUGES, load
 
     if capture is not None:
         request, seen = read_capture(capture)
     elif port:
-        settings = byte_settings_of(TappedWire(port, baud, format_, timeout_s))
+        settings = byte_line_settings(PortArguments(port, baud, format_, timeout_s))
         request, seen = capture_live(settings, out, replies, _between_captures, typer.echo)
     else:
         raise typer.BadParameter("name a capture file, or a --port")
@@ -195,7 +195,7 @@ def learn(
         errors[text.encode("latin-1")] = quality
     chosen = [one.strip() for one in names.split(",") if one.strip()]
     learned = learn_from(request, seen, unit, chosen, errors)
-    said = verify(learned, load(GAUGES, "serial_ascii", "driver serial_ascii"), seen)
+    said = read_replies(learned, load(GAUGES, "serial_ascii", "driver serial_ascii"), seen)
     for reply, values in zip(seen, said, strict=True):
         typer.echo(f"# {reply!r} -> {values}")
     for note in learned.notes:
@@ -219,13 +219,13 @@ def _target(
     timeout_s: float,
     assignments: Sequence[str] | None,
 ) -> GaugeTarget:
-    from compd.commissioning.open_gauge import TappedWire, by_driver, configured
+    from compd.commissioning.open_gauge import PortArguments, gauge_of_configuration, gauge_of_driver
 
     if target.endswith((".yaml", ".yml")):
-        return configured(Path(target), name)
+        return gauge_of_configuration(Path(target), name)
     if not port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
-    return by_driver(target, TappedWire(port, baud, form, timeout_s), assignments or ())
+    return gauge_of_driver(target, PortArguments(port, baud, form, timeout_s), assignments or ())
 
 
 def _shown(reading: Reading, unit: str) -> str:

@@ -234,7 +234,7 @@ def tcp_line(transcript: Transcript) -> Iterator[ModbusTcp]:
 
 
 def replay_transcript(path: Path) -> None:
-    """Fails unless the driver sends exactly the transcript's bytes, reads all replies and makes of them what it says."""
+    """Fails unless the driver sends exactly these bytes, reads all replies and makes of them what the file says."""
     transcript = parse(path)
     gauge, _ = gauge_of(transcript)
     if transcript.over_tcp:
