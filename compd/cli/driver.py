@@ -32,7 +32,7 @@ def try_on_wires(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="In virtual time alone, no ptys or ports.")] = False,
 ) -> None:
-    """Try a driver on wires that go wrong: each fault must give its quality, and the next good reading must be right.
+    """Try a driver on wires that go wrong: installed fault must give its quality, and the next good reading must be right.
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
@@ -45,9 +45,9 @@ def try_on_wires(
         failed = _try(driver_under_test(name, chosen, simulator), quick)
     else:
         failed = 0
-        for each in names(GAUGES):
+        for installed in names(GAUGES):
             try:
-                driver = driver_under_test(each)
+                driver = driver_under_test(installed)
             except PluginError as error:
                 typer.echo(f"\n{error}")
                 failed += 1
@@ -61,28 +61,28 @@ def _try(driver: DriverUnderTest, quick: bool) -> int:
     from compd.commissioning.conformance.report import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
-    found: list[tuple[str, CaseResult]] = []
+    results: list[tuple[str, CaseResult]] = []
     for wire, result in run_conformance(driver, on_real_wires=not quick):
         required = f" [{result.required}]" if result.required else ""
         typer.echo(f"  {result.verdict:4} {wire:12} {result.case}{required}: {result.observed}")
-        found.append((wire, result))
-    _print_table(driver.name, found)
-    return sum(result.verdict == "FAIL" for _, result in found)
+        results.append((wire, result))
+    _print_table(driver.name, results)
+    return sum(result.verdict == "FAIL" for _, result in results)
 
 
-def _print_table(name: str, found: list[tuple[str, CaseResult]]) -> None:
+def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    wires = list(dict.fromkeys(wire for wire, _ in found))
+    wires = list(dict.fromkeys(wire for wire, _ in results))
     colours = {"pass": "[green]pass[/]", "FAIL": "[bold red]FAIL[/]", "-": "-"}
     table = Table("case", *wires, title=f"{name} (-: cannot be tried there, see above)", title_justify="left")
-    for case in dict.fromkeys(result.case for _, result in found):
-        verdicts = {wire: colours[result.verdict] for wire, result in found if result.case == case}
+    for case in dict.fromkeys(result.case for _, result in results):
+        verdicts = {wire: colours[result.verdict] for wire, result in results if result.case == case}
         table.add_row(case, *(verdicts.get(wire, "") for wire in wires))
     Console().print(table)
-    failed = sum(result.verdict == "FAIL" for _, result in found)
-    typer.echo(f"{name}: {failed} of {len(found)} cases failed" if failed else f"{name}: nothing failed")
+    failed = sum(result.verdict == "FAIL" for _, result in results)
+    typer.echo(f"{name}: {failed} of {len(results)} cases failed" if failed else f"{name}: nothing failed")
 
 
 def _read_options(path: Path) -> dict[str, Any]:

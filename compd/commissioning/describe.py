@@ -11,10 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import yaml
 from pydantic import ValidationError
 
 from compd.errors import CompdError, Problem
 from compd.gauge import Gauge, LineFault, Quality
+from compd.plugins import GAUGES, load
 
 FEWEST_REPLIES = 3
 _NUMBER = re.compile(rb" *[+-]? *\d*\.\d+| *[+-] *\d+|\d+")
@@ -31,6 +33,10 @@ class GaugeDescription:
     options: Mapping[str, Any]
     notes: tuple[str, ...]
 
+    def as_yaml(self) -> str:
+        """An entry for `gauges:` in a configuration, with names to be replaced for the gauge and its line."""
+        return yaml.safe_dump({"learned_gauge": {**self.options, "line": "name_of_its_line"}}, sort_keys=False)
+
 
 class _ReplyPart(NamedTuple):
     """A piece of a reply: a number or the text between two numbers, and its first byte's place in the reply."""
@@ -38,6 +44,17 @@ class _ReplyPart(NamedTuple):
     is_number: bool
     text: bytes
     start: int
+
+
+def learn_gauge(
+    request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
+) -> tuple[GaugeDescription, list[str]]:
+    """The description of a gauge, and the values that it gives of every reply. Parameters as for `describe_replies`.
+
+    Raises DescriptionError where no description follows, or where a reply does not fit the one that does.
+    """
+    description = describe_replies(request, replies, unit, names, errors)
+    return description, read_replies(description, load(GAUGES, "serial_ascii", "driver serial_ascii"), replies)
 
 
 def describe_replies(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,6 +65,14 @@ def preset_candidates() -> list[PresetCandidate]:
             options = driver.Options.model_validate({"driver": name, "line": "probe", **(driver.sample_options or {})})
             candidates.append(PresetCandidate(name, driver(options), *driver.usual_line))
     return candidates
+
+
+def probe_ports(ports: Sequence[ComputerPort]) -> Iterator[tuple[ComputerPort, PresetCandidate, str]]:
+    """Every port with every candidate and the outcome of one read, as `probe_port` gives it. SENDS BYTES."""
+    candidates = preset_candidates()
+    for port in ports:
+        for candidate in candidates:
+            yield port, candidate, probe_port(port.path, candidate)
 
 
 def probe_port(path: str, candidate: PresetCandidate) -> str:
