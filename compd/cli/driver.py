@@ -32,7 +32,7 @@ def try_on_wires(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="In virtual time alone, no ptys or ports.")] = False,
 ) -> None:
-    """Try a driver on wires that go wrong: installed fault must give its quality, and the next good reading must be right.
+    """Try a driver on wires that go wrong: each fault must give its quality, and the next good reading must be right.
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
