@@ -236,6 +236,7 @@ class Gauge(ABC, Generic[LineT]):
         they must be given in a file.
     sample_range : lowest and highest value that the gauge can show with these options, in its channels' unit.
     usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
+    about : what the device speaks and where that was read; "" where the module's docstring says it.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
@@ -244,6 +245,7 @@ class Gauge(ABC, Generic[LineT]):
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
     usual_line: ClassVar[tuple[int, str] | None] = None
+    about: ClassVar[str] = ""
 
     def __init__(self, options: Any) -> None:
         """`options`: an instance of this class's `Options`, checked. No device is asked here: there is no line yet."""
