@@ -1,11 +1,32 @@
-"""A small client of the daemon: blocking, one connection, standard library alone.
+"""A client of the running daemon: blocking, one connection, no dependency beyond the standard library.
 
-from compd.client import connect
+A program that drives a machine, or only watches it, connects to the daemon's TCP port or Unix socket and receives
+setpoints::
 
-with connect("127.0.0.1:7750") as client:
-    for setpoint in client.watch(rate_hz=10):
-        if setpoint["valid"]:
-            print(setpoint["tip_M_mm"])
+    from compd.client import connect
+
+    with connect("127.0.0.1:7750") as client:
+        print(client.version["machine"])
+        for setpoint in client.watch(rate_hz=10):
+            if setpoint["valid"]:
+                print(setpoint["tip_M_mm"], "mm in the frame of the surface plate")
+            else:
+                print(setpoint["state"], setpoint["reason"])
+
+A controller also says where the tip shall be, and commands its drives with the corrected scale readings::
+
+    with connect("/run/compd/compd.sock") as client:
+        client.target(tip_B0_mm=[10.0, 0.0, -500.0])
+        for setpoint in client.watch():
+            if setpoint["valid"] and setpoint["mode"] == "machine_tool":
+                drive_to(setpoint["scale_setpoint_mm"])
+
+Messages are dictionaries with the keys of the protocol. Lengths are in mm, angles in rad, times in seconds of the
+daemon's monotonic clock; a vector's name ends in its frame and unit. What is unknown is absent from a message, so a
+key that not every setpoint has is read with `get`. A setpoint must not be used later than its `valid_until`: on the
+daemon's computer compare it with `time.monotonic()`, elsewhere count `valid_until - time_s` from the moment of arrival.
+
+Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 """
 
 from __future__ import annotations
@@ -19,6 +40,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from compd.errors import DaemonError, Problem
+from compd.live.loop.states import state_named
 
 DEFAULT_ADDRESS = "127.0.0.1:7750"
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
@@ -27,9 +49,21 @@ Message = dict[str, Any]
 
 
 def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Client:
-    """Connect to "host:port" or to the path of a Unix socket.
+    """Connect to the daemon.
 
-    timeout_s : for connecting, and for each answer. Raises DaemonError when nobody answers there.
+    Parameters
+    ----------
+    address : "host:port", or the path of the daemon's Unix socket. What reads or writes files of the daemon's computer
+        (`Client.readings`, `Client.zero`, `Client.model`) is allowed over the Unix socket alone.
+    timeout_s : for connecting, and for each answer and each setpoint.
+
+    Returns
+    -------
+    Client : a context manager that closes the connection.
+
+    Raises
+    ------
+    DaemonError : the address is none, or no daemon answers there, or it has too many clients.
     """
     text = str(address)
     try:
@@ -62,12 +96,17 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
 
 
 class Client:
-    """A connection to the daemon. Messages are dictionaries as README.md describes them.
+    """A connection to the daemon, made by `connect`. Each method is named after the message that it is about.
 
-    version : the daemon's VERSION message.
+    A client is used by one thread. Setpoints that arrive while it waits for another answer are kept for `watch`.
+
+    Attributes
+    ----------
+    version : the daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
     """
 
     def __init__(self, connection: socket.socket, address: str) -> None:
+        """`connection`: an open socket with its timeout set; `address`: the name of the other end in errors."""
         self._connection = connection
         self._address = address
         self._lines = connection.makefile("rb")
@@ -75,22 +114,43 @@ class Client:
         self.version = self._await("VERSION")
 
     def watch(self, rate_hz: float | None = None) -> Iterator[Message]:
-        """SETPOINT messages for ever, `rate_hz` per second; None for every one of them.
+        """Iterate over SETPOINT messages, without end.
 
-        Raises DaemonError when the daemon goes away.
+        `valid` is false in every message whose `state` this release does not know, whatever else it says: the daemon is
+        a newer one then.
+
+        Parameters
+        ----------
+        rate_hz : setpoints per second; None for the setpoint of every cycle.
+
+        Raises
+        ------
+        DaemonError : the daemon has gone, or sent nothing within the timeout; or it refused a message that was sent
+            meanwhile.
         """
         self._ask({"class": "WATCH"} if rate_hz is None else {"class": "WATCH", "rate_hz": rate_hz}, "WATCH")
         while True:
-            yield self._setpoints.popleft() if self._setpoints else self._next_setpoint()
+            if not self._setpoints:
+                self._await("SETPOINT")
+            yield self._setpoints.popleft()
 
     def readings(self, rate_hz: float | None = None) -> Iterator[tuple[bytes, Message]]:
-        """What the cycles compute from: lines as they came, and the messages in them. First the answer to WATCH, with
-        the columns of a recording, then READINGS for ever, `rate_hz` per second; None for every cycle.
+        """Iterate over what the cycles compute from, for a recording: each line as it came, and the message in it.
 
-        Unix socket only. Raises DaemonError when the daemon refuses or goes away.
+        The first item is the answer to WATCH, whose `columns` say which channel is which column of a recording. Then
+        come READINGS messages, without end, just as the daemon sent them. Unix socket only; use a connection for this
+        alone.
+
+        Parameters
+        ----------
+        rate_hz : messages per second; None for one of every cycle.
+
+        Raises
+        ------
+        DaemonError : the daemon refuses, or has gone, or sent nothing within the timeout.
         """
-        asked = {"class": "WATCH", "what": "readings"}
-        self._send(asked if rate_hz is None else asked | {"rate_hz": rate_hz})
+        request: Message = {"class": "WATCH", "what": "readings"}
+        self._send(request if rate_hz is None else request | {"rate_hz": rate_hz})
         while True:
             yield self._read()
 
@@ -100,39 +160,69 @@ class Client:
         rotation_B0_rad: Sequence[float] | None = None,
         tip_P_mm: Sequence[float] | None = None,
     ) -> None:
-        """Say where the tip shall be, as the controller; the next setpoint is computed for it.
+        """Set the tip's target, as the controller; the next setpoint is computed for it.
 
-        The first client that does so is the controller until it goes or calls `release`. There is no answer;
-        an ERROR (another client is the controller) raises DaemonError from whatever is read next.
+        The first client with a target is the controller until it disconnects or calls `release`. There is no answer:
+        where the daemon refuses the target, the method that reads next raises DaemonError.
+
+        Parameters
+        ----------
+        tip_B0_mm : the tip in {B0}, the base platform's frame at machine zero, mm: three numbers.
+        rotation_B0_rad : for a hexapod, the rotation vector of {P} in {B0}, rad; None for the attitude at machine zero.
+        tip_P_mm : with the tool on the surface plate, instead of tip_B0_mm: the touched place in {P}, mm.
         """
         keys = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
         self._send({"class": "TARGET", **{key: list(value) for key, value in keys.items() if value is not None}})
 
     def release(self) -> None:
-        """Give the controller role back: the daemon returns to CMM mode."""
+        """Give the controller's role back: the daemon returns to CMM mode.
+
+        Raises
+        ------
+        DaemonError : this client is not the controller.
+        """
         self._ask({"class": "RELEASE"}, "RELEASE")
 
     def status(self) -> Message:
-        """The daemon's STATUS."""
+        """Ask for STATUS: the state of the loop, its timing, every line and every gauge."""
         return self._ask({"class": "STATUS"}, "STATUS")
 
     def zero(self) -> Message:
-        """Take machine zero, with the machine at rest at its zero position (Unix socket only).
+        """Take machine zero, with the machine at rest at its zero position. Unix socket only; takes about a second.
 
-        Raises DaemonError when a gauge cannot be read or the machine moves.
+        Returns
+        -------
+        Message : ZERO with `taken_at`, `path` of the file, and `readings_mm` by channel.
+
+        Raises
+        ------
+        DaemonError : a gauge cannot be read, the machine moves, or the file cannot be written.
         """
         return self._ask({"class": "ZERO"}, "ZERO")
 
     def model(self, file: str | None = None, shadow: bool = False) -> Message:
-        """The models that the daemon runs with, as it tells them (Unix socket only).
+        """Ask which models the daemon runs with; with `file`, adopt that model first. Unix socket only.
 
-        file : a model file to adopt first, or to run as a shadow; an absolute path on the daemon's computer, "" for
-        none. Raises DaemonError where the daemon cannot use it.
+        Parameters
+        ----------
+        file : absolute path of a model file on the daemon's computer; "" for the machine without effects, or for no
+            shadow; None to change nothing.
+        shadow : compute the correction of this model beside the applied one, and do not apply it.
+
+        Returns
+        -------
+        Message : MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `model` (the file's hash)
+            and `file`.
+
+        Raises
+        ------
+        DaemonError : the daemon cannot use the file; the models are as before.
         """
-        order = {} if file is None else {"file": file, "shadow": shadow}
-        return self._ask({"class": "MODEL", **order}, "MODEL")
+        keys = {} if file is None else {"file": file, "shadow": shadow}
+        return self._ask({"class": "MODEL", **keys}, "MODEL")
 
     def close(self) -> None:
+        """Close the connection; a controller's role ends with it."""
         self._lines.close()
         self._connection.close()
 
@@ -143,10 +233,6 @@ class Client:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _next_setpoint(self) -> Message:
-        self._await("SETPOINT")
-        return self._setpoints.popleft()
 
     def _ask(self, message: Message, answer: str) -> Message:
         self._send(message)
@@ -159,25 +245,38 @@ class Client:
             raise self._lost(error.strerror or str(error)) from error
 
     def _await(self, wanted: str) -> Message:
-        """Read until a message of class `wanted`; setpoints that come before it are kept for `watch`."""
+        """Read until a message of class `wanted`; every setpoint on the way is kept for `watch`."""
         while True:
             _, message = self._read()
             if message["class"] == "SETPOINT":
+                if state_named(message.get("state", "")) is None:
+                    message["valid"] = False
                 self._setpoints.append(message)
             if message["class"] == wanted:
                 return message
 
     def _read(self) -> tuple[bytes, Message]:
-        """The next line, and the message that it is."""
+        """The next line, and the message that it is. Raises DaemonError for an ERROR message too."""
         try:
             line = self._lines.readline()
         except OSError as error:
             raise self._lost(error.strerror or "no answer in time") from error
         if not line.endswith(b"\n"):
             raise self._lost("it closed the connection")
-        message: Message = json.loads(line)
-        if message["class"] == "ERROR":
-            raise DaemonError(Problem(where=self._address, what=message["text"], value=message["code"]))
+        try:
+            message: Message = json.loads(line)
+            error_code = message["code"] if message["class"] == "ERROR" else None
+        except (ValueError, TypeError, KeyError) as error:
+            raise DaemonError(
+                Problem(
+                    where=self._address,
+                    what="what answers here is not compd",
+                    value=repr(line[:40]),
+                    next_step="give the address under `sockets:` in the daemon's configuration",
+                )
+            ) from error
+        if error_code is not None:
+            raise DaemonError(Problem(where=self._address, what=message["text"], value=error_code))
         return line, message
 
     def _lost(self, why: str) -> DaemonError:

@@ -1,8 +1,44 @@
-"""What a gauge driver implements, and what it delivers.
+r"""The interface between compd and a gauge driver.
 
-A driver is a class derived from `Gauge`, named in the entry-point group `compd.gauges` (or by
-`driver: /etc/compd/my_gauge.py:MyGauge`). It knows its device's bytes and nothing else: the line's
-thread calls `read`, and the line does the waiting, the timeouts and the recovery.
+A driver is a class derived from `Gauge`. It knows its device's bytes, or its registers, and nothing else: the thread of
+the line calls `read`, and the line does the waiting, the timeouts and the recovery. A driver implements
+
+- `Options`, where it has keys of its own in the configuration: a pydantic model,
+- `channels`: the names and units of what one poll delivers,
+- `read`: one poll of the device, to one `Reading` per channel.
+
+A whole driver, of a comparator that answers ``?`` with its reading in mm, such as ``+01.2345``::
+
+    import re
+    from collections.abc import Sequence
+
+    from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
+
+    class MyGauge(Gauge[ByteLine]):
+        @property
+        def channels(self) -> Sequence[Channel]:
+            return [Channel("value", "mm")]
+
+        def read(self, line: ByteLine) -> Sequence[Reading]:
+            time_s = line.send(b"?\r")
+            reply = line.receive_until(b"\r\n", limit=10)
+            if reply == b"OVER\r\n":
+                return [bad(time_s, Quality.OVER_RANGE, "OVER")]
+            if not re.fullmatch(rb"[+-]\d{2}\.\d{4}\r\n", reply):
+                raise LineFault(Quality.MISMATCH, repr(reply))
+            return [good(float(reply), time_s)]
+
+Rules for every driver:
+
+- The value is in the channel's unit: mm for every length, whatever the device displays.
+- `time_s` is what `send` or `read_registers` returned, never the time of the reply.
+- There is no number unless the reply fits exactly. What is damaged, cut short or out of range becomes a `Quality`.
+- A channel that has no value is `bad` and the others go on; `LineFault` is for a poll that failed as a whole.
+- `read` does not sleep or log, nor repeat a poll that failed: the line's thread decides when to ask again.
+
+A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
+``driver: /etc/compd/my_gauge.py:MyGauge``. ``drivers/template`` is a complete package to copy, with a simulated device;
+``compd driver test`` tries a driver on wires that go wrong.
 """
 
 from __future__ import annotations
@@ -18,7 +54,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class Quality(StrEnum):
-    """Why a reading is good or not. Only OK carries a number that may be used."""
+    """Whether a reading has a value, and if not, why. Only OK carries a number."""
 
     OK = "ok"
     NEVER_READ = "never_read"  # nothing has been asked yet
@@ -38,13 +74,15 @@ class Quality(StrEnum):
 
 
 class Reading(NamedTuple):
-    """One channel of one gauge at one time.
+    """One channel of one gauge at one time. Drivers make it by `good` and `bad`.
 
-    value : in the channel's unit (mm for every length); nan unless quality is OK.
-    time_s : monotonic seconds when the request left the port: the earliest time at which the device
-        can have sampled, so an age is never understated.
-    quality : OK or the reason why there is no value.
-    detail : what was seen, for a person ("ER,MS,31"); "" when OK.
+    Attributes
+    ----------
+    value : in the channel's unit (mm for every length); nan unless `quality` is OK.
+    time_s : monotonic time (s) at which the request had left the port. It is the earliest time at which the device can
+        have sampled, so that the age of a reading is never understated.
+    quality : OK, or the reason why there is no value.
+    detail : what the device sent or the line saw, for a person ("ER,MS,31"); "" when OK.
     """
 
     value: float
@@ -54,23 +92,27 @@ class Reading(NamedTuple):
 
     @property
     def ok(self) -> bool:
+        """Whether there is a value."""
         return self.quality is Quality.OK
 
 
 def good(value: float, time_s: float) -> Reading:
-    """A reading with a number; not finite is refused here, once, for every driver."""
+    """A reading with a value, in the channel's unit; one that is not finite becomes `bad` with NOT_FINITE."""
     if not math.isfinite(value):
         return bad(time_s, Quality.NOT_FINITE, repr(value))
     return Reading(value, time_s, Quality.OK)
 
 
 def bad(time_s: float, quality: Quality, detail: str = "") -> Reading:
-    """A reading without a number, and why."""
+    """A reading without a value: its quality is the reason, `detail` what was seen."""
     return Reading(math.nan, time_s, quality, detail)
 
 
 class LineFault(Exception):
-    """A poll that failed as a whole; every channel of the gauge takes this quality."""
+    """A poll that failed as a whole: every channel of the gauge takes this quality.
+
+    Lines raise it for what happens to the bytes, drivers for a reply that cannot be used (MISMATCH, CRC, DEVICE_ERROR).
+    """
 
     def __init__(self, quality: Quality, detail: str = "") -> None:
         super().__init__(f"{quality}: {detail}" if detail else str(quality))
@@ -83,7 +125,11 @@ Unit = Literal["mm", "degC", "N", "hPa", "pct", "1"]
 
 @dataclass(frozen=True)
 class Channel:
-    """One value that a gauge delivers: its name (unique in the gauge) and unit."""
+    """One value that a gauge delivers: its name, unique in the gauge, and its unit.
+
+    The configuration and STATUS call it "gauge.channel". A length is in mm whatever the device displays; "pct" is per
+    cent, "1" a number without unit.
+    """
 
     name: str
     unit: Unit = "mm"
@@ -92,43 +138,61 @@ class Channel:
 class ByteLine(Protocol):
     """A stream of bytes to one or more devices: a serial port or a TCP connection.
 
-    Every method raises `LineFault`: TIMEOUT when nothing came, INCOMPLETE when something did but not
-    enough, LINE_LOST when the port is gone.
+    Every method raises `LineFault` with TIMEOUT when nothing came, INCOMPLETE when something came but not enough, and
+    LINE_LOST when the port is gone. A driver lets these pass: the line's thread knows what to do.
     """
 
     def send(self, request: bytes) -> float:
-        """Discard what is waiting, write `request`; the monotonic time (s) at which it had left."""
+        """Discard what has arrived unasked, and write `request`.
+
+        Returns the monotonic time (s) at which its last bit had left: the `time_s` of the readings in the reply.
+        """
         ...
 
     def listen(self) -> float:
-        """Discard what is waiting, of a device that speaks unasked; the monotonic time (s) of it."""
+        """Discard what has arrived so far, of a device that sends unasked.
+
+        Returns the monotonic time (s): the `time_s` of the readings that are received next.
+        """
         ...
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
-        """Exactly `count` bytes; `timeout_s` for the first byte, the line's own if None."""
+        """Exactly `count` bytes. `timeout_s` is for the first byte; None is the line's own timeout."""
         ...
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
-        """Bytes up to and including `terminator`; MISMATCH beyond `limit` bytes."""
+        """Bytes up to and including `terminator`, at most `limit` of them; more raise MISMATCH."""
         ...
 
     def drain(self) -> bytes:
-        """After a fault: wait until the line has been quiet for its timeout; what came meanwhile."""
+        """Wait until nothing has come for the line's timeout, and return what came meanwhile.
+
+        The line's thread does so after a fault. A driver needs it only between two exchanges of one poll.
+        """
         ...
 
 
 class RegisterReply(NamedTuple):
-    """Registers read in one Modbus transaction: unsigned 16-bit values, and the time of asking (s)."""
+    """Registers read in one Modbus transaction.
+
+    Attributes
+    ----------
+    registers : unsigned 16-bit values, in the order of their addresses.
+    time_s : monotonic time (s) at which the request had left: the `time_s` of the readings.
+    """
 
     registers: tuple[int, ...]
     time_s: float
 
 
 class RegisterLine(Protocol):
-    """A Modbus line (RTU, TCP or RTU over TCP); raises `LineFault` like `ByteLine`."""
+    """A Modbus line: RTU, TCP or RTU over TCP. It raises `LineFault` as `ByteLine` does, also CRC and DEVICE_ERROR."""
 
     def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
-        """`count` registers from `address` of slave `unit` by function code 3 or 4."""
+        """`count` registers from `address` of the slave `unit`, by function code 3 (holding) or 4 (input).
+
+        `address` counts from 0, as on the wire; manuals that write 40001 or 30001 mean address 0.
+        """
         ...
 
 
@@ -149,7 +213,7 @@ class GaugeOptions(BaseModel):
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="standard deviation of one reading of a length, um; where it is missing nobody knows the tip's",
+        description="standard deviation of one reading of a length, um; without it the tip's uncertainty is unknown",
     )
 
 
@@ -157,15 +221,22 @@ LineT = TypeVar("LineT", ByteLine, RegisterLine)
 
 
 class Gauge(ABC, Generic[LineT]):
-    """One device on a line: `class MyGauge(Gauge[ByteLine])` or `Gauge[RegisterLine]`.
+    """Base of all drivers: one device on a line, `class MyGauge(Gauge[ByteLine])` or `Gauge[RegisterLine]`.
 
-    Subclasses set the class variables, take their `Options` in `__init__`, and implement two members.
+    One object serves one device, from one thread. `channels` and `read` must be implemented; the class variables are
+    set where their defaults do not fit.
 
-    integrity : "checksum" where the driver itself checks one (a Modbus line does it for its drivers);
-        "format" where only the shape of a reply tells damage.
-    sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver.
-    sample_range : what the gauge can show with these options, in its channels' unit.
+    Attributes
+    ----------
+    Options : the model of the gauge's keys in the configuration, `GaugeOptions` or derived from it.
+    line_kind : "bytes" for a `ByteLine`, "registers" for a `RegisterLine`.
+    integrity : "checksum" where the driver itself checks one (a Modbus line does it for its drivers); "format" where
+        only the shape of a reply tells damage.
+    sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver; None where
+        they must be given in a file.
+    sample_range : lowest and highest value that the gauge can show with these options, in its channels' unit.
     usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
+    about : what the device speaks and where that was read; "" where the module's docstring says it.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
@@ -174,26 +245,28 @@ class Gauge(ABC, Generic[LineT]):
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
     usual_line: ClassVar[tuple[int, str] | None] = None
+    about: ClassVar[str] = ""
 
     def __init__(self, options: Any) -> None:
-        """`options` is an instance of this class's `Options`."""
+        """`options`: an instance of this class's `Options`, checked. No device is asked here: there is no line yet."""
         self.options = options
 
     @property
     @abstractmethod
     def channels(self) -> Sequence[Channel]:
-        """What one `read` delivers, in order."""
+        """What one `read` delivers, in this order; the same for the life of the object."""
 
     @abstractmethod
     def read(self, line: LineT) -> Sequence[Reading]:
-        """Poll the device once: one reading per channel, in their order, each with its own time.
+        """Poll the device once.
 
-        Raises LineFault where the poll as a whole failed.
+        Returns one reading per channel, in their order, each with its own time and quality.
+        Raises LineFault where the poll as a whole failed. Any other exception is reported as a defect of the driver.
         """
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
-        """(bytes sent, bytes received) of every exchange that one `read` makes, for planning; None = unknown.
+        """(bytes sent, bytes received) of every exchange that one `read` makes, for planning lines; None = unknown.
 
-        For a driver on registers: as on an RTU line, with address and checksum.
+        For a driver on registers these are the bytes on an RTU line, with address and checksum.
         """
         return None

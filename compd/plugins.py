@@ -1,4 +1,8 @@
-"""Drivers, their simulators and effects, found by entry point or by path: there is no central list."""
+"""Drivers, their simulators and effects, found by entry point or by path: there is no central list.
+
+Gauges that are pure description come from folders of presets, which packages offer in the group `compd.gauge_presets`:
+each preset is a driver and a simulated device of its own name.
+"""
 
 from __future__ import annotations
 
@@ -8,48 +12,85 @@ import stat
 import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
 
 GAUGES = "compd.gauges"
 SIMULATED_GAUGES = "compd.simulated_gauges"
+GAUGE_PRESETS = "compd.gauge_presets"
 EFFECTS = "compd.effects"
 _KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effect"}
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
 
 
+class PresetFolder(Protocol):
+    """What an entry point in `compd.gauge_presets` stands for: a folder of described gauges."""
+
+    def names(self) -> list[str]:
+        """Of all presets in it."""
+        ...
+
+    def driver(self, name: str) -> type:
+        """The driver that the preset `name` describes. Raises CompdError for a description that cannot be used."""
+        ...
+
+    def simulated_device(self, name: str) -> type:
+        """Its simulated device, from the same description."""
+        ...
+
+
 def names(group: str) -> list[str]:
-    """Names that installed packages offer in `group`, sorted."""
-    return sorted({point.name for point in entry_points(group=group)})
+    """Names that installed packages offer in `group`, presets among them, sorted."""
+    return sorted({point.name for point in entry_points(group=group)} | _preset_folders(group).keys())
 
 
 def load(group: str, name: str, where: str) -> Any:
-    """What `name` stands for, a class or an effect: an entry point's name, or /absolute/file.py:Name.
+    """What `name` stands for, a class or an effect: an entry point's name, a preset's, or /absolute/file.py:Name.
 
-    Raises PluginError, which names `where` and lists what there is.
+    Raises PluginError, which names `where` and lists what there is; ConfigurationError for a preset whose
+    description cannot be used.
     """
     if match := _PATH.match(name):
         return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group))
     points: dict[str, EntryPoint] = {point.name: point for point in entry_points(group=group)}
-    if name not in points:
-        raise PluginError(
-            Problem(
-                where=where,
-                what=f"no such {_KIND.get(group, group)}",
-                value=name,
-                allowed=", ".join(sorted(points)) or "none installed",
-                next_step="choose one of these, or write /absolute/file.py:Name",
-            )
+    if name in points:
+        return _load_point(points[name], where)
+    folders = _preset_folders(group)
+    if name in folders:
+        return folders[name].driver(name) if group == GAUGES else folders[name].simulated_device(name)
+    raise PluginError(
+        Problem(
+            where=where,
+            what=f"no such {_KIND.get(group, group)}",
+            value=name,
+            allowed=", ".join(sorted(points.keys() | folders.keys())) or "none installed",
+            next_step="choose one of these, or write /absolute/file.py:Name",
         )
+    )
+
+
+def _preset_folders(group: str) -> dict[str, PresetFolder]:
+    """Every preset's name with the folder that holds it; of two with one name, the first package's counts."""
+    if group not in (GAUGES, SIMULATED_GAUGES):
+        return {}
+    folders: dict[str, PresetFolder] = {}
+    for point in entry_points(group=GAUGE_PRESETS):
+        folder: PresetFolder = _load_point(point, GAUGE_PRESETS)
+        for name in folder.names():
+            folders.setdefault(name, folder)
+    return folders
+
+
+def _load_point(point: EntryPoint, where: str) -> Any:
     try:
-        return points[name].load()
+        return point.load()
     except (ImportError, AttributeError, SyntaxError) as error:
         raise PluginError(
             Problem(
                 where=where,
-                what=f"{points[name].value} cannot be loaded: {error}",
-                value=name,
+                what=f"{point.value} cannot be loaded: {error}",
+                value=point.name,
                 next_step="reinstall the package that offers it",
             )
         ) from error

@@ -22,11 +22,11 @@ from compd.live.loop.model_loader import ModelLoader, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import State
 from compd.live.pipeline import build_pipeline
-from compd.live.service.messages import PROTOCOL, TargetKeys
+from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.requests import Requests
+from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
@@ -78,7 +78,6 @@ class Daemon:
         }
         report = StatusReport(
             version,
-            configuration,
             self.latest,
             self._wires,
             self.commands,
@@ -97,9 +96,9 @@ class Daemon:
             keys,
             self.commands,
             report.message,
-            self._zero_taker.take,
+            self._zero_taker.start,
             ReadingsMessage(self._wires, self.latest.channels, directions),
-            self._model_adopter.take,
+            self._model_adopter.start,
         )
         self._state: State | None = None
 

@@ -1,19 +1,24 @@
-"""Analogue input modules on Modbus: which input, its range, and the curve from V or mA to what is measured."""
+"""Analogue input modules on Modbus: which input, its range, and the curve from V or mA to what is measured.
+
+A preset describes the module itself in its section `inputs`; what is wired to it is the person's to say.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic.fields import FieldInfo
 
-from compd.gauge import GaugeOptions, Unit
+from compd.gauge import Unit
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.modbus import ModbusOptions
+from compd_drivers.modbus import Address, Function, RegisterType, Status
 
 INPUTS = 8  # of every module that is described here
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
+RangeName = Literal["+-10V", "+-5V", "+-1V", "+-500mV", "+-150mV", "0-10V", "+-20mA", "0-20mA", "4-20mA"]
 
 
 class Span(NamedTuple):
@@ -37,10 +42,12 @@ SPANS: Mapping[str, Span] = {
 }
 
 
-class AnalogueInput(BaseModel):
-    """One input that is wired to a sensor."""
-
+class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AnalogueInput(_Section):
+    """One input that is wired to a sensor."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     input: int = Field(ge=0, lt=INPUTS, description="the module's input, from 0")
@@ -50,30 +57,108 @@ class AnalogueInput(BaseModel):
     highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
 
 
-class ModuleOptions(GaugeOptions):
-    """Options of every module: where it is."""
+class AnalogueData(_Section):
+    """How the module gives an input's signal."""
 
-    unit: int = Field(ge=1, le=247, description="slave address")
-
-
-def register_map(options: ModuleOptions, channels: Sequence[Mapping[str, Any]]) -> ModbusOptions:
-    """The module as the generic Modbus driver knows it: `channels` as under its key of that name."""
-    return ModbusOptions.model_validate(
-        {"driver": options.driver, "line": options.line, "unit": options.unit, "channels": channels}
+    type: RegisterType = Field(description="how the number is stored")
+    counts: tuple[int, int] | None = Field(
+        default=None, description="raw numbers at the lower and the upper end of the range; left out: V or mA itself"
     )
+    ranges: tuple[RangeName, ...] = Field(default=(), description="the ranges to which an input may be set")
+    invalid: tuple[Number, ...] = Field(default=(), description="raw numbers that mean: no value")
+    over_range: tuple[Number, ...] = Field(default=(), description="raw numbers that mean: at or above full scale")
+    under_range: tuple[Number, ...] = Field(default=(), description="raw numbers that mean: at or below zero scale")
+
+    @model_validator(mode="after")
+    def _check_counts(self) -> Self:
+        if (self.counts is None) != (not self.ranges):
+            raise ValueError("`counts` and `ranges` belong together")
+        return self
+
+    def channel(self, range_name: str | None) -> dict[str, Any]:
+        """Type, special numbers, scale and offset: signal = low + (raw - counts[0]) (high - low) / (counts[1] -
+        counts[0])."""
+        channel: dict[str, Any] = {
+            "type": self.type,
+            "invalid": self.invalid,
+            "over_range": self.over_range,
+            "under_range": self.under_range,
+        }
+        if self.counts is not None and range_name is not None:
+            _, low, high = SPANS[range_name]
+            first, last = self.counts
+            channel["scale"] = (high - low) / (last - first)
+            channel["offset"] = low - first * channel["scale"]
+        return channel
 
 
-def check_inputs(inputs: Sequence[AnalogueInput]) -> None:
+class AnalogueModule(_Section):
+    """The registers of a module of eight inputs."""
+
+    function: Function = Field(description="3: holding registers, 4: input registers")
+    address: Address = Field(description="register of input 0, from 0")
+    step: int = Field(default=1, ge=1, description="registers from one input to the next")
+    status: Status | None = Field(default=None, description="status register of input 0; the others follow one by one")
+    data: tuple[AnalogueData, ...] = Field(min_length=1, description="how the signal is given, by range")
+
+    @property
+    def ranges(self) -> tuple[RangeName, ...]:
+        """All that an input may be set to; none where the module gives V or mA itself."""
+        return tuple(name for data in self.data for name in data.ranges)
+
+    def field(self, model_name: str) -> tuple[Any, FieldInfo]:
+        """Annotation and field of the option `channels`, for pydantic."""
+        model: Any = AnalogueInput
+        if self.ranges:
+            choice: Any = Literal[self.ranges]
+            setting = Field(description="what the input is set to in the module")
+            model = create_model(
+                f"{model_name}Input", __base__=_RangedInput, __module__=__name__, range=(choice, setting)
+            )
+        inputs: Any = Annotated[tuple[model, ...], AfterValidator(_check_once)]
+        return inputs, Field(min_length=1, description="the inputs that are wired")
+
+    def channels(self, inputs: Sequence[AnalogueInput]) -> list[dict[str, Any]]:
+        """`channels` of the driver `modbus` for the inputs that are wired."""
+        return [self._channel(wired) for wired in inputs]
+
+    def _channel(self, wired: AnalogueInput) -> dict[str, Any]:
+        range_name = wired.range if isinstance(wired, _RangedInput) else None
+        data = next(data for data in self.data if range_name is None or range_name in data.ranges)
+        channel = {
+            "name": wired.name,
+            "function": self.function,
+            "address": self.address + self.step * wired.input,
+            "linearisation": wired.linearisation,
+            "unit": wired.unit,
+            "lowest": wired.lowest,
+            "highest": wired.highest,
+            **data.channel(range_name),
+        }
+        if self.status is not None:
+            channel["status"] = self.status.model_copy(update={"address": self.status.address + wired.input})
+        return channel
+
+
+class _RangedInput(AnalogueInput):
+    """An input whose range is set in the module; a model made from this one says which ranges the module has."""
+
+    range: str
+
+    @model_validator(mode="after")
+    def _check_signal(self) -> Self:
+        signal = SPANS[self.range].signal
+        if self.linearisation.signal != signal:
+            raise ValueError(
+                f"{self.name}: range {self.range} delivers {signal}, the linearisation wants "
+                f"{self.linearisation.signal}"
+            )
+        return self
+
+
+def _check_once(inputs: tuple[AnalogueInput, ...]) -> tuple[AnalogueInput, ...]:
     """ValueError for an input that stands twice."""
-    numbers = [one.input for one in inputs]
+    numbers = [wired.input for wired in inputs]
     if doubled := sorted({number for number in numbers if numbers.count(number) > 1}):
         raise ValueError(f"input {doubled[0]} stands twice")
-
-
-def check_span(one: AnalogueInput, span: str) -> None:
-    """ValueError where the linearisation begins with another signal than the input's range delivers."""
-    signal = SPANS[span].signal
-    if one.linearisation.signal != signal:
-        raise ValueError(
-            f"{one.name}: range {span} delivers {signal}, the linearisation wants {one.linearisation.signal}"
-        )
+    return inputs

@@ -1,7 +1,8 @@
 """Generic binary gauge: a request, and a reply of fixed length with a checksum, described in the configuration.
 
 `frame` is the reply byte by byte, as a manual draws it: hexadecimal bytes that are always so, `..` for a byte that
-may be anything, `CS` for each byte of the checksum. `at` counts from 0. Micro-Epsilon MSC7401, appendix 4.4.4:
+may be anything, `CS` for each byte of the checksum (in `out`, too, with an `out_checksum`). `at` counts from 0.
+Micro-Epsilon MSC7401, appendix 4.4.4:
 
     driver: serial_frame
     line: rs485
@@ -29,7 +30,7 @@ from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quali
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
-from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -74,11 +75,18 @@ class FrameChecksum(BaseModel):
     )
     byte_order: Literal["little", "big"] = Field(default="little", description="of a checksum of two bytes")
 
-    def fits(self, data: bytes, place: slice) -> bool:
-        """Whether the bytes at `place` are the checksum of what it covers."""
-        said = data[place]
-        made = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
-        return said == (made if self.byte_order == "little" else made[::-1])
+    def of(self, data: bytes, place: slice) -> bytes:
+        """The checksum that belongs at `place` of `data`."""
+        checksum = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
+        return checksum if self.byte_order == "little" else checksum[::-1]
+
+    def check(self, frame: Frame, key: str) -> None:
+        """ValueError where `frame`, the option `key`, has no place for this checksum."""
+        length = frame.checksum.stop - frame.checksum.start
+        if length != CHECKSUMS[self.kind].length:
+            raise ValueError(f"`{key}` has {length} bytes CS, its checksum makes {CHECKSUMS[self.kind].length}")
+        if not self.first < (self.end or frame.checksum.start) <= len(frame.fixed):
+            raise ValueError(f"the checksum of `{key}` covers nothing: see `first` and `end`")
 
 
 class FrameChannel(MeasuredChannel):
@@ -87,7 +95,7 @@ class FrameChannel(MeasuredChannel):
     at: Annotated[int, Field(ge=0)] = Field(description="its first byte, from 0")
     type: NumberType
     byte_order: Literal["little", "big"] = Field(default="little", description="of a number in several bytes")
-    invalid: dict[float, SaidQuality] = Field(default={}, description="numbers that are none, and what they mean")
+    invalid: dict[float, ReplyQuality] = Field(default={}, description="numbers that are none, and what they mean")
 
     @property
     def length(self) -> int:
@@ -109,7 +117,7 @@ class ErrorFrame(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     frame: str = Field(description="its bytes, as in `frame`")
-    quality: SaidQuality = Field(description="what it means")
+    quality: ReplyQuality = Field(description="what it means")
     says: str = Field(default="", description="in words, for the status")
 
 
@@ -117,6 +125,9 @@ class SerialFrameOptions(ExchangeOptions):
     """Options of a described binary gauge."""
 
     out: str = Field(min_length=2, description="the request in hexadecimal bytes, its checksum included")
+    out_checksum: FrameChecksum | None = Field(
+        default=None, description="how `CS` in `out` is made, where it is not written out"
+    )
     frame: str = Field(min_length=2, description="the reply: hexadecimal bytes, `..` for any, `CS` for the checksum")
     checksum: FrameChecksum | None = Field(default=None, description="how `CS` is made")
     channels: tuple[FrameChannel, ...] = Field(min_length=1)
@@ -124,17 +135,18 @@ class SerialFrameOptions(ExchangeOptions):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        if doubled := twice([channel.name for channel in self.channels]):
+        if doubled := repeated([channel.name for channel in self.channels]):
             raise ValueError(f"channel named twice: {doubled}")
-        bytes.fromhex(self.out)
+        if self.out_checksum is None:
+            bytes.fromhex(self.out)
+        else:
+            self.out_checksum.check(Frame.of(self.out), "out")
         frame = Frame.of(self.frame)
-        place = frame.checksum
-        needed = CHECKSUMS[self.checksum.kind].length if self.checksum else 0
-        if place.stop - place.start != needed:
-            raise ValueError(f"`frame` has {place.stop - place.start} bytes CS, `checksum` makes {needed}")
-        if self.checksum and not self.checksum.first < (self.checksum.end or place.start) <= len(frame.fixed):
-            raise ValueError("`checksum` covers nothing: see `first` and `end`")
-        if not self.checksum and sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
+        if self.checksum is not None:
+            self.checksum.check(frame, "frame")
+        elif frame.checksum.stop:
+            raise ValueError("`frame` has bytes CS, `checksum` must say how they are made")
+        elif sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
             raise ValueError(f"a frame without a checksum needs {FEWEST_FIXED_BYTES} fixed bytes to be known by")
         for channel in self.channels:
             if channel.at + channel.length > len(frame.fixed):
@@ -146,6 +158,16 @@ class SerialFrameOptions(ExchangeOptions):
             if all(None in (a, b) or a == b for a, b in zip(short, frame.fixed, strict=False)):
                 raise ValueError(f"error {error.frame!r} could be the beginning of a reply")
         return self
+
+    @property
+    def request(self) -> bytes:
+        """What is sent, its checksum included."""
+        if self.out_checksum is None:
+            return bytes.fromhex(self.out)
+        frame = Frame.of(self.out)
+        request = bytes(byte or 0 for byte in frame.fixed)
+        checksum = self.out_checksum.of(request, frame.checksum)
+        return request[: frame.checksum.start] + checksum + request[frame.checksum.stop :]
 
 
 class SerialFrame(Gauge[ByteLine]):
@@ -173,8 +195,8 @@ class SerialFrame(Gauge[ByteLine]):
 
     def __init__(self, options: SerialFrameOptions) -> None:
         super().__init__(options)
-        self._said = options
-        self._request = bytes.fromhex(options.out)
+        self._protocol = options
+        self._request = options.request
         self._frame = Frame.of(options.frame)
         self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
         self._channels = tuple(channel.channel for channel in options.channels)
@@ -196,18 +218,19 @@ class SerialFrame(Gauge[ByteLine]):
     def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         data, error = self._receive(line)
-        nothing_behind(line, self._said, data)
+        nothing_behind(line, self._protocol, data)
         if error is not None:
             detail = f"{data.hex(' ')}: {error.says}" if error.says else data.hex(" ")
             return [bad(time_s, Quality(error.quality), detail)] * len(self._channels)
-        if self._said.checksum and not self._said.checksum.fits(data, self._frame.checksum):
+        place = self._frame.checksum
+        if self._protocol.checksum and data[place] != self._protocol.checksum.of(data, place):
             raise LineFault(Quality.CRC, data.hex(" "))
         if not self._frame.fits(data):
-            raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._said.frame}")
-        return [_reading(channel, data, time_s) for channel in self._said.channels]
+            raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._protocol.frame}")
+        return [_reading(channel, data, time_s) for channel in self._protocol.channels]
 
     def _rest(self, line: ByteLine, count: int, so_far: bytes) -> bytes:
-        gap_s = self._said.gap_timeout_s
+        gap_s = self._protocol.gap_timeout_s
         return following(line, count if gap_s is None else 1, gap_s, so_far)
 
     def _receive(self, line: ByteLine) -> tuple[bytes, ErrorFrame | None]:
@@ -215,7 +238,7 @@ class SerialFrame(Gauge[ByteLine]):
         data = b""
         for length in sorted({len(frame.fixed) for frame in (self._frame, *(frame for frame, _ in self._errors))}):
             if not data:
-                data = receive(line, self._said, length)
+                data = receive(line, self._protocol, length)
             while len(data) < length:
                 data += self._rest(line, length - len(data), data)
             for frame, error in self._errors:

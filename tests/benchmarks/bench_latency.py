@@ -18,9 +18,8 @@ from compd.clock import MonotonicClock
 from compd.configuration.operation import LoopSettings, SocketSettings
 from compd.gauge import good
 from compd.live.loop.loop import Loop
-from compd.live.service.messages import TargetKeys
 from compd.live.service.publisher import Publisher
-from compd.live.service.requests import Requests
+from compd.live.service.requests import Requests, TargetKeys
 from compd.live.systemd import Notifier
 from tests.benchmarks.figures import median_and_p99, quiet, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine

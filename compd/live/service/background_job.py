@@ -1,4 +1,4 @@
-"""Work that a client asked for and that neither loop nor publisher waits for: one piece at a time."""
+"""Work that takes longer than the publisher may: it runs on a thread of its own and answers the client when done."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ from compd.live.service.messages import ErrorCode, ProtocolError
 
 
 class BackgroundJob:
-    """A thread per piece of work. It is free again before the answer goes out: whoever has it may ask at once."""
+    """Runs one piece of work at a time. It is free again before the answer goes out, so that the client that has the
+    answer may ask at once for the next one."""
 
-    def __init__(self, name: str, busy: str) -> None:
-        """`busy` : what a client is told that asks too early."""
+    def __init__(self, name: str, busy_text: str) -> None:
+        """`name`: the thread's; `busy_text`: the error's text for a client that asks while work is running."""
         self._name = name
-        self._busy = busy
+        self._busy_text = busy_text
         self._running = False
         self._thread: threading.Thread | None = None
 
-    def begin(self, work: Callable[[], bytes], answer: Callable[[bytes], None]) -> None:
-        """Start `work`; `answer` gets the line that it returns. Raises ProtocolError while one is running."""
+    def start(self, work: Callable[[], bytes], answer: Callable[[bytes], None]) -> None:
+        """Start `work`; `answer` gets the line that it returns. Raises ProtocolError while other work is running."""
         if self._running:
-            raise ProtocolError(ErrorCode.BUSY, self._busy)
+            raise ProtocolError(ErrorCode.BUSY, self._busy_text)
         self._running = True
         self._thread = threading.Thread(target=self._run, args=(work, answer), name=self._name, daemon=True)
         self._thread.start()
 
     def join(self) -> None:
-        """Returns when nothing is running."""
+        """Return when nothing is running."""
         if self._thread is not None:
             self._thread.join()
 

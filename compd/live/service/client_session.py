@@ -1,4 +1,4 @@
-"""One client's connection: bytes in and out, nothing waited for."""
+"""One client's connection: splits what it sends into lines, and sends it what it asked for, without ever waiting."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ from collections.abc import Callable, Iterator
 from compd.live.loop.setpoint import Setpoint
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
 
-# About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind reads the past.
+# About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind acts on old setpoints.
 MAX_BEHIND_BYTES = 128 * 1024
-# About 1500 READINGS: 1.5 s at 1 kHz. Who watches them wants the past, and they are for this computer alone.
+# About 1500 READINGS: 1.5 s at 1 kHz. A recorder needs all of them, however late, and runs on this computer.
 MAX_READINGS_BEHIND_BYTES = 8 * 1024 * 1024
 _RECEIVE_BYTES = 4096
 _LONGEST_INTERVAL_S = 1e6
 
 
 class ClientSession:
-    """A connected client. Only the publisher's thread touches it."""
+    """A connected client; used by the publisher's thread alone.
+
+    Attributes
+    ----------
+    open : False once the connection has ended.
+    due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
+    encode : makes the message of a setpoint that this client watches.
+    """
 
     def __init__(self, connection: socket.socket, name: str, local: bool) -> None:
-        """`local`: came over the Unix socket, from this computer."""
+        """`name`: of the other end, for the log; `local`: connected over the Unix socket, from this computer."""
         connection.setblocking(False)
         self.connection = connection
         self.name = name
@@ -32,27 +39,36 @@ class ClientSession:
         self._interval_s = math.inf
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
-        self._skipping = False
-        self._waiting = bytearray()
+        self._skipping_line = False
+        self._unsent = bytearray()
 
     def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes], max_behind_bytes: int) -> None:
-        """From now on `rate_hz` setpoints per second, as `encode` writes them: inf for every one, 0 for none."""
+        """Send `rate_hz` setpoints per second from now on, each made by `encode`: inf for every one, 0 for none.
+
+        A client with more than `max_behind_bytes` unsent is dropped.
+        """
         self.encode = encode
         self._max_behind_bytes = max_behind_bytes
         self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
 
-    def takes(self, time_s: float, half_period_s: float) -> bool:
-        """Whether the setpoint of `time_s` is this client's next one."""
+    def take(self, time_s: float, half_period_s: float) -> bool:
+        """Whether the setpoint of `time_s` is the one that is due; the next is then due an interval later.
+
+        Half a period of tolerance keeps a rate that divides the loop's even, whatever the jitter of its times.
+        """
         if time_s < self.due_s - half_period_s:
             return False
         self.due_s += self._interval_s
-        if self.due_s < time_s:  # the first one, or an interval was missed: count from here
+        if self.due_s < time_s:  # the first setpoint, or an interval was missed: count from this one
             self.due_s = time_s + self._interval_s
         return True
 
     def receive(self) -> Iterator[bytes | ProtocolError]:
-        """Whole lines that have come, and an error for each that is too long. Closes at the end of the stream."""
+        """Yield the whole lines that have arrived, and an error for each that is too long.
+
+        `open` is False afterwards when the stream has ended.
+        """
         try:
             data = self.connection.recv(_RECEIVE_BYTES)
         except BlockingIOError:
@@ -66,42 +82,43 @@ class ClientSession:
         *lines, rest = self._received.split(b"\n")
         self._received = rest
         for line in lines:
-            if self._skipping:
-                self._skipping = False
+            if self._skipping_line:
+                self._skipping_line = False
             elif len(line) > MAX_LINE_BYTES:
                 yield _too_long()
             elif line.strip():
                 yield bytes(line)
         if len(rest) > MAX_LINE_BYTES:
             self._received = bytearray()
-            if not self._skipping:
-                self._skipping = True
+            if not self._skipping_line:
+                self._skipping_line = True
                 yield _too_long()
 
     def send(self, data: bytes) -> bool:
-        """Send now what the system takes and keep the rest; False when the client is too far behind."""
-        if len(self._waiting) + len(data) > self._max_behind_bytes:
+        """Send what the system takes at once and keep the rest; False when the client is too far behind."""
+        if len(self._unsent) + len(data) > self._max_behind_bytes:
             return False
-        self._waiting += data
+        self._unsent += data
         self.flush()
         return True
 
     def flush(self) -> None:
-        """Send what waits, as far as the system takes it."""
+        """Send what is unsent, as far as the system takes it."""
         try:
-            while self._waiting:
-                del self._waiting[: self.connection.send(self._waiting)]
+            while self._unsent:
+                del self._unsent[: self.connection.send(self._unsent)]
         except BlockingIOError:
             return
         except OSError:
             self.open = False
 
     @property
-    def behind(self) -> bool:
-        """Something waits to be sent."""
-        return bool(self._waiting)
+    def has_unsent(self) -> bool:
+        """Whether bytes wait until the system takes them."""
+        return bool(self._unsent)
 
     def close(self) -> None:
+        """Close the connection."""
         self.open = False
         self.connection.close()
 

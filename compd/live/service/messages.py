@@ -1,30 +1,36 @@
-"""The socket's messages: one JSON object per line. Here they are read and checked; nothing here does I/O."""
+"""The wire format of the daemon's sockets: one JSON object per line, with its name under "class".
+
+Every message, in both directions, is one line of UTF-8 that ends with a newline. There is no null and no NaN: what is
+unknown is left out. What a client may send is declared in `compd.live.service.requests`; what the daemon sends is made
+by `Setpoint.to_json`, `ReadingsMessage`, `StatusReport` and the answers to the requests.
+"""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
+
+from pydantic import ValidationError
 
 from compd.json_text import encode_compact
-from compd.live.loop.commands import Target
 
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096
 # 1e9 mm is 1000 km: a number beyond it is not a coordinate, a rate or an angle.
-_LARGEST_NUMBER = 1e9
+LARGEST_NUMBER = 1e9
+# How much of a faulty text is repeated in an error.
+QUOTED_CHARACTERS = 40
 
 
 class ErrorCode(StrEnum):
-    """What was wrong with a message."""
+    """What was wrong with a request: `code` of an ERROR message."""
 
     BAD_JSON = "bad_json"  # not one JSON object on one line
     LINE_TOO_LONG = "line_too_long"
     UNKNOWN_CLASS = "unknown_class"
-    BAD_MESSAGE = "bad_message"  # a key is missing, unknown, or of the wrong type
+    BAD_MESSAGE = "bad_message"  # a key is missing, unknown, of the wrong type or out of range
     ROLE_TAKEN = "role_taken"  # another client is the controller
     NOT_CONTROLLER = "not_controller"
     UNIX_ONLY = "unix_only"  # asked over TCP for what only the Unix socket allows
@@ -35,7 +41,7 @@ class ErrorCode(StrEnum):
 
 
 class ProtocolError(Exception):
-    """A message that cannot be followed; the connection stays."""
+    """A request that cannot be followed. The client gets an ERROR message, and its connection stays open."""
 
     def __init__(self, code: ErrorCode, text: str) -> None:
         super().__init__(text)
@@ -47,31 +53,22 @@ class ProtocolError(Exception):
         return line({"class": "ERROR", "code": self.code, "text": self.text})
 
 
-@dataclass(frozen=True)
-class TargetKeys:
-    """What a TARGET carries on this machine: `tip` is tip_B0_mm, or tip_P_mm with the tool on the plate."""
+class ParsedLine(NamedTuple):
+    """One line from a client: the request's name, and its other keys, not yet checked."""
 
-    tip: str
-    rotation: bool  # a hexapod's attitude may be given as rotation_B0_rad
-
-
-@dataclass(frozen=True)
-class ModelOrder:
-    """Which model file to adopt, or to run as a shadow; file "" is none."""
-
-    file: str
-    shadow: bool
+    name: str
+    keys: dict[str, Any]
 
 
 def line(message: Mapping[str, Any]) -> bytes:
-    """One message as it goes over the wire."""
+    """Encode one message, with its newline. Raises ValueError for a number that is not finite."""
     return encode_compact(message).encode() + b"\n"
 
 
-def parse(data: bytes) -> dict[str, Any]:
-    """One line (without its newline) to a message with a known type of `class`.
+def parse(data: bytes) -> ParsedLine:
+    """Decode one line, given without its newline.
 
-    Raises ProtocolError for anything that is not one JSON object with a text `class`.
+    Raises ProtocolError for anything that is not one JSON object with a text under "class".
     """
     try:
         message = json.loads(data.decode("utf-8"), parse_constant=_refuse_constant)
@@ -79,77 +76,53 @@ def parse(data: bytes) -> dict[str, Any]:
         raise ProtocolError(ErrorCode.BAD_JSON, f"not a JSON object: {error}") from error
     if not isinstance(message, dict):
         raise ProtocolError(ErrorCode.BAD_JSON, f"not a JSON object but {type(message).__name__}")
-    if not isinstance(message.get("class"), str):
+    name = message.pop("class", None)
+    if not isinstance(name, str):
         raise ProtocolError(ErrorCode.BAD_MESSAGE, 'needs "class", a text')
-    return message
-
-
-def parse_watch(message: Mapping[str, Any]) -> tuple[float, bool]:
-    """WATCH: how many per second (inf for every one, 0 for none), and whether of the readings, not the setpoints."""
-    _only(message, ("rate_hz", "what"))
-    what = message.get("what", "setpoints")
-    if what not in ("setpoints", "readings"):
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"what is {str(what)[:40]!r}, allowed: setpoints, readings")
-    readings = what == "readings"
-    if "rate_hz" not in message:
-        return math.inf, readings
-    rate_hz = _number(message["rate_hz"], "rate_hz")
-    if rate_hz < 0:
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"rate_hz is {rate_hz:g}, allowed 0 or more")
-    return rate_hz, readings
-
-
-def parse_target(message: Mapping[str, Any], keys: TargetKeys) -> Target:
-    """TARGET for a machine that takes `keys`."""
-    _only(message, (keys.tip, "rotation_B0_rad") if keys.rotation else (keys.tip,))
-    if keys.tip not in message:
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"needs {keys.tip}, three numbers")
-    rotation = message.get("rotation_B0_rad")
-    return Target(
-        _vector(message[keys.tip], keys.tip), None if rotation is None else _vector(rotation, "rotation_B0_rad")
-    )
-
-
-def parse_model(message: Mapping[str, Any]) -> ModelOrder | None:
-    """MODEL with an order; None for the bare question."""
-    _only(message, ("file", "shadow"))
-    if set(message) == {"class"}:
-        return None
-    file, shadow = message.get("file"), message.get("shadow", False)
-    if not isinstance(file, str) or not isinstance(shadow, bool):
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, "needs file, a text (shadow: true or false)")
-    if file and not file.startswith("/"):
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f'file is {file[:200]!r}, allowed: an absolute path, or "" for none')
-    return ModelOrder(file, shadow)
-
-
-def parse_bare(message: Mapping[str, Any]) -> None:
-    """A message that is its class alone: STATUS, RELEASE, ZERO."""
-    _only(message, ())
+    return ParsedLine(name, message)
 
 
 def _refuse_constant(name: str) -> NoReturn:
+    """NaN and Infinity, which Python's decoder would accept, are no JSON."""
     raise ValueError(f"{name} is no number")
 
 
-def _only(message: Mapping[str, Any], keys: tuple[str, ...]) -> None:
-    unknown = sorted(set(message) - {"class", *keys})
-    if unknown:
-        allowed = ", ".join(keys) or "none"
-        raise ProtocolError(
-            ErrorCode.BAD_MESSAGE, f"{message['class']}: unknown key {unknown[0][:40]!r}, allowed: {allowed}"
-        )
+def bad_message(error: ValidationError, name: str, allowed: tuple[str, ...]) -> ProtocolError:
+    """The error for keys that a request's model refused: the first of pydantic's, an unknown key before all others.
+
+    name : the request's class; allowed : the keys that it has on this machine.
+    """
+    details = error.errors(include_url=False)
+    detail = next((detail for detail in details if detail["type"] == "extra_forbidden"), details[0])
+    value, context = detail["input"], detail.get("ctx", {})
+    if not detail["loc"] and detail["type"] == "string_unicode":  # the key itself
+        return unknown_key(name, str(value), allowed)
+    key = str(detail["loc"][0]) if detail["loc"] else name
+    quoted = repr(value)[:QUOTED_CHARACTERS]
+    match detail["type"]:
+        case "extra_forbidden":
+            return unknown_key(name, key, allowed)
+        case "value_error":
+            text = detail["msg"].removeprefix("Value error, ")
+        case "int_type" | "float_type":
+            text = f"{key} must be a number, is {type(value).__name__}"
+        case "list_type" | "too_short" | "too_long":
+            text = f"{key} must be a list of three numbers"
+        case "greater_than_equal" if context["ge"] == 0:
+            text = f"{key} is {quoted}, allowed 0 or more"
+        case "greater_than_equal" | "less_than_equal":
+            text = f"{key} must be within +-{LARGEST_NUMBER:g}"
+        case "literal_error":
+            allowed_texts = context["expected"].replace("'", "").replace(" or ", ", ")
+            text = f"{key} is {quoted}, allowed: {allowed_texts}"
+        case _:
+            text = f"{key} is {quoted}: {detail['msg']}"
+    return ProtocolError(ErrorCode.BAD_MESSAGE, text)
 
 
-def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"{name} must be a number, is {type(value).__name__}")
-    if not -_LARGEST_NUMBER <= value <= _LARGEST_NUMBER:  # compares huge integers without converting them
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"{name} must be within +-{_LARGEST_NUMBER:g}")
-    return float(value)
-
-
-def _vector(value: Any, name: str) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != 3:
-        raise ProtocolError(ErrorCode.BAD_MESSAGE, f"{name} must be a list of three numbers")
-    return tuple(_number(part, name) for part in value)
+def unknown_key(name: str, key: str, allowed: tuple[str, ...]) -> ProtocolError:
+    """The error for a key that a request does not have."""
+    return ProtocolError(
+        ErrorCode.BAD_MESSAGE,
+        f"{name}: unknown key {key[:QUOTED_CHARACTERS]!r}, allowed: {', '.join(allowed) or 'none'}",
+    )

@@ -1,4 +1,4 @@
-"""Adopting a model file, or running it as a shadow: read and tried on a thread of its own, then handed to the loop."""
+"""Adopting a model file, or running it as a shadow, while the loop goes on with the model that it has."""
 
 from __future__ import annotations
 
@@ -11,44 +11,50 @@ from compd.errors import CompdError
 from compd.live.loop.commands import Commands
 from compd.live.loop.model_loader import LiveModel, ModelLoader, Models
 from compd.live.service.background_job import BackgroundJob
-from compd.live.service.messages import ErrorCode, ModelOrder, ProtocolError, line
+from compd.live.service.messages import ErrorCode, ProtocolError, line
 
 _log = structlog.get_logger()
 
 
 class ModelSwitch:
-    """Takes one order at a time, and is the only writer of `commands.models`: neither loop nor publisher waits."""
+    """Reads and tries a model file on a thread of its own, then hands it to the loop. One file at a time.
+
+    It is the only writer of `Commands.models`.
+    """
 
     def __init__(self, loader: ModelLoader, commands: Commands) -> None:
         self._loader = loader
         self._commands = commands
-        self._errand = BackgroundJob("model", "another model is being read")
+        self._job = BackgroundJob("model", "another model is being read")
 
-    def take(self, order: ModelOrder, answer: Callable[[bytes], None]) -> None:
-        """Start; `answer` gets the MODEL or ERROR line when it is done. Raises ProtocolError while one is running."""
-        self._errand.begin(lambda: self._taken(order), answer)
+    def start(self, file: str, shadow: bool, answer: Callable[[bytes], None]) -> None:
+        """Begin to switch to the model in `file`, "" for none; `answer` gets the MODEL or ERROR line when it is done.
+
+        shadow : compute this model's correction and do not apply it. Raises ProtocolError while another is being read.
+        """
+        self._job.start(lambda: self._switch(file, shadow), answer)
 
     def stop(self) -> None:
-        """Returns when nothing is being read."""
-        self._errand.join()
+        """Return when nothing is being read."""
+        self._job.join()
 
-    def _taken(self, order: ModelOrder) -> bytes:
-        """Do it; the MODEL or ERROR line."""
+    def _switch(self, file: str, shadow: bool) -> bytes:
         try:
-            model = self._loader.read(Path(order.file)) if order.file else None
+            model = self._loader.read(Path(file)) if file else None
         except CompdError as error:
-            _log.warning("model refused", file=order.file, reason=str(error))
+            _log.warning("model refused", file=file, reason=str(error))
             return ProtocolError(ErrorCode.MODEL_REFUSED, str(error)).to_json()
-        models = self._changed(order, model)
+        models = self._next_models(model, shadow)
         self._commands.models = models
-        _log.info("shadow" if order.shadow else "model adopted", file=order.file or "none")
+        _log.info("shadow" if shadow else "model adopted", file=file or "none")
         return line({"class": "MODEL", **models.summary})
 
-    def _changed(self, order: ModelOrder, model: LiveModel | None) -> Models:
-        applied, shadow = self._commands.models or Models(self._loader.without_effects)
-        if order.shadow:
+    def _next_models(self, model: LiveModel | None, shadow: bool) -> Models:
+        """The pair of applied and shadow model with `model` (None: no effects, or no shadow) in its place."""
+        applied, running_shadow = self._commands.models or Models(self._loader.without_effects)
+        if shadow:
             return Models(applied, model)
-        if model is not None and shadow is not None and model.hash == shadow.hash:
-            # the very object that ran as a shadow: its effects keep what they remember
-            return Models(shadow)
-        return Models(model or self._loader.without_effects, shadow)
+        if model is not None and running_shadow is not None and model.hash == running_shadow.hash:
+            # The same object that ran as a shadow: its effects keep their memory.
+            return Models(running_shadow)
+        return Models(model or self._loader.without_effects, running_shadow)

@@ -1,4 +1,8 @@
-"""The publisher: one thread between the loop and its clients. The loop never waits for it, nor it for a client."""
+"""The publisher: one thread between the loop and its clients. The loop never waits for it, and it waits for no client.
+
+The loop calls `deliver` with every setpoint. The publisher's thread takes them from a bounded queue, encodes each once,
+sends it to the clients that are due, and answers their requests.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +20,17 @@ from typing import Any
 import structlog
 
 from compd.configuration.operation import SocketSettings
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import State
 from compd.live.service.client_session import ClientSession
+from compd.live.service.listeners import listen_tcp, listen_unix
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
 
 # Half a second at 1 kHz: longer than any pause of the publisher that is not a fault.
 _QUEUE_LENGTH = 512
 _MAX_CLIENTS = 32
-_SOCKET_MODE = 0o660  # the daemon's user and group
-_BACKLOG = 16
 
 _log = structlog.get_logger()
 
@@ -36,7 +39,8 @@ class Publisher:
     """Listens on the Unix socket and, where configured, on TCP; sends setpoints and answers."""
 
     def __init__(self, sockets: SocketSettings, period_s: float, observe: Callable[[Setpoint], None]) -> None:
-        """`observe` sees the first setpoint of every new state, on this thread: for the log."""
+        """`period_s`: of the loop; `observe` is called with every setpoint that is queued, on the publisher's thread:
+        the first of a new state is always among them, for the log."""
         self._sockets = sockets
         self._half_period_s = period_s / 2
         self._observe = observe
@@ -47,8 +51,8 @@ class Publisher:
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
-        self._requests: Requests | None = None
-        # The loop's side: when somebody wants the next setpoint, and what it last handed over.
+        self._requests: Requests  # from `start` on: it needs the publisher's own figures for STATUS
+        # Read by the loop's thread: when a client is due, and the state of the setpoint that was queued last.
         self._next_due_s = math.inf
         self._last_state: State | None = None
         self.dropped_setpoints = 0
@@ -56,23 +60,23 @@ class Publisher:
         self.tcp_port: int | None = None
 
     def start(self, requests: Requests) -> None:
-        """Listen and serve. Raises DaemonError where an address cannot be had."""
+        """Listen, and serve on a thread of its own. Raises DaemonError where an address cannot be had."""
         self._requests = requests
         try:
             if self._sockets.tcp is not None:
-                listener = _listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
+                listener = listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
                 self.tcp_port = listener.getsockname()[1]
                 self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
-            listener = _listen_unix(Path(self._sockets.unix.path))
+            listener = listen_unix(Path(self._sockets.unix.path))
             self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
         except DaemonError:
             self._close()
             raise
-        self._selector.register(self._wake, selectors.EVENT_READ, self._woken)
+        self._selector.register(self._wake, selectors.EVENT_READ, self._send_queued)
         self._thread.start()
 
     def stop(self) -> None:
-        """Close every connection; returns when the thread has ended."""
+        """Close every connection; return when the thread has ended."""
         self._stop.set()
         os.eventfd_write(self._wake, 1)
         self._thread.join()
@@ -92,9 +96,9 @@ class Publisher:
         return self._thread.is_alive()
 
     def deliver(self, setpoint: Setpoint) -> None:
-        """Called by the loop with every setpoint: queued when someone wants it or the state is new.
+        """Queue a setpoint when a client is due or the state is new; called by the loop with every setpoint.
 
-        When the queue is full the oldest setpoint goes, and is counted.
+        When the queue is full the oldest setpoint is dropped and counted.
         """
         if setpoint.time_s < self._next_due_s - self._half_period_s and setpoint.state is self._last_state:
             return
@@ -109,7 +113,7 @@ class Publisher:
         os.eventfd_write(self._wake, 1)
 
     def summary(self) -> dict[str, Any]:
-        """For STATUS."""
+        """Clients now, and clients and setpoints dropped so far, for STATUS."""
         return {
             "clients": len(self._sessions),
             "dropped_clients": self.dropped_clients,
@@ -136,7 +140,7 @@ class Publisher:
             return
         self._sessions.add(session)
         self._selector.register(connection, selectors.EVENT_READ, partial(self._serve, session))
-        self._send(session, self._desk.version)
+        self._send(session, self._requests.version)
 
     def _serve(self, session: ClientSession, events: int) -> None:
         if events & selectors.EVENT_WRITE:
@@ -144,26 +148,27 @@ class Publisher:
         if events & selectors.EVENT_READ:
             for received in session.receive():
                 reply = self._reply(session, received)
-                self._schedule()  # before the answer: the next setpoint already counts
+                self._schedule()  # before the answer: a client that has it can rely on the next setpoint
                 self._send(session, reply)
-        self._tidy(session)
+        self._update_events(session)
         self._schedule()
 
     def _reply(self, session: ClientSession, received: bytes | ProtocolError) -> bytes:
         if isinstance(received, ProtocolError):
             return received.to_json()
         try:
-            return self._desk.answer(session, received, partial(self._answer_later, session))
+            return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
             return error.to_json()
 
     def _answer_later(self, session: ClientSession, answer: bytes) -> None:
-        """From any thread."""
+        """Hand an answer that took time to the publisher's thread; called from any thread."""
         self._answers.append((session, answer))
         os.eventfd_write(self._wake, 1)
 
-    def _woken(self, _events: int) -> None:
-        """Setpoints or late answers are waiting. Each is encoded once in each way, and only if someone takes it."""
+    def _send_queued(self, _events: int) -> None:
+        """Send the late answers and the setpoints that wait. A setpoint is encoded once per kind of message, and only
+        for a client that is due."""
         os.eventfd_read(self._wake)
         while self._answers:
             self._send(*self._answers.popleft())
@@ -172,14 +177,14 @@ class Publisher:
             self._observe(setpoint)
             encoded: dict[Callable[[Setpoint], bytes], bytes] = {}
             for session in list(self._sessions):
-                if session.takes(setpoint.time_s, self._half_period_s):
+                if session.take(setpoint.time_s, self._half_period_s):
                     if session.encode not in encoded:
                         encoded[session.encode] = session.encode(setpoint)
                     self._send(session, encoded[session.encode])
         self._schedule()
 
     def _schedule(self) -> None:
-        """Tell the loop when somebody wants the next setpoint."""
+        """Note for `deliver` when the next client is due."""
         self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
 
     def _send(self, session: ClientSession, data: bytes) -> None:
@@ -187,80 +192,18 @@ class Publisher:
             self.dropped_clients += 1
             session.open = False
             _log.warning("slow client dropped", client=session.name)
-        self._tidy(session)
+        self._update_events(session)
 
-    def _tidy(self, session: ClientSession) -> None:
-        """Listen for room to write only while something waits; forget a client that has gone."""
+    def _update_events(self, session: ClientSession) -> None:
+        """Ask for room to write only while data wait for this client; forget a client that has gone."""
         if session not in self._sessions:
             return
         if session.open:
-            wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if session.behind else 0)
-            if self._selector.get_key(session.connection).events != wanted:
-                self._selector.modify(session.connection, wanted, partial(self._serve, session))
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if session.has_unsent else 0)
+            if self._selector.get_key(session.connection).events != events:
+                self._selector.modify(session.connection, events, partial(self._serve, session))
             return
         self._sessions.discard(session)
         self._selector.unregister(session.connection)
-        self._desk.left(session)
+        self._requests.release(session)
         session.close()
-
-    @property
-    def _desk(self) -> Requests:
-        assert self._requests is not None, "started"
-        return self._requests
-
-
-def _listen_tcp(host: str, port: int) -> socket.socket:
-    try:
-        return socket.create_server(
-            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET, backlog=_BACKLOG
-        )
-    except OSError as error:
-        raise DaemonError(
-            Problem(
-                where=f"sockets.tcp {host}:{port}",
-                what=f"cannot listen: {error.strerror}",
-                next_step="is another compd running? choose another port, or an address of this computer",
-            )
-        ) from error
-
-
-def _listen_unix(path: Path) -> socket.socket:
-    """A socket that appears complete: it is renamed into place once it listens, over one that a crash left."""
-    arriving = path.with_name(f".{path.name}.new")
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        if _answers(path):
-            raise DaemonError(
-                Problem(
-                    where=f"sockets.unix {path}", what="another daemon is listening here", next_step="stop it first"
-                )
-            )
-        path.parent.mkdir(parents=True, exist_ok=True)
-        arriving.unlink(missing_ok=True)
-        listener.bind(str(arriving))
-        arriving.chmod(_SOCKET_MODE)
-        listener.listen(_BACKLOG)
-        arriving.rename(path)
-    except OSError as error:
-        listener.close()
-        raise DaemonError(
-            Problem(
-                where=f"sockets.unix {path}",
-                what=f"cannot listen: {error.strerror or error}",
-                next_step="give a path in a directory that the daemon's user may write",
-            )
-        ) from error
-    except DaemonError:
-        listener.close()
-        raise
-    return listener
-
-
-def _answers(path: Path) -> bool:
-    """Whether a living process listens there."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        try:
-            probe.connect(str(path))
-        except OSError:
-            return False
-        return True

@@ -1,8 +1,8 @@
-"""READINGS: everything that one cycle computed from, as a line of JSON, and back without losing a bit.
+"""The READINGS message: everything that one cycle computed from, as a line of JSON that is read back bit for bit.
 
-A message stands on its own: it has the cycle's readings, machine zero and target, and what the cycle had from
-the one before it. So any subset of a run can be replayed, however thinly it was recorded. Numbers are written
-in full (the shortest text that reads back as the same float64), where a SETPOINT is rounded.
+A message stands on its own: it has the cycle's readings, machine zero and target, and the state that the cycle had
+from the one before it. So any subset of a run can be replayed, however few of its cycles were recorded. Numbers are
+written in full (the shortest text that reads back as the same float64), while those of a SETPOINT are rounded.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
 
 
 class RecordedCycle(NamedTuple):
-    """One READINGS message: the state and inputs of a cycle, and the SETPOINT line that came out.
+    """A READINGS message read back.
+
+    Attributes
+    ----------
+    state : the state that the cycle had from the one before it.
+    inputs : what the cycle computed from.
+    setpoint_line : the SETPOINT line that it made, with its newline.
 
     The models are None in both: the message has their hashes only.
     """
@@ -37,15 +43,19 @@ class RecordedCycle(NamedTuple):
 
 
 class ReadingsMessage:
-    """Writes a machine's READINGS; `wires` and `channels`: of the loop's snapshots, which `directions` sees."""
+    """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
     def __init__(self, wires: MachineWires, channels: Sequence[str], directions: Directions) -> None:
+        """`channels`: names of a snapshot's readings, in order; `directions`: follows the links in every cycle."""
         self.columns = columns(wires)
         self._channels = tuple(channels)
         self._directions = directions
 
     def line(self, setpoint: Setpoint) -> bytes:
-        """The READINGS line of the cycle that made `setpoint`, with its newline."""
+        """The READINGS line of the cycle that made `setpoint`, with its newline.
+
+        Called with the setpoints of a run in order, since the direction of travel is that of the newest cycle.
+        """
         inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
         assert state is not None, "and its state"
@@ -75,24 +85,24 @@ class ReadingsMessage:
 def columns(wires: MachineWires) -> list[dict[str, Any]]:
     """Which channel is which column of a recording, for the answer to WATCH.
 
-    A length's column is sign * (reading - machine zero), in the unit at the end of its name; a quantity, which has
-    no sign here, is recorded as it is read.
+    A length's column is sign * (reading - machine zero), in the unit at the end of its name. Any other quantity has no
+    sign here and is recorded as it is read.
     """
     names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints), *FRAME_COLUMNS]
-    found: list[dict[str, Any]] = [
+    lengths: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)
     ]
-    quantities = wires.all_wires[len(names) :]
-    return found + [
-        {"column": wire.meaning, "channel": wire.channel, "stale_after_s": wire.stale_after_s} for wire in quantities
+    return lengths + [
+        {"column": wire.meaning, "channel": wire.channel, "stale_after_s": wire.stale_after_s}
+        for wire in wires.all_wires[len(names) :]
     ]
 
 
 def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> RecordedCycle:
-    """The cycle behind a READINGS message; its readings in the order of `channels`.
+    """The cycle behind a READINGS message, with its readings in the order of `channels`.
 
-    Raises KeyError, TypeError or ValueError for what is no such message.
+    Raises KeyError, TypeError or ValueError for anything that is not such a message.
     """
     readings = tuple(_parsed_reading(message["readings"][channel]) for channel in channels)
     zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
@@ -107,12 +117,12 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
 
 
 def _reading(reading: Reading) -> dict[str, Any]:
-    """A value, or why there is none."""
+    """A reading as plain data: its value, or why there is none."""
     value, time_s, quality, detail = reading
     if quality is Quality.OK:
         return {"value": value, "time_s": time_s}
-    found = {"quality": quality, "time_s": time_s}
-    return found | {"detail": detail} if detail else found
+    fault = {"quality": quality, "time_s": time_s}
+    return fault | {"detail": detail} if detail else fault
 
 
 def _parsed_reading(data: Mapping[str, Any]) -> Reading:
@@ -121,14 +131,17 @@ def _parsed_reading(data: Mapping[str, Any]) -> Reading:
 
 
 def _target(target: Target) -> dict[str, Any]:
-    found: dict[str, Any] = {"tip_mm": target.tip_mm}
-    if target.rotation_B0_rad is not None:
-        found["rotation_B0_rad"] = target.rotation_B0_rad
-    return found
+    tip: dict[str, Any] = {"tip_mm": target.tip_mm}
+    if target.rotation_B0_rad is None:
+        return tip
+    return tip | {"rotation_B0_rad": target.rotation_B0_rad}
 
 
 def _carried(state: CycleState, inputs: CycleInputs) -> Any:
-    """The state; of its zero only whether it is that of the inputs, since nothing of another one is used."""
+    """The state from the cycle before, as plain data.
+
+    Of its machine zero only whether it is this cycle's own: a cycle uses nothing that was computed with another.
+    """
     return to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
 
 

@@ -1,7 +1,7 @@
-"""What a cycle carries over, as plain data for JSON and back, without losing a bit.
+"""The state that a cycle hands to the next one, as plain data for JSON, and back bit for bit.
 
-Arrays go as base64 of their bytes: nan included, which JSON's numbers have no word for, and cheaper than decimals.
-Everything says what it is, so that a state which grows is written without a change here.
+An array becomes the base64 text of its bytes, with its type and shape: so nan, which JSON has no number for, is kept,
+and writing it takes less time than decimals. A named tuple carries a tag that says what it is.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from compd.live.loop.stale_policy import ComparatorSet
 from compd.model.apply_effects import EffectMemory
 from compd.model.observations import Motion
 
-# Tags in recordings: they stay as they are, whatever the classes are called.
+# The tags are part of the recordings' format: they stay as they are when a class is renamed.
 _KINDS: Mapping[str, Any] = {
     "Carried": CycleState,
     "WarmStart": WarmStart,
@@ -43,7 +43,11 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
 
 
 def to_plain(value: Any) -> Any:
-    """Named tuples, tuples, mappings by text, arrays, numbers, texts, None. TypeError for anything else."""
+    """`value` as lists, dictionaries, numbers and texts.
+
+    It may be made of named tuples (those with a tag), tuples, mappings by text, arrays, numbers, texts and None. Raises
+    TypeError for anything else.
+    """
     match value:
         case np.ndarray() | np.generic():
             array = np.asarray(value, order="C")
@@ -70,7 +74,7 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(data: Any) -> Any:
-    """What `to_plain` was given. Raises KeyError, TypeError or ValueError for what it cannot have made."""
+    """The inverse of `to_plain`. Raises KeyError, TypeError or ValueError for data that it cannot have made."""
     match data:
         case {"array": text, "type": dtype, "shape": shape}:
             return np.frombuffer(base64.b64decode(text), dtype=dtype).reshape(shape)

@@ -1,4 +1,4 @@
-"""The STATUS message: how the whole daemon is doing."""
+"""The STATUS message: machine zero, models, the loop and its timing, sockets, lines and every gauge."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import Clock
-from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.json_text import omit_unknown
@@ -22,10 +21,17 @@ from compd.readings import Latest
 
 @dataclass(frozen=True)
 class StatusReport:
-    """Looks at everything and changes nothing; called on the publisher's thread."""
+    """Collects the STATUS message from the daemon's parts, of which it changes none; on the publisher's thread.
+
+    Attributes
+    ----------
+    version : the VERSION message, whose keys STATUS repeats.
+    commands, latest, wires, loop, publisher : the daemon's own.
+    packets : the UDP sender, where one is configured.
+    lines : makes the state of every line, by name.
+    """
 
     version: Mapping[str, Any]
-    configuration: Configuration
     latest: Latest
     wires: MachineWires
     commands: Commands
@@ -36,7 +42,7 @@ class StatusReport:
     clock: Clock
 
     def message(self) -> dict[str, Any]:
-        """What is unknown is left out."""
+        """The message as plain data; what is unknown is left out."""
         now_s = self.clock.monotonic()
         published = self.publisher.summary()
         if self.packets is not None:
@@ -49,7 +55,7 @@ class StatusReport:
             "zero": self._zero(),
             "model": self._model(),
             "loop": self.loop.timing.summary(),
-            "realtime": {name: granted._asdict() for name, granted in self.loop.permissions.items()},
+            "realtime": {name: permission._asdict() for name, permission in self.loop.permissions.items()},
             "publisher": published,
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
@@ -64,26 +70,26 @@ class StatusReport:
         return {"taken": True, "taken_at": zero.taken_at}
 
     def _model(self) -> dict[str, Any]:
-        """Applied, and shadow if there is one; without their files, which are this computer's business."""
+        """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
         summary = {} if self.commands.models is None else self.commands.models.summary
         return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
-        """Every channel: raw value, before sign and zero, with its age; a stale one says so."""
-        found: list[dict[str, Any]] = []
+        """Every channel: its raw value, before sign and machine zero, and its age (s); or why there is no value."""
+        gauges: list[dict[str, Any]] = []
         stale_after_s = {wire.channel: wire.stale_after_s for wire in self.wires.all_wires}
         meanings = {wire.channel: wire.meaning for wire in self.wires.all_wires}
         for channel, reading in zip(self.latest.channels, self.latest.snapshot(now_s).readings, strict=True):
             age_s = now_s - reading.time_s
-            old = reading.ok and age_s > stale_after_s.get(channel, math.inf)
-            entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if old else reading.quality}
+            stale = reading.ok and age_s > stale_after_s.get(channel, math.inf)
+            entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if stale else reading.quality}
             if channel in meanings:
                 entry["measures"] = meanings[channel]
             if reading.quality is not Quality.NEVER_READ:
                 entry["age_s"] = round(age_s, 4)
-            if reading.ok and not old:
+            if reading.ok and not stale:
                 entry["value"] = round(reading.value, 7)
             if reading.detail:
                 entry["detail"] = reading.detail
-            found.append(entry)
-        return found
+            gauges.append(entry)
+        return gauges

@@ -11,13 +11,13 @@ from compd.live.loop.setpoint import Setpoint
 
 
 class UdpSender:
-    """Sends every setpoint from the loop's own thread: a second thread would add its wake-up to each packet.
+    """Sends every setpoint to one address, on the loop's own thread: a thread between would add its wake-up time.
 
     A packet that the system does not take at once is dropped and counted.
     """
 
     def __init__(self, target: UdpTarget, config_hash: str) -> None:
-        """Raises DaemonError for a host that has no address."""
+        """`config_hash`: hexadecimal; its first 8 bytes go into each packet. Raises DaemonError for an unknown host."""
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
@@ -37,7 +37,7 @@ class UdpSender:
         self.dropped = 0
 
     def deliver(self, setpoint: Setpoint) -> None:
-        """One packet; never waits."""
+        """Send one packet, without waiting."""
         try:
             self._socket.sendto(setpoint.to_packet(self._config_hash), self._address)
         except OSError:
@@ -46,8 +46,9 @@ class UdpSender:
             self.sent += 1
 
     def summary(self) -> dict[str, Any]:
-        """For STATUS."""
+        """How many packets were sent and dropped, for STATUS."""
         return {"packets_sent": self.sent, "packets_dropped": self.dropped}
 
     def close(self) -> None:
+        """Close the socket."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""Taking machine zero: every length gauge read for a while with the machine at rest, then kept on disk."""
+"""Taking machine zero: average every length gauge for a second with the machine at rest, and keep the means on disk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from compd.live.service.background_job import BackgroundJob
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.readings import Latest
 
-# Long enough to average a comparator's noise over several polls, short enough to stand beside.
+# Several polls of a comparator, to average its noise, and short enough for a person to wait.
 _WINDOW_S = 1.0
 _LOOK_EVERY_S = 0.02
 # A machine at rest stays within a few steps of its gauges; one that moves leaves this in milliseconds.
@@ -29,7 +29,10 @@ _log = structlog.get_logger()
 
 
 class ZeroCapture:
-    """Takes one zero at a time, on a thread of its own: neither loop nor publisher waits for gauges or disk."""
+    """Takes machine zero on a thread of its own, so that neither loop nor publisher waits for gauges or disk.
+
+    It is the only writer of `Commands.zero` while the daemon runs. One zero at a time.
+    """
 
     def __init__(
         self, wires: MachineWires, latest: Latest, commands: Commands, directory: Path, zero_hash: str, clock: Clock
@@ -41,19 +44,18 @@ class ZeroCapture:
         self._zero_hash = zero_hash
         self._clock = clock
         self._stop = threading.Event()
-        self._errand = BackgroundJob("zero", "machine zero is being taken already")
+        self._job = BackgroundJob("zero", "machine zero is being taken already")
 
-    def take(self, answer: Callable[[bytes], None]) -> None:
-        """Start; `answer` gets the ZERO or ERROR line when it is done. Raises ProtocolError while one is running."""
-        self._errand.begin(self._taken, answer)
+    def start(self, answer: Callable[[bytes], None]) -> None:
+        """Begin; `answer` gets the ZERO or ERROR line at the end. Raises ProtocolError while one is being taken."""
+        self._job.start(self._capture, answer)
 
     def stop(self) -> None:
-        """Give up what is running; returns when it has ended."""
+        """Give up a zero that is being taken; return when its thread has ended."""
         self._stop.set()
-        self._errand.join()
+        self._job.join()
 
-    def _taken(self) -> bytes:
-        """Do it; the ZERO or ERROR line."""
+    def _capture(self) -> bytes:
         try:
             zero = MachineZero(self._zero_hash, datetime.now(UTC).isoformat(timespec="seconds"), self.sample())
             path = zero.save(self._directory)
@@ -67,11 +69,13 @@ class ZeroCapture:
         )
 
     def sample(self) -> dict[str, float]:
-        """Mean raw reading (mm) of every length gauge over the window, each reading counted once.
+        """Mean raw reading (mm) of every length gauge, by channel, over `_WINDOW_S`; each reading counts once.
 
-        Raises StateError when a gauge is not good at any moment of it, or the machine is not at rest.
+        Raises StateError when a gauge is not good at any moment of the window, or when its readings spread over more
+        than REST_TOLERANCE_MM: the machine is not at rest.
         """
-        seen: dict[str, dict[float, float]] = defaultdict(dict)
+        # By channel and time of reading: a snapshot repeats the readings that no newer one has replaced.
+        values_mm: dict[str, dict[float, float]] = defaultdict(dict)
         start_s = self._clock.monotonic()
         while True:
             snapshot = self._latest.snapshot(self._clock.monotonic())
@@ -85,14 +89,14 @@ class ZeroCapture:
                 )
             for wire in self._wires.length_wires:
                 reading = snapshot.readings[wire.slot]
-                seen[wire.channel][reading.time_s] = reading.value
+                values_mm[wire.channel][reading.time_s] = reading.value
             if snapshot.time_s - start_s >= _WINDOW_S:
                 break
             if self._clock.wait(self._stop, _LOOK_EVERY_S):
                 raise StateError(
                     Problem(where="machine zero", what="the daemon is stopping", next_step="take zero again")
                 )
-        for channel, readings in seen.items():
+        for channel, readings in values_mm.items():
             spread_mm = max(readings.values()) - min(readings.values())
             if spread_mm > REST_TOLERANCE_MM:
                 raise StateError(
@@ -104,4 +108,4 @@ class ZeroCapture:
                         next_step="let the machine stand still, then take zero again",
                     )
                 )
-        return {channel: sum(readings.values()) / len(readings) for channel, readings in seen.items()}
+        return {channel: sum(readings.values()) / len(readings) for channel, readings in values_mm.items()}

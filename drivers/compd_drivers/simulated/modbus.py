@@ -7,6 +7,7 @@ import struct
 from typing import Any
 
 from compd.simulation.wires.device import Sense, SimulatedRegisterDevice
+from compd_drivers.simulated.transducer import signal_for
 
 # type -> struct code, smallest and largest count
 INTEGERS = {
@@ -49,6 +50,8 @@ class SimulatedRegisters(SimulatedRegisterDevice):
 
     def _fill(self, bank: list[int], channel: Any) -> None:
         value = self.sense(channel.name)
+        if channel.linearisation is not None:
+            value = signal_for(channel.linearisation, value)
         data = _stored(channel, value)
         words = struct.unpack(f">{len(data) // 2}H", data)
         if channel.byte_order == "little":

@@ -34,11 +34,17 @@ class SimulatedAscii(SimulatedByteDevice):
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
         end = plain(options.out_terminator)
-        others = [*options.init, *([options.echo] if options.echo else [])]
-        self._replies = {(plain(one.out) + end).encode("latin-1"): one.in_ for one in others}
+        exchanges = [*options.init, *([options.echo] if options.echo else [])]
+        self._replies = {(plain(exchange.out) + end).encode("latin-1"): exchange.in_ for exchange in exchanges}
         if options.out:
             self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
         self._heard = b""
+
+    @property
+    def error_replies(self) -> dict[bytes, str]:
+        """Each described error as it goes over the wire, and the quality that it means."""
+        end = plain(self.options.in_terminator)
+        return {(self._printed(error.in_, {}) + end).encode("latin-1"): error.quality for error in self.options.errors}
 
     def hear(self, data: bytes) -> bytes:
         self._heard += data
@@ -50,12 +56,12 @@ class SimulatedAscii(SimulatedByteDevice):
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""
         places = {request: self._heard.find(request) for request in self._replies}
-        found = {request: place for request, place in places.items() if place >= 0}
-        if not found:
+        requests = {request: place for request, place in places.items() if place >= 0}
+        if not requests:
             self._heard = self._heard[-max(map(len, self._replies), default=0) :]
             return b""
-        first = min(found, key=lambda request: (found[request], -len(request)))
-        self._heard = self._heard[found[first] + len(first) :]
+        first = min(requests, key=lambda request: (requests[request], -len(request)))
+        self._heard = self._heard[requests[first] + len(first) :]
         return first
 
     def _answer(self, request: bytes) -> str:
@@ -67,10 +73,16 @@ class SimulatedAscii(SimulatedByteDevice):
             if not math.isfinite(value):
                 word = next((word for word, meant in channel.instead.items() if meant == "sensor_fault"), None)
                 if word is None:
-                    error = next((one.in_ for one in self.options.errors if one.quality == "sensor_fault"), None)
-                    return self._printed(error, {}) + end if error is not None else ""
+                    error = self._error_of("sensor_fault") or self._error_of("device_error")
+                    return self._printed(error, {}) + end if error else ""
                 words[channel.name] = plain(word)
+            elif (error := self._error_of("over_range")) and _beyond(channel, value):
+                return self._printed(error, {}) + end
         return self._printed(form, words) + end
+
+    def _error_of(self, quality: str) -> str:
+        """The first error reply of this meaning; "" if the description has none."""
+        return next((error.in_ for error in self.options.errors if error.quality == quality), "")
 
     def _printed(self, form: str, words: dict[str, str]) -> str:
         """`form` with numbers, blanks for what the driver skips, and checksums."""
@@ -95,7 +107,7 @@ class SimulatedAscii(SimulatedByteDevice):
         return filler * int(token[4] or 1)
 
     def _number(self, name: str, form: str) -> str:
-        channel = next(one for one in self.options.channels if one.name == name)
+        channel = next(channel for channel in self.options.channels if channel.name == name)
         value = self.sense(name)
         match channel.unit:
             case "V" | "mA":
@@ -107,7 +119,14 @@ class SimulatedAscii(SimulatedByteDevice):
             case unit:
                 value /= MM_IN.get(unit, OTHER.get(unit, 1.0))
         value = value / channel.scale * 10**channel.decimals
-        return str(form % (round(value) if form[-1] in "dx" else value))
+        text = str(form % (round(value) if form[-1] in "dx" else value))
+        width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)
+        # an exact width without room for the zero before the point: -.050000
+        return text.replace("0.", ".", 1) if 0 < width < len(text) and abs(value) < 1 else text
+
+
+def _beyond(channel: Any, value: float) -> bool:
+    return channel.range is not None and not channel.range[0] <= value <= channel.range[1]
 
 
 def checksum(kind: str, data: bytes, hexadecimal: bool) -> str:

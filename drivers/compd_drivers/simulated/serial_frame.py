@@ -18,8 +18,14 @@ class SimulatedFrame(SimulatedByteDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._request = bytes.fromhex(options.out)
+        self._request = bytes.fromhex(options.out) if options.out_checksum is None else self._printed_request()
         self._heard = b""
+
+    def _printed_request(self) -> bytes:
+        tokens = self.options.out.split()
+        return with_checksum(
+            tokens, bytearray(0 if token == "CS" else int(token, 16) for token in tokens), self.options.out_checksum
+        )
 
     def hear(self, data: bytes) -> bytes:
         self._heard += data
@@ -38,13 +44,7 @@ class SimulatedFrame(SimulatedByteDevice):
             if number is None:
                 return b""
             frame[channel.at : channel.at + channel.length] = number
-        if "CS" in tokens:
-            first = tokens.index("CS")
-            check = self.options.checksum
-            end = check.end or first
-            made = checksum(check.kind, bytes(frame[check.first : end]), hexadecimal=False).encode("latin-1")
-            frame[first : first + len(made)] = made if check.byte_order == "little" else made[::-1]
-        return bytes(frame)
+        return with_checksum(tokens, frame, self.options.checksum) if "CS" in tokens else bytes(frame)
 
     def _number(self, channel: Any) -> bytes | None:
         value = self.sense(channel.name)
@@ -64,3 +64,11 @@ class SimulatedFrame(SimulatedByteDevice):
         low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
         count = min(high, max(low, round(number)))
         return int(count).to_bytes(length, "little" if channel.byte_order == "little" else "big", signed=signed)
+
+
+def with_checksum(tokens: list[str], frame: bytearray, check: Any) -> bytes:
+    """The frame with its checksum where `tokens` say CS, made as the description's `check` says."""
+    first = tokens.index("CS")
+    made = checksum(check.kind, bytes(frame[check.first : check.end or first]), hexadecimal=False).encode("latin-1")
+    frame[first : first + len(made)] = made if check.byte_order == "little" else made[::-1]
+    return bytes(frame)

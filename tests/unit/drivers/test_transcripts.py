@@ -2,279 +2,27 @@
 
 from __future__ import annotations
 
-import ast
-import socket
-import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
-import yaml
 
-from compd.clock import MonotonicClock
-from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines.modbus_rtu import RtuMaster
-from compd.lines.modbus_tcp import ModbusTcp
-from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
-from compd.simulation.wires.modbus_slaves import Slaves
+from compd.gauge import LineFault
+from compd.plugins import GAUGES, names
 from tests.support.paths import TESTS
+from tests.support.transcripts import check_simulated_device, parse, replay_transcript
 
 FILES = sorted((TESTS / "transcripts").glob("*.txt"))
-OVER_TCP = {"moxa_e1240"}
 GENERIC = {"modbus"}  # its map is tried in tests of its own; the presets on it have transcripts
-PATIENCE_S = 5.0
-
-
-@dataclass
-class Exchange:
-    """One request and its reply; `simulated`: the simulated device answers exactly so."""
-
-    sent: bytes
-    received: bytes = b""
-    simulated: bool = False
-
-
-@dataclass
-class Poll:
-    """What one poll exchanges and gives."""
-
-    line: int
-    exchanges: list[Exchange] = field(default_factory=list)
-    drained: bytes = b""
-    readings: list[str] = field(default_factory=list)
-    fault: str = ""
-
-
-@dataclass
-class Transcript:
-    """One file."""
-
-    driver: str
-    options: dict[str, Any]
-    polls: list[Poll]
-
-
-def octets(text: str) -> bytes:
-    """Quoted text or hexadecimal bytes."""
-    if text.startswith('"'):
-        return ast.literal_eval("b" + text)
-    return bytes.fromhex(text)
-
-
-def parse(path: Path) -> Transcript:
-    """A transcript; ValueError names the line that is none."""
-    options: dict[str, Any] = {}
-    polls: list[Poll] = []
-    ended = True
-    for number, raw in enumerate(path.read_text(encoding="ascii").splitlines(), start=1):
-        mark, _, rest = raw.partition(" ")
-        if not raw.strip() or mark == "#":
-            continue
-        if mark == "options":
-            options = yaml.safe_load(rest)
-            continue
-        if mark in {">", "again"} and ended:
-            polls.append(Poll(number))
-        ended = mark in {"=", "!"}
-        poll = polls[-1]
-        match mark:
-            case ">":
-                poll.exchanges.append(Exchange(octets(rest)))
-            case "<" | "<*":
-                poll.exchanges[-1].received += octets(rest)
-                poll.exchanges[-1].simulated = mark == "<*"
-            case "again":
-                poll.exchanges.append(poll.exchanges[-1])
-            case "~":
-                poll.drained = octets(rest)
-            case "=":
-                poll.readings.append(rest)
-            case "!":
-                poll.fault = rest
-            case _:
-                raise ValueError(f"{path.name}:{number}: {raw}")
-    return Transcript(path.name.split(".")[0], options, polls)
-
-
-class ReplayedLine:
-    """A line that carries exactly one poll's bytes at a time."""
-
-    unexpected_bytes = 0
-
-    def __init__(self) -> None:
-        self._coming: deque[Exchange] = deque()
-        self._waiting = b""
-        self._time_s = 100.0
-
-    def begin(self, poll: Poll) -> None:
-        assert not self._waiting, f"left over before line {poll.line}: {self._waiting!r}"
-        self._coming = deque(poll.exchanges)
-
-    def end(self) -> None:
-        assert not self._coming, f"never asked: {self._coming[0].sent!r}"
-        assert not self._waiting, f"never read: {self._waiting!r}"
-
-    def send(self, request: bytes) -> float:
-        assert not self._waiting, f"{self._waiting!r} was not read before {request!r} was sent"
-        assert self._coming, f"{request!r} is not in the transcript"
-        expected = self._coming.popleft()
-        assert request == expected.sent
-        self._waiting = expected.received
-        self._time_s += 0.01
-        return self._time_s
-
-    def listen(self) -> float:
-        raise AssertionError("a transcript is of a device that is asked")
-
-    def receive(self, count: int, timeout_s: float | None = None) -> bytes:
-        self._check()
-        if len(self._waiting) < count:
-            raise LineFault(Quality.INCOMPLETE, f"only {self._waiting!r}")
-        return self._take(count)
-
-    def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
-        self._check()
-        place = self._waiting.find(terminator)
-        if 0 <= place <= limit - len(terminator):
-            return self._take(place + len(terminator))
-        raise LineFault(Quality.MISMATCH if len(self._waiting) >= limit else Quality.INCOMPLETE, repr(self._waiting))
-
-    def drain(self) -> bytes:
-        return self._take(len(self._waiting))
-
-    def close(self) -> None:
-        """Nothing to close."""
-
-    def _check(self) -> None:
-        if not self._waiting:
-            raise LineFault(Quality.TIMEOUT, "silence")
-
-    def _take(self, count: int) -> bytes:
-        taken, self._waiting = self._waiting[:count], self._waiting[count:]
-        return taken
-
-
-class ReplayedServer:
-    """The far end of a Modbus TCP connection: hears exactly the transcript's bytes, or the connection ends."""
-
-    def __init__(self, exchanges: Sequence[Exchange]) -> None:
-        self.wrong: list[str] = []
-        self._exchanges = exchanges
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = int(self._listener.getsockname()[1])
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
-
-    def _serve(self) -> None:
-        with self._listener, self._listener.accept()[0] as connection:
-            connection.settimeout(PATIENCE_S)
-            for exchange in self._exchanges:
-                heard = b""
-                while len(heard) < len(exchange.sent) and (data := connection.recv(len(exchange.sent) - len(heard))):
-                    heard += data
-                if heard != exchange.sent:
-                    self.wrong.append(f"sent {heard.hex(' ')}, transcript has {exchange.sent.hex(' ')}")
-                    return
-                connection.sendall(exchange.received)
-            if more := connection.recv(1):
-                self.wrong.append(f"sent {more!r}... after the transcript's end")
-
-    def join(self) -> None:
-        self._thread.join(PATIENCE_S)
-        assert not self._thread.is_alive(), "the driver asked less than the transcript has"
-
-
-def gauge_of(transcript: Transcript) -> tuple[Gauge[Any], Any]:
-    driver = load(GAUGES, transcript.driver, transcript.driver)
-    options = driver.Options.model_validate({"driver": transcript.driver, "line": "line", **transcript.options})
-    return driver(options), options
-
-
-def check(reading: Reading, expected: str, unit: str) -> None:
-    if expected in set(Quality):
-        assert reading.quality == expected, reading
-        assert reading.value != reading.value, "no value without quality ok"
-        return
-    value, expected_unit = expected.split()
-    assert reading.ok, reading
-    assert reading.value == pytest.approx(float(value), rel=1e-12, abs=1e-15)
-    assert unit == expected_unit
-
-
-def replay(gauge: Gauge[Any], line: Any, polls: Sequence[Poll], begin: Callable[[Poll], None]) -> None:
-    for poll in polls:
-        begin(poll)
-        if poll.fault:
-            with pytest.raises(LineFault) as caught:
-                gauge.read(line)
-            assert caught.value.quality == poll.fault, f"line {poll.line}: {caught.value}"
-            assert line.drain() == poll.drained, f"line {poll.line}"
-            continue
-        readings = gauge.read(line)
-        assert len(readings) == len(poll.readings) == len(gauge.channels), f"line {poll.line}"
-        for reading, expected, channel in zip(readings, poll.readings, gauge.channels, strict=True):
-            check(reading, expected, channel.unit)
-
-
-@contextmanager
-def tcp_line(transcript: Transcript) -> Iterator[ModbusTcp]:
-    server = ReplayedServer([exchange for poll in transcript.polls for exchange in poll.exchanges])
-    line = ModbusTcp("127.0.0.1", server.port, PATIENCE_S, MonotonicClock())
-    try:
-        yield line
-    finally:
-        line.close()
-        server.join()
-        assert not server.wrong
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_replay(path: Path) -> None:
-    transcript = parse(path)
-    gauge, _ = gauge_of(transcript)
-    if transcript.driver in OVER_TCP:
-        with tcp_line(transcript) as tcp:
-            replay(gauge, tcp, transcript.polls, lambda poll: None)
-        return
-    wire = ReplayedLine()
-    line = RtuMaster(wire, alternate=False) if gauge.line_kind == "registers" else wire  # type: ignore[arg-type]
-
-    def begin(poll: Poll) -> None:
-        if poll is not transcript.polls[0]:
-            wire.end()
-        wire.begin(poll)
-
-    replay(gauge, line, transcript.polls, begin)
-    wire.end()
+    replay_transcript(path)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_simulated_device_says_the_same(path: Path) -> None:
-    """The replies marked <* come from the simulated device, too, when its sensors see what the poll gives."""
-    transcript = parse(path)
-    gauge, options = gauge_of(transcript)
-    tried = 0
-    for poll in transcript.polls:
-        marked = [exchange for exchange in poll.exchanges if exchange.simulated]
-        if not marked:
-            continue
-        seen = {
-            channel.name: float("nan") if text in set(Quality) else float(text.split()[0])
-            for channel, text in zip(gauge.channels, poll.readings, strict=True)
-        }
-        device = load(SIMULATED_GAUGES, transcript.driver, path.name)(
-            options, lambda name, seen=seen: seen.get(name, float("nan"))
-        )
-        if gauge.line_kind == "registers":
-            device = Slaves([device], over_tcp=transcript.driver in OVER_TCP)
-        for exchange in marked:
-            assert device.hear(exchange.sent) == exchange.received, f"line {poll.line}"
-            tried += 1
-    assert tried or transcript.driver in {"icpdas_m7017c", "adam_4017p"}  # see test_presets_modbus: their steps
+    check_simulated_device(path)
 
 
 def test_every_driver_has_a_transcript() -> None:
@@ -306,4 +54,4 @@ def test_a_transcript_that_is_off_by_one_byte_fails(tmp_path: Path, old: str, ne
     path = tmp_path / SYLVAC.name
     path.write_text(text.replace(old, new, 1), encoding="ascii")
     with pytest.raises((AssertionError, pytest.fail.Exception, LineFault)):
-        test_replay(path)
+        replay_transcript(path)

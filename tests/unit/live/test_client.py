@@ -89,3 +89,29 @@ def test_setpoints_that_come_before_an_answer_are_not_lost(tmp_path):
         assert next(setpoints)["seq"] == 1
         assert client.status()["x"] == 5
         assert [next(setpoints)["seq"] for _ in range(2)] == [2, 3]
+
+
+def test_a_setpoint_in_an_unknown_state_is_not_valid_whatever_it_says(tmp_path):
+    def script(connection):
+        connection.sendall(VERSION)
+        connection.recv(100)
+        connection.sendall(
+            b'{"class":"WATCH"}\n'
+            b'{"class":"SETPOINT","seq":1,"valid":true,"state":"ok"}\n'
+            b'{"class":"SETPOINT","seq":2,"valid":true,"state":"coasting","tip_M_mm":[1,2,3]}\n'
+            b'{"class":"SETPOINT","seq":3,"valid":true}\n'
+        )
+        connection.recv(100)
+
+    with scripted(tmp_path / "s", script) as path, connect(path) as client:
+        setpoints = client.watch()
+        assert [next(setpoints)["valid"] for _ in range(3)] == [True, False, False]
+
+
+@pytest.mark.parametrize("greeting", [b"SSH-2.0-OpenSSH_9.6\n", b"[1]\n", b"{}\n", b'{"class":"ERROR"}\n', b"7\n"])
+def test_what_is_not_compd_is_named(tmp_path, greeting):
+    with (
+        scripted(tmp_path / "s", lambda connection: connection.sendall(greeting)) as path,
+        pytest.raises(DaemonError, match="not compd"),
+    ):
+        connect(path)

@@ -135,8 +135,8 @@ class Taking:
             self.latest.put(self.latest.index[channel], reading if quality is Quality.OK else bad(self.now_s, quality))
 
     def take(self):
-        self.taker.take(self.answers.append)
-        self.taker._errand.join()
+        self.taker.start(self.answers.append)
+        self.taker._job.join()
         return json.loads(self.answers[-1])
 
 

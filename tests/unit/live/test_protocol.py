@@ -16,9 +16,9 @@ from compd.errors import DaemonError, Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues
 from compd.live.loop.states import State
-from compd.live.service.messages import MAX_LINE_BYTES, TargetKeys, line
+from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.publisher import Publisher
-from compd.live.service.requests import Requests
+from compd.live.service.requests import REQUESTS, Asker, Requests, TargetKeys
 
 PERIOD_S = 0.005
 TIMEOUT_S = 20
@@ -73,8 +73,16 @@ class Bench:
         self.commands = Commands(NO_ZERO)
         self.observed = []
         self.zeros = []
+        self.models = []
         self.publisher = Publisher(sockets, PERIOD_S, self.observed.append)
-        requests = Requests(VERSION, target_keys, self.commands, lambda: {"class": "STATUS"}, self.zeros.append)
+        requests = Requests(
+            VERSION,
+            target_keys,
+            self.commands,
+            lambda: {"class": "STATUS"},
+            self.zeros.append,
+            switch_model=lambda *arguments: self.models.append(arguments),
+        )
         self.publisher.start(requests)
         self.peers = []
 
@@ -182,6 +190,58 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(bench, message, code):
     bench.publisher.deliver(setpoint(1, MonotonicClock().monotonic()))
     assert other.read()["seq"] == 1
     assert bench.commands.target is None
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        ({"class": "watch"}, "class 'watch', allowed: WATCH, TARGET, RELEASE, STATUS, VERSION, ZERO, MODEL"),
+        ({"class": "STATUS", "why": 1}, "STATUS: unknown key 'why', allowed: none"),
+        ({"class": "WATCH", "rate_hz": "10"}, "rate_hz must be a number, is str"),
+        ({"class": "WATCH", "rate_hz": -1}, "rate_hz is -1, allowed 0 or more"),
+        ({"class": "WATCH", "rate_hz": 2e9}, "rate_hz must be within +-1e+09"),
+        ({"class": "WATCH", "what": "x"}, "what is 'x', allowed: setpoints, readings"),
+        ({"class": "TARGET"}, "needs tip_B0_mm, three numbers"),
+        ({"class": "TARGET", "tip_B0_mm": [1, 2]}, "tip_B0_mm must be a list of three numbers"),
+        ({"class": "TARGET", "tip_B0_mm": [1, 2, None]}, "tip_B0_mm must be a number, is NoneType"),
+        ({"class": "TARGET", "tip_B0_mm": [1, 2, -2e9]}, "tip_B0_mm must be within +-1e+09"),
+        ({"class": "TARGET", "tip_P_mm": [1, 2, 3]}, "TARGET: unknown key 'tip_P_mm', allowed: tip_B0_mm"),
+        ({"class": "MODEL", "shadow": True}, "needs file, a text (shadow: true or false)"),
+        ({"class": "MODEL", "file": "m.yaml"}, "file is 'm.yaml', allowed: an absolute path, or \"\" for none"),
+        ({"class": "MODEL", "file": "/m\0"}, "file is '/m\\x00', allowed: an absolute path, or \"\" for none"),
+        ({"class": "MODEL", "file": "/\ud800"}, "file is '/\\ud800', allowed: an absolute path, or \"\" for none"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_an_error_names_the_key_its_value_and_what_is_allowed(bench, message, text):
+    answer = bench.unix().ask(message)
+    assert answer["class"] == "ERROR"
+    assert answer["text"] == text
+
+
+def test_the_answer_to_watch_repeats_the_keys_as_they_were_written(bench):
+    peer = bench.tcp()
+    for request in (b'{"class":"WATCH","rate_hz":20}\n', b'{"class":"WATCH","what":"setpoints","rate_hz":20.0}\n'):
+        peer.say(request)
+        assert peer.file.readline() == request
+
+
+def test_a_model_is_switched_over_the_unix_socket_alone(bench):
+    remote, local = bench.tcp(), bench.unix()
+    for request in ({"class": "MODEL"}, {"class": "MODEL", "file": "/m.yaml"}):
+        assert remote.ask(request)["code"] == "unix_only"
+    assert local.ask({"class": "MODEL"}) == {"class": "MODEL"}
+    local.say({"class": "MODEL", "file": "/m.yaml", "shadow": True})
+    local.say({"class": "MODEL", "file": ""})
+    local.ask({"class": "STATUS"})
+    assert [(file, shadow) for file, shadow, _ in bench.models] == [("/m.yaml", True), ("", False)]
+
+
+def test_every_request_documents_itself_and_each_of_its_keys():
+    for name, kind in REQUESTS.items():
+        assert kind.__doc__, name
+        assert all(field.description for field in kind.model_fields.values()), name
+        assert bool(kind.refusal) == (kind.asker is not Asker.ANYBODY), name
 
 
 def test_a_message_may_come_in_pieces_and_several_in_one_piece(bench):

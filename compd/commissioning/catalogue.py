@@ -1,0 +1,82 @@
+"""The installed gauge drivers and presets: what each is, where its protocol was read, and the options it takes."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass
+from typing import Any
+
+from compd.gauge import Gauge
+from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
+
+GIVEN_BY_THE_CONFIGURATION = ("driver", "line")  # needed by every gauge, of no interest in a list
+
+
+@dataclass(frozen=True)
+class CatalogueEntry:
+    """One driver: `title` is the first line of its text, `needed_options` are those without a default."""
+
+    name: str
+    line_kind: str
+    title: str
+    needed_options: tuple[str, ...]
+    simulated: bool
+
+
+@dataclass(frozen=True)
+class DriverOption:
+    """One key of a gauge in the configuration; `default` is Python's text of it, "" where the option is needed."""
+
+    name: str
+    default: str
+    meaning: str
+
+    @property
+    def needed(self) -> bool:
+        return not self.default
+
+
+@dataclass(frozen=True)
+class DriverDescription:
+    """What `compd gauge show` prints."""
+
+    text: str
+    options: tuple[DriverOption, ...]
+
+
+def catalogue() -> list[CatalogueEntry]:
+    """Every installed driver, sorted by name. Raises CompdError for one that cannot be loaded."""
+    simulated = set(names(SIMULATED_GAUGES))
+    entries = []
+    for name in names(GAUGES):
+        driver = load(GAUGES, name, name)
+        needed = [key.rstrip("_") for key, field in driver.Options.model_fields.items() if field.is_required()]
+        entries.append(
+            CatalogueEntry(
+                name,
+                driver.line_kind,
+                driver_text(driver).partition("\n")[0],
+                tuple(key for key in needed if key not in GIVEN_BY_THE_CONFIGURATION),
+                name in simulated,
+            )
+        )
+    return entries
+
+
+def driver_description(name: str) -> DriverDescription:
+    """Text and options of the driver `name`. Raises PluginError where there is none."""
+    driver = load(GAUGES, name, name)
+    options = tuple(
+        DriverOption(
+            field.alias or key,
+            "" if field.is_required() else repr(field.get_default(call_default_factory=True)),
+            field.description or "",
+        )
+        for key, field in driver.Options.model_fields.items()
+    )
+    return DriverDescription(driver_text(driver), options)
+
+
+def driver_text(driver: type[Gauge[Any]]) -> str:
+    """What the device speaks and where that was read: `about`, else the docstring of the module, else of the class."""
+    return driver.about or inspect.getdoc(inspect.getmodule(driver)) or inspect.getdoc(driver) or ""

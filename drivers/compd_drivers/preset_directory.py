@@ -1,0 +1,134 @@
+"""A folder of presets: every `NAME.yaml` in it is a gauge driver NAME with its simulated device.
+
+A package offers its folder in the entry-point group `compd.gauge_presets`:
+
+    [project.entry-points."compd.gauge_presets"]
+    my_package = "my_package.presets:directory"         # directory = PresetDirectory(files("my_package.presets"))
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from importlib.resources import as_file
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from compd.configuration.document import Document, read
+from compd.errors import ConfigurationError, PluginError, Problem
+from compd.gauge import Gauge
+from compd.plugins import GAUGES, SIMULATED_GAUGES, load
+from compd_drivers.preset import Preset
+
+SUFFIX = ".yaml"
+
+
+class PresetDirectory:
+    """The presets in one folder. Each file is read when its preset is first used."""
+
+    def __init__(self, folder: Traversable) -> None:
+        self._folder = folder
+        self.driver = cache(self._driver)
+        self.simulated_device = cache(self._simulated_device)
+
+    def names(self) -> list[str]:
+        """Of all presets, sorted."""
+        return sorted(file.name.removesuffix(SUFFIX) for file in self._folder.iterdir() if file.name.endswith(SUFFIX))
+
+    def _driver(self, name: str) -> type[Gauge[Any]]:
+        """The driver's class. ConfigurationError for a file that cannot be used, PluginError for an unknown base."""
+        preset, document = self._read(name)
+        base = load(GAUGES, preset.base, document.where(("base",)))
+        try:
+            return driver_class(name, preset, base)
+        except ValidationError as error:
+            raise ConfigurationError(_problems(document, error, ("sample",))) from error
+        except ValueError as error:
+            raise ConfigurationError(Problem(where=document.where(("options",)), what=str(error))) from error
+
+    def _simulated_device(self, name: str) -> type:
+        """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
+        preset, document = self._read(name)
+        base = load(GAUGES, preset.base, document.where(("base",)))
+        device = load(SIMULATED_GAUGES, preset.base, document.where(("base",)))
+        return simulated_class(name, preset, base.Options, device)
+
+    def _read(self, name: str) -> tuple[Preset, Document]:
+        if name not in self.names():
+            raise PluginError(
+                Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
+            )
+        with as_file(self._folder / f"{name}{SUFFIX}") as path:
+            document = read(path)
+        try:
+            return Preset.model_validate(document.data), document
+        except ValidationError as error:
+            raise ConfigurationError(_problems(document, error)) from error
+
+
+def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gauge[Any]]:
+    """A class that differs from its base driver in its options alone.
+
+    Raises ValueError where an option is `like` one that the base driver has not, ValidationError where `sample`
+    are no options of this preset.
+    """
+    camel = _camel(name)
+    options_model = preset.options_model(f"{camel}Options", base.Options)
+
+    def initialise(self: Any, options: Any) -> None:
+        base.__init__(self, preset.gauge_options(options, base.Options))
+        self.options = options
+
+    described = type(
+        camel,
+        (base,),
+        {
+            "__init__": initialise,
+            "__doc__": preset.delivers,
+            "__module__": f"{__name__}.{name}",
+            "Options": options_model,
+            "about": f"{preset.title}\n\nSource: {preset.source}".strip(),
+            "sample_options": preset.sample,
+            "sample_range": preset.sample_range,
+            "usual_line": (preset.line.baud, preset.line.format) if preset.line else None,
+        },
+    )
+    options_model.model_validate({"driver": name, "line": "line", **preset.sample})
+    return described
+
+
+def simulated_class(name: str, preset: Preset, base_options: type[BaseModel], device: Any) -> type:
+    """The base protocol's simulated device for this description. A channel that is not read has its sensor off."""
+
+    def initialise(self: Any, options: Any, sense: Any) -> None:
+        described: Any = preset.simulated_options(options, base_options)
+        gauge: Any = preset.gauge_options(options, base_options)
+        read_channels = {channel.name for channel in gauge.channels}
+        device.__init__(self, described, lambda channel: sense(channel) if channel in read_channels else math.nan)
+
+    return type(f"Simulated{_camel(name)}", (device,), {"__init__": initialise, "__doc__": preset.title})
+
+
+def _camel(name: str) -> str:
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def _problems(document: Document, error: ValidationError, root: tuple[str, ...] = ()) -> list[Problem]:
+    """Each of pydantic's errors with its line in the file."""
+    problems = []
+    for detail in error.errors(include_url=False):
+        location = (*root, *detail["loc"])
+        value = document.value(location)
+        allowed = detail.get("ctx", {}).get("expected", "")
+        problems.append(
+            Problem(
+                where=document.where(location),
+                what=detail["msg"].removeprefix("Value error, "),
+                value="" if value is None or isinstance(value, dict | list) else str(value),
+                allowed=str(allowed),
+                next_step="drivers/compd_drivers/presets/README.md says what a preset may hold",
+            )
+        )
+    return problems
