@@ -10,7 +10,8 @@ import numpy as np
 from compd.gauge import good
 from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.model.effect import FittedEffect, needed_quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.library import library
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine

@@ -14,7 +14,8 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
-from compd.model.effect import FittedEffect, needed_quantities, unmet_needs
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
 from compd.model_file import read_model_file
