@@ -15,9 +15,10 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, Segment, rows_of, segments
 from compd.diagnosis.regression import solve
 from compd.errors import Problem, RecordingError
-from compd.model.effect import FittedEffect, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
-from compd.model.prediction import columns, sensitivities
+from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file
 from compd.units import UM_PER_MM
 
@@ -89,15 +90,15 @@ def plan(
             )
         )
     links = aligned.rows.links
-    names = list(dict.fromkeys(name for one in pair for name in quantities(one.effect, links)))
+    names = list(dict.fromkeys(name for one in pair for name in needed_quantities(one.effect, links)))
     programmes = [one for one in segments(aligned, limits, names) if len(one) <= rows]
     fresh = rows_of(aligned.model, aligned.rows.constants, programmes, aligned)
     ports = {port for one in (*model, *pair) for port in one.effect.ports}
     by = sensitivities(aligned.model, fresh, ports)
 
     def of(one: FittedEffect) -> FloatArray:
-        basis, _ = one.effect.basis(fresh, one.shape, None)
-        found = columns(one.effect, fresh, basis, by)
+        basis, _ = one.effect.basis(fresh, one.constants, None)
+        found = effect_sensitivity(one.effect, fresh, basis, by)
         return (
             (found.link_length if aligned.of_links else found.tip)[:, list(aligned.axes)]
             * UM_PER_MM
@@ -105,7 +106,7 @@ def plan(
         )
 
     usable, _ = aligned.usable
-    old = [aligned.columns(one.effect, one.shape) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
+    old = [aligned.columns(one.effect, one.constants) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
     good = usable & np.all([np.isfinite(one).all(axis=(1, 2)) for one in old], axis=0)
     new = [of(one) for one in (*model, *pair)]
     ends = np.cumsum([0, *(len(one) for one in programmes)])
