@@ -86,7 +86,12 @@ def _row(durations_s: list[float]) -> list[str]:
 
 def _cycles(measured: Machine) -> dict[str, list[float]]:
     """Durations (s) of compute, JSON, packet, and of all three."""
-    found: dict[str, list[float]] = {"snapshot to setpoint": [], "JSON": [], "UDP packet": [], "snapshot to bytes": []}
+    durations_s: dict[str, list[float]] = {
+        "snapshot to setpoint": [],
+        "JSON": [],
+        "UDP packet": [],
+        "snapshot to bytes": [],
+    }
     config_hash = bytes(8)
     for tick in range(CYCLES):
         measured.now_s += 0.005
@@ -103,10 +108,10 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
         packed = time.perf_counter()
         assert setpoint.valid, setpoint.reason
         for durations, seconds in zip(
-            found.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
+            durations_s.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
         ):
             durations.append(seconds)
-    return found
+    return durations_s
 
 
 if __name__ == "__main__":
