@@ -1,4 +1,4 @@
-"""A client of the running daemon: blocking, one connection, the standard library alone.
+"""A client of the running daemon: blocking, one connection, no dependency beyond the standard library.
 
 A program that drives a machine, or only watches it, connects to the daemon's TCP port or Unix socket and receives
 setpoints::
@@ -40,10 +40,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from compd.errors import DaemonError, Problem
+from compd.live.loop.states import state_named
 
 DEFAULT_ADDRESS = "127.0.0.1:7750"
-# Every state of the loop that this client knows. A newer daemon may have more, and their meaning is unknown here.
-KNOWN_STATES = frozenset({"starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused"})
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
 
 Message = dict[str, Any]
@@ -117,7 +116,8 @@ class Client:
     def watch(self, rate_hz: float | None = None) -> Iterator[Message]:
         """Iterate over SETPOINT messages, without end.
 
-        `valid` is false in every message whose `state` is not among `KNOWN_STATES`, whatever else it says.
+        `valid` is false in every message whose `state` this release does not know, whatever else it says: the daemon is
+        a newer one then.
 
         Parameters
         ----------
@@ -249,7 +249,7 @@ class Client:
         while True:
             _, message = self._read()
             if message["class"] == "SETPOINT":
-                if message.get("state") not in KNOWN_STATES:
+                if state_named(message.get("state", "")) is None:
                     message["valid"] = False
                 self._setpoints.append(message)
             if message["class"] == wanted:

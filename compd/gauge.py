@@ -235,7 +235,7 @@ class Gauge(ABC, Generic[LineT]):
     sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver; None where
         they must be given in a file.
     sample_range : lowest and highest value that the gauge can show with these options, in its channels' unit.
-    usual_line : baud rate and format ("8N1") as the device is delivered, for `compd gauge scan --probe`.
+    usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
     about : what the device speaks and where that was read; "" where the module's docstring says it.
     """
 

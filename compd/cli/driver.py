@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.conformance.cases import Result
-    from compd.commissioning.conformance.report import Driver
+    from compd.commissioning.conformance.cases import CaseResult
+    from compd.commissioning.conformance.report import DriverUnderTest
 
 app = typer.Typer(no_args_is_help=True, help="Gauge drivers.")
 
@@ -36,18 +36,18 @@ def try_on_wires(
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
-    from compd.commissioning.conformance.report import find
+    from compd.commissioning.conformance.report import driver_under_test
     from compd.errors import PluginError
     from compd.plugins import GAUGES, names
 
     chosen = _read_options(options) if options else None
     if name is not None:
-        failed = _try(find(name, chosen, simulator), quick)
+        failed = _try(driver_under_test(name, chosen, simulator), quick)
     else:
         failed = 0
-        for each in names(GAUGES):
+        for installed in names(GAUGES):
             try:
-                driver = find(each)
+                driver = driver_under_test(installed)
             except PluginError as error:
                 typer.echo(f"\n{error}")
                 failed += 1
@@ -56,33 +56,33 @@ def try_on_wires(
     raise typer.Exit(1 if failed else 0)
 
 
-def _try(driver: Driver, quick: bool) -> int:
+def _try(driver: DriverUnderTest, quick: bool) -> int:
     """Print each case as it ends, and the table; the number that failed."""
-    from compd.commissioning.conformance.report import try_driver
+    from compd.commissioning.conformance.report import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
-    found: list[tuple[str, Result]] = []
-    for wire, result in try_driver(driver, on_real_wires=not quick):
-        wanted = f" [{result.wanted}]" if result.wanted else ""
-        typer.echo(f"  {result.verdict:4} {wire:12} {result.case}{wanted}: {result.came}")
-        found.append((wire, result))
-    _print_table(driver.name, found)
-    return sum(result.verdict == "FAIL" for _, result in found)
+    results: list[tuple[str, CaseResult]] = []
+    for wire, result in run_conformance(driver, on_real_wires=not quick):
+        required = f" [{result.required}]" if result.required else ""
+        typer.echo(f"  {result.verdict:4} {wire:12} {result.case}{required}: {result.observed}")
+        results.append((wire, result))
+    _print_table(driver.name, results)
+    return sum(result.verdict == "FAIL" for _, result in results)
 
 
-def _print_table(name: str, found: list[tuple[str, Result]]) -> None:
+def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    wires = list(dict.fromkeys(wire for wire, _ in found))
+    wires = list(dict.fromkeys(wire for wire, _ in results))
     colours = {"pass": "[green]pass[/]", "FAIL": "[bold red]FAIL[/]", "-": "-"}
     table = Table("case", *wires, title=f"{name} (-: cannot be tried there, see above)", title_justify="left")
-    for case in dict.fromkeys(result.case for _, result in found):
-        verdicts = {wire: colours[result.verdict] for wire, result in found if result.case == case}
+    for case in dict.fromkeys(result.case for _, result in results):
+        verdicts = {wire: colours[result.verdict] for wire, result in results if result.case == case}
         table.add_row(case, *(verdicts.get(wire, "") for wire in wires))
     Console().print(table)
-    failed = sum(result.verdict == "FAIL" for _, result in found)
-    typer.echo(f"{name}: {failed} of {len(found)} cases failed" if failed else f"{name}: nothing failed")
+    failed = sum(result.verdict == "FAIL" for _, result in results)
+    typer.echo(f"{name}: {failed} of {len(results)} cases failed" if failed else f"{name}: nothing failed")
 
 
 def _read_options(path: Path) -> dict[str, Any]:

@@ -65,7 +65,8 @@ def _card(one: Effect, configuration: Configuration) -> RenderableType:
     from rich.table import Table
 
     from compd.machine_builder import build_model
-    from compd.model.effect import PORTS, unmet_needs
+    from compd.model.effect import PORTS
+    from compd.model.effect_needs import unmet_needs
     from compd.model.observations import available_settings
 
     model = build_model(configuration.geometry, configuration.wiring)

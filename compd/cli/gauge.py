@@ -66,13 +66,13 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, look which preset gets an answer."""
-    from compd.commissioning.scan import candidates, ports, probe_port
+    from compd.commissioning.scan import probe_ports, serial_ports
 
-    found = ports()
-    if not found:
+    ports = serial_ports()
+    if not ports:
         typer.echo("no serial port found; is the adapter plugged in, and are you in group dialout?")
         return
-    for port in found:
+    for port in ports:
         typer.echo(f"{port.path}\n    {port.device}  {port.description}")
     if not probe:
         return
@@ -81,12 +81,8 @@ def scan(
         "is no gauge may take it for a command."
     )
     typer.confirm("Is nothing dangerous connected?", abort=True)
-    for port in found:
-        for candidate in candidates():
-            typer.echo(
-                f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: "
-                f"{probe_port(port.path, candidate)}"
-            )
+    for port, candidate, outcome in probe_ports(ports):
+        typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: {outcome}")
 
 
 @app.command()
@@ -101,10 +97,10 @@ def read(
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
     from compd.clock import MonotonicClock
-    from compd.commissioning.open_gauge import open_seen
+    from compd.commissioning.open_gauge import read_gauge
     from compd.gauge import LineFault
 
-    found = _target(target, name, port, baud, format_, timeout_s, assignments)
+    gauge_target = _target(target, name, port, baud, format_, timeout_s, assignments)
     clock = MonotonicClock()
     started_s = clock.monotonic()
 
@@ -112,16 +108,12 @@ def read(
         typer.echo(f"{(clock.monotonic() - started_s) * 1e3:8.1f} ms {direction} {data.hex(' ')}   {data!r}")
 
     try:
-        line = open_seen(found.line, clock, show)
-        try:
-            readings = found.gauge.read(line)
-        finally:
-            line.close()
+        readings = read_gauge(gauge_target, clock, show)
     except LineFault as fault:
-        typer.echo(f"{found.name}: {fault}")
+        typer.echo(f"{gauge_target.name}: {fault}")
         raise typer.Exit(1) from fault
-    for channel, reading in zip(found.gauge.channels, readings, strict=True):
-        typer.echo(f"{found.name}.{channel.name}: {_shown(reading, channel.unit)}")
+    for channel, reading in zip(gauge_target.gauge.channels, readings, strict=True):
+        typer.echo(f"{gauge_target.name}.{channel.name}: {_reading_text(reading, channel.unit)}")
     raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
 
 
@@ -142,17 +134,16 @@ def watch(
 
     from compd.clock import MonotonicClock
     from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import polled
+    from compd.commissioning.open_gauge import poll_gauge
 
-    found = _target(target, name, port, baud, format_, timeout_s, assignments)
+    gauge_target = _target(target, name, port, baud, format_, timeout_s, assignments)
     clock = MonotonicClock()
-    statistics = GaugeStatistics(found.gauge.channels)
-    console = Console()
-    with Live(console=console, refresh_per_second=5) as live:
+    statistics = GaugeStatistics(gauge_target.gauge.channels)
+    with Live(console=Console(), refresh_per_second=5) as live:
         try:
-            for readings in polled(found, clock, polls):
+            for readings in poll_gauge(gauge_target, clock, polls):
                 statistics.add(readings, clock.monotonic())
-                live.update(_watched(found.name, statistics, clock.monotonic()))
+                live.update(_statistics_table(gauge_target.name, statistics, clock.monotonic()))
         except KeyboardInterrupt:
             return
 
@@ -174,36 +165,30 @@ def learn(
     to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
 ) -> None:
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
-    import yaml
-
     from compd.commissioning.capture import capture_live, read_capture
-    from compd.commissioning.describe import learn as learn_from
-    from compd.commissioning.describe import verify
-    from compd.commissioning.open_gauge import TappedWire, byte_settings_of
-    from compd.plugins import GAUGES, load
+    from compd.commissioning.describe import learn_gauge
+    from compd.commissioning.open_gauge import PortArguments, byte_line_settings
 
     if capture is not None:
-        request, seen = read_capture(capture)
+        request, captured = read_capture(capture)
     elif port:
-        settings = byte_settings_of(TappedWire(port, baud, format_, timeout_s))
-        request, seen = capture_live(settings, out, replies, _between_captures, typer.echo)
+        settings = byte_line_settings(PortArguments(port, baud, format_, timeout_s))
+        request, captured = capture_live(settings, out, replies, _between_captures, typer.echo)
     else:
         raise typer.BadParameter("name a capture file, or a --port")
     errors = {}
-    for one in error or []:
-        text, _, quality = one.partition("=")
-        errors[text.encode("latin-1")] = quality
-    chosen = [one.strip() for one in names.split(",") if one.strip()]
-    learned = learn_from(request, seen, unit, chosen, errors)
-    said = verify(learned, load(GAUGES, "serial_ascii", "driver serial_ascii"), seen)
-    for reply, values in zip(seen, said, strict=True):
-        typer.echo(f"# {reply!r} -> {values}")
-    for note in learned.notes:
+    for assignment in error or []:
+        reply_text, _, quality = assignment.partition("=")
+        errors[reply_text.encode("latin-1")] = quality
+    channels = [name.strip() for name in names.split(",") if name.strip()]
+    description, values = learn_gauge(request, captured, unit, channels, errors)
+    for reply, value in zip(captured, values, strict=True):
+        typer.echo(f"# {reply!r} -> {value}")
+    for note in description.notes:
         typer.echo(f"# note: {note}")
-    text = yaml.safe_dump({"learned_gauge": {**learned.options, "line": "name_of_its_line"}}, sort_keys=False)
-    typer.echo(text)
+    typer.echo(description.as_yaml())
     if to is not None:
-        to.write_text(text, encoding="utf-8")
+        to.write_text(description.as_yaml(), encoding="utf-8")
 
 
 def _between_captures(done: int, wanted: int) -> None:
@@ -219,20 +204,20 @@ def _target(
     timeout_s: float,
     assignments: Sequence[str] | None,
 ) -> GaugeTarget:
-    from compd.commissioning.open_gauge import TappedWire, by_driver, configured
+    from compd.commissioning.open_gauge import PortArguments, gauge_of_configuration, gauge_of_driver
 
     if target.endswith((".yaml", ".yml")):
-        return configured(Path(target), name)
+        return gauge_of_configuration(Path(target), name)
     if not port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
-    return by_driver(target, TappedWire(port, baud, form, timeout_s), assignments or ())
+    return gauge_of_driver(target, PortArguments(port, baud, form, timeout_s), assignments or ())
 
 
-def _shown(reading: Reading, unit: str) -> str:
+def _reading_text(reading: Reading, unit: str) -> str:
     return f"{reading.value:.6f} {unit}" if reading.ok else f"{reading.quality} {reading.detail}".rstrip()
 
 
-def _watched(name: str, statistics: GaugeStatistics, now_s: float) -> Any:
+def _statistics_table(name: str, statistics: GaugeStatistics, now_s: float) -> Any:
     from rich.table import Table
 
     faults = ", ".join(f"{quality} {count}" for quality, count in statistics.faults.items()) or "none"
@@ -249,7 +234,7 @@ def _watched(name: str, statistics: GaugeStatistics, now_s: float) -> Any:
         noise, age_ms = statistics.noise(k) * scale, statistics.age_s(k, now_s) * 1e3
         table.add_row(
             channel.name,
-            _shown(reading, channel.unit),
+            _reading_text(reading, channel.unit),
             f"{statistics.mean(k):.6f} {channel.unit}",
             f"{noise:.3f} {unit}",
             f"{age_ms:.1f}",

@@ -7,14 +7,14 @@ import math
 from rich.console import Console
 from rich.table import Table
 
-from compd.commissioning.line_budget import plan, warnings
+from compd.commissioning.line_budget import budget_warnings, line_budgets
 from compd.configuration import Configuration
 from compd.errors import Problem
 
 
 def print_line_plan(configuration: Configuration) -> list[Problem]:
     """Print bytes, milliseconds and rate per line; the warnings that follow."""
-    plans = plan(configuration)
+    plans = line_budgets(configuration)
     table = Table(
         "line",
         "gauges",
@@ -40,7 +40,7 @@ def print_line_plan(configuration: Configuration) -> list[Problem]:
             _rates(one.usual_hz, one.ideal_hz),
         )
     Console().print(table)
-    return warnings(configuration, plans)
+    return budget_warnings(configuration, plans)
 
 
 def _rates(usual_hz: float, ideal_hz: float) -> str:

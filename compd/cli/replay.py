@@ -22,8 +22,7 @@ def replay(
     Exit code 1 when one differs.
     """
     from compd.configuration import load
-    from compd.live.record.replay import RecordedCycles, ReplayedCycle
-    from compd.live.record.replay import replay as replay_cycles
+    from compd.live.record.replay import RecordedCycles, ReplayedCycle, replay_cycles
 
     configuration = load(machine)
     transcripts = RecordedCycles(name)
@@ -42,8 +41,8 @@ def replay(
             first = first or cycle
         if setpoints:
             typer.echo(cycle.replayed, nl=False)
-    if transcripts.torn:
-        typer.echo(f"{transcripts.torn} torn line at the end left out: the recorder was killed", err=True)
+    if transcripts.torn_lines:
+        typer.echo(f"{transcripts.torn_lines} torn line at the end left out: the recorder was killed", err=True)
     if first is None:
         typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent", err=True)
         return

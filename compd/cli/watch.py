@@ -14,11 +14,11 @@ from rich.text import Text
 
 from compd.cli.zero import unix_address
 from compd.client import DEFAULT_ADDRESS, Client, connect
+from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
 _STATUS_EVERY_S = 1.0
-_COLOURS = {"ok": "green", "slewing": "yellow", "hold": "yellow", "fade": "yellow", "clamped": "yellow"}
 
 
 def watch(
@@ -67,13 +67,21 @@ def view(version: dict[str, Any], setpoint: dict[str, Any], status: dict[str, An
     """One picture of the daemon: what a VERSION, a SETPOINT and a STATUS message say."""
     parts: list[RenderableType] = [_headline(version, setpoint)]
     if setpoint["reason"]:
-        parts.append(Text(setpoint["reason"], style=_COLOURS.get(setpoint["state"], "red")))
-    if setpoint["valid"]:
+        parts.append(Text(setpoint["reason"], style=state_colour(setpoint["state"])))
+    if setpoint["valid"] and state_named(setpoint["state"]) is not None:
         parts += [_position(setpoint), _corrections(setpoint)]
     parts.append(_loop(status))
     if lost := [gauge for gauge in status["gauges"] if gauge["quality"] != "ok"]:
         parts.append(Text("not good: " + ", ".join(f"{g['channel']} {g['quality']}" for g in lost), style="red"))
     return Group(*parts)
+
+
+def state_colour(name: str) -> str:
+    """Green for ok, yellow for the other valid states, red for the invalid ones and for those of a newer daemon."""
+    state = state_named(name)
+    if state is None or not state.valid:
+        return "red"
+    return "green" if state is State.OK else "yellow"
 
 
 def _headline(version: dict[str, Any], setpoint: dict[str, Any]) -> Text:
@@ -82,7 +90,7 @@ def _headline(version: dict[str, Any], setpoint: dict[str, Any]) -> Text:
     return Text.assemble(
         (version["machine"], "bold"),
         "  ",
-        (state.upper(), f"bold {_COLOURS.get(state, 'red')}"),
+        (state.upper(), f"bold {state_colour(state)}"),
         f"  {setpoint['mode']}, setpoint {setpoint['seq']}{age}",
     )
 

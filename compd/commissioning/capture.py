@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from compd.clock import MonotonicClock
-from compd.commissioning.open_gauge import open_stream
+from compd.commissioning.open_gauge import open_tapped_stream
 from compd.configuration.lines import ModbusRtuLine, SerialLine, TcpLine
 from compd.errors import CompdError, Problem
 from compd.gauge import LineFault, Quality
@@ -29,7 +29,7 @@ def read_capture(path: Path) -> tuple[bytes, list[bytes]]:
         text = line.strip()
         if not text or text.startswith("#"):
             continue
-        direction, data = text[0], _bytes(f"{path}:{number}", text)
+        direction, data = text[0], _bytes_of_line(f"{path}:{number}", text)
         if direction == "<":
             replies.append(data)
         elif request and data != request:
@@ -47,7 +47,7 @@ def read_capture(path: Path) -> tuple[bytes, list[bytes]]:
     return request, replies
 
 
-def _bytes(where: str, text: str) -> bytes:
+def _bytes_of_line(where: str, text: str) -> bytes:
     data = text[1:].strip()
     if text[0] not in "<>" or not data:
         raise CompdError(
@@ -80,16 +80,24 @@ def capture_live(
     between: Callable[[int, int], None],
     show: Callable[[str], None],
 ) -> tuple[bytes, list[bytes]]:
-    """Ask `wanted` times, `between` two captures the person moves the gauge; everything until silence is the reply.
+    """The request and `wanted` replies, captured on the wire: everything until silence is one reply.
 
-    Without `out`, what comes unasked between two silences. CompdError when nothing comes.
+    out : the request with escapes; "" for a device that speaks unasked, where a reply is what comes between two
+        silences.
+    between : called between two captures with (captured so far, wanted): the person moves the gauge meanwhile.
+    show : called with a line of text for all bytes that pass.
+    Raises CompdError when nothing comes.
     """
     request = unescaped(out)
     replies: list[bytes] = []
-    line = open_stream(settings, MonotonicClock(), lambda way, data: show(f"{way} {data.hex(' ')}   {data!r}"))
+
+    def show_bytes(direction: str, data: bytes) -> None:
+        show(f"{direction} {data.hex(' ')}   {data!r}")
+
+    line = open_tapped_stream(settings, MonotonicClock(), show_bytes)
     try:
         while len(replies) < wanted:
-            replies.append(_reply(line, request))
+            replies.append(_reply_until_silence(line, request))
             if len(replies) < wanted:
                 between(len(replies), wanted)
     except LineFault as fault:
@@ -105,8 +113,8 @@ def capture_live(
     return request, replies
 
 
-def _reply(line: StreamLine, request: bytes) -> bytes:
-    """What comes after a request, until the line is quiet."""
+def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
+    """What comes after a request, until the line is quiet. Raises LineFault: TIMEOUT when nothing does."""
     if request:
         line.send(request)
     else:

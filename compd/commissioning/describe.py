@@ -1,7 +1,7 @@
 """From observed replies of an unknown gauge to a `serial_ascii` description, or to why there is none.
 
 What never changed is taken for constant text, numbers with a decimal point (and whole numbers that changed) for
-channels. The description is as narrow as what was seen: a width that never changed must not change.
+channels. The description is as narrow as the replies: a width that never changed must not change.
 """
 
 from __future__ import annotations
@@ -11,49 +11,67 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import yaml
 from pydantic import ValidationError
 
 from compd.errors import CompdError, Problem
 from compd.gauge import Gauge, LineFault, Quality
+from compd.plugins import GAUGES, load
 
 FEWEST_REPLIES = 3
 _NUMBER = re.compile(rb" *[+-]? *\d*\.\d+| *[+-] *\d+|\d+")
 
 
-class LearningError(CompdError):
+class DescriptionError(CompdError):
     """Replies from which no description follows."""
 
 
 @dataclass(frozen=True)
-class Learned:
-    """Options for `serial_ascii` (without `line`), and what a person should look at."""
+class GaugeDescription:
+    """Options for the driver `serial_ascii` (without `line`), and notes on what to look up in the manual."""
 
     options: Mapping[str, Any]
     notes: tuple[str, ...]
 
+    def as_yaml(self) -> str:
+        """An entry for `gauges:` in a configuration, with names to be replaced for the gauge and its line."""
+        return yaml.safe_dump({"learned_gauge": {**self.options, "line": "name_of_its_line"}}, sort_keys=False)
 
-class _Part(NamedTuple):
-    """A piece of a reply: a number or the text between two numbers, and where it begins."""
+
+class _ReplyPart(NamedTuple):
+    """A piece of a reply: a number or the text between two numbers, and its first byte's place in the reply."""
 
     is_number: bool
     text: bytes
-    at: int
+    start: int
 
 
-def learn(
+def learn_gauge(
     request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
-) -> Learned:
-    """The description of a gauge that answered `request` (b"" = it speaks unasked) by `replies`.
+) -> tuple[GaugeDescription, list[str]]:
+    """The description of a gauge, and the values that it gives of every reply. Parameters as for `describe_replies`.
 
-    `unit` : of every number on the wire. `names` : of the channels, 1, 2 ... if empty.
-    `errors` : whole error replies without their terminator, and their quality.
-    Raises LearningError: too few replies, or where the first one differs from the others.
+    Raises DescriptionError where no description follows, or where a reply does not fit the one that does.
+    """
+    description = describe_replies(request, replies, unit, names, errors)
+    return description, read_replies(description, load(GAUGES, "serial_ascii", "driver serial_ascii"), replies)
+
+
+def describe_replies(
+    request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
+) -> GaugeDescription:
+    """The description of a gauge that answered `request` (b"": it speaks unasked) by `replies`.
+
+    unit : of every number on the wire.
+    names : of the channels; "value", or 1, 2 ... if empty.
+    errors : whole error replies without their terminator, and their quality.
+    Raises DescriptionError for too few replies that differ, and for the first reply of another form, with its place.
     """
     terminator = _terminator(replies)
     bodies = [reply[: len(reply) - len(terminator)] for reply in replies]
     bodies = [body for body in bodies if body not in errors]
     if len(set(bodies)) < FEWEST_REPLIES:
-        raise LearningError(
+        raise DescriptionError(
             Problem(
                 where="replies",
                 what="too few that differ",
@@ -65,10 +83,10 @@ def learn(
     columns = _columns(bodies)
     numbers = [k for k, column in enumerate(columns) if _is_channel(column)]
     if not numbers:
-        raise LearningError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
+        raise DescriptionError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
     chosen = list(names) or (["value"] if len(numbers) == 1 else [str(k + 1) for k in range(len(numbers))])
     if len(chosen) != len(numbers):
-        raise LearningError(
+        raise DescriptionError(
             Problem(
                 where="--names",
                 what=f"{len(chosen)} names for {len(numbers)} numbers",
@@ -85,56 +103,60 @@ def learn(
             text, note = _constant(column)
         form += text
         notes += [note] if note else []
-    options = {
+    options: dict[str, Any] = {
         "driver": "serial_ascii",
         **({"out": escaped(request)} if request else {}),
         "in": form,
         "in_terminator": escaped(terminator),
         "channels": [{"name": name, "unit": unit} for name in chosen],
-        **(
-            {"errors": [{"in": escaped(text, "%"), "quality": said} for text, said in errors.items()]} if errors else {}
-        ),
     }
-    return Learned(options, (*notes, "add each channel's `range` from the manual: what is beyond it is no measurement"))
+    if errors:
+        options["errors"] = [{"in": escaped(text, "%"), "quality": quality} for text, quality in errors.items()]
+    return GaugeDescription(
+        options, (*notes, "add each channel's `range` from the manual: what is beyond it is no measurement")
+    )
 
 
-def verify(learned: Learned, driver: type[Gauge[Any]], replies: Sequence[bytes]) -> list[str]:
-    """Read every observed reply by the description: what came, in words. LearningError names one that does not fit."""
+def read_replies(description: GaugeDescription, driver: type[Gauge[Any]], replies: Sequence[bytes]) -> list[str]:
+    """The values of every observed reply, read by the description with `driver` (serial_ascii), as text.
+
+    Raises DescriptionError for options that the driver refuses, and for a reply that does not fit.
+    """
     try:
-        options = driver.Options.model_validate({**learned.options, "line": "learned"})
+        options = driver.Options.model_validate({**description.options, "line": "learned"})
     except ValidationError as error:
-        raise LearningError(
+        raise DescriptionError(
             [Problem(where="description", what=detail["msg"], value=str(detail["input"])) for detail in error.errors()]
         ) from error
-    said = []
+    texts = []
     for k, reply in enumerate(replies):
-        line = _Replay(reply)
+        line = _RepeatedReply(reply)
         try:
             readings = driver(options).read(line)
         except LineFault as fault:
-            raise LearningError(
+            raise DescriptionError(
                 Problem(
                     where=f"reply {k + 1}",
                     what=f"does not fit the description: {fault}",
                     value=repr(reply),
-                    allowed=str(learned.options["in"]),
+                    allowed=str(description.options["in"]),
                 )
             ) from fault
-        said.append(", ".join(f"{r.value:.6g}" if r.ok else str(r.quality) for r in readings))
-    return said
+        texts.append(", ".join(f"{r.value:.6g}" if r.ok else str(r.quality) for r in readings))
+    return texts
 
 
 def escaped(text: bytes, double: str = "") -> str:
     r"""As a description writes it: \r \n \t \\ \xHH; characters of `double` twice."""
     named = {0x0D: r"\r", 0x0A: r"\n", 0x09: r"\t", 0x5C: r"\\"}
     shown = (named.get(b) or (chr(b) if 0x20 <= b < 0x7F else f"\\x{b:02x}") for b in text)
-    return "".join(2 * one if one in double else one for one in shown)
+    return "".join(2 * character if character in double else character for character in shown)
 
 
 def _terminator(replies: Sequence[bytes]) -> bytes:
     """Control characters that end every reply; b"" if all are equally long without any."""
     if not replies or not all(replies):
-        raise LearningError(
+        raise DescriptionError(
             Problem(where="replies", what="there is none, or an empty one", next_step="check port, baud and format")
         )
     ending = re.search(rb"[\x00-\x1f]*$", replies[0])
@@ -143,7 +165,7 @@ def _terminator(replies: Sequence[bytes]) -> bytes:
         terminator = terminator[1:]
     if not terminator and len({len(reply) for reply in replies}) > 1:
         k = next(k for k, reply in enumerate(replies) if len(reply) != len(replies[0]))
-        raise LearningError(
+        raise DescriptionError(
             Problem(
                 where=f"reply {k + 1}",
                 what="has no terminator in common with reply 1, and another length",
@@ -154,32 +176,34 @@ def _terminator(replies: Sequence[bytes]) -> bytes:
     return terminator
 
 
-def _parts(body: bytes) -> list[_Part]:
-    found, at = [], 0
+def _parts(body: bytes) -> list[_ReplyPart]:
+    """Text and numbers in turn; the first and the last part are text, perhaps empty."""
+    parts, start = [], 0
     for match in _NUMBER.finditer(body):
-        found += [_Part(False, body[at : match.start()], at), _Part(True, match[0], match.start())]
-        at = match.end()
-    return [*found, _Part(False, body[at:], at)]
+        parts += [_ReplyPart(False, body[start : match.start()], start), _ReplyPart(True, match[0], match.start())]
+        start = match.end()
+    return [*parts, _ReplyPart(False, body[start:], start)]
 
 
-def _columns(bodies: Sequence[bytes]) -> list[list[_Part]]:
-    """Column by column the parts of all replies. LearningError where one reply is built differently."""
+def _columns(bodies: Sequence[bytes]) -> list[list[_ReplyPart]]:
+    """Column by column the parts of all replies. DescriptionError where one reply is built differently."""
     split = [_parts(body) for body in bodies]
     for k, parts in enumerate(split):
-        for mine, first in zip(parts, split[0], strict=False):
-            if not mine.is_number and len(mine.text) != len(first.text):
-                raise _differs(k, mine.at, bodies[k], bodies[0])
-            if mine.is_number and (b"." in mine.text) != (b"." in first.text):
-                raise _differs(k, mine.at, bodies[k], bodies[0])
+        for part, first in zip(parts, split[0], strict=False):
+            if not part.is_number and len(part.text) != len(first.text):
+                raise _difference(k, part.start, bodies[k], bodies[0])
+            if part.is_number and (b"." in part.text) != (b"." in first.text):
+                raise _difference(k, part.start, bodies[k], bodies[0])
         if len(parts) != len(split[0]):
-            raise _differs(k, min(parts[-1].at, split[0][-1].at), bodies[k], bodies[0])
+            raise _difference(k, min(parts[-1].start, split[0][-1].start), bodies[k], bodies[0])
     return [list(column) for column in zip(*split, strict=True)]
 
 
-def _differs(k: int, at: int, body: bytes, first: bytes) -> LearningError:
-    return LearningError(
+def _difference(k: int, place: int, body: bytes, first: bytes) -> DescriptionError:
+    """The error for reply `k`, which differs in form from the first one from byte `place` on."""
+    return DescriptionError(
         Problem(
-            where=f"reply {k + 1}, character {at + 1}",
+            where=f"reply {k + 1}, character {place + 1}",
             what="is built differently from reply 1",
             value=repr(body),
             allowed=repr(first),
@@ -188,7 +212,7 @@ def _differs(k: int, at: int, body: bytes, first: bytes) -> LearningError:
     )
 
 
-def _is_channel(column: Sequence[_Part]) -> bool:
+def _is_channel(column: Sequence[_ReplyPart]) -> bool:
     """A number with a point or a sign always counts; a bare whole number (an address, a name) if it changed."""
     if not column[0].is_number:
         return False
@@ -196,21 +220,23 @@ def _is_channel(column: Sequence[_Part]) -> bool:
     return not bare or len({part.text for part in column}) > 1
 
 
-def _constant(column: Sequence[_Part]) -> tuple[str, str]:
-    """Text that never changed, literally; a character that did, as the set of what was seen."""
+def _constant(column: Sequence[_ReplyPart]) -> tuple[str, str]:
+    """Text that never changed, literally; a character that did, as the set of all that came; and a note as above."""
     form, note = "", ""
     for place in range(len(column[0].text)):
-        seen = sorted({part.text[place : place + 1] for part in column})
-        if len(seen) == 1:
-            form += escaped(seen[0], "%")
+        characters = sorted({part.text[place : place + 1] for part in column})
+        if len(characters) == 1:
+            form += escaped(characters[0], "%")
             continue
-        form += "%*1[" + "".join(escaped(one) for one in sorted(seen, key=lambda one: one in b"-^]")) + "]"
-        note += f"{', ' if note else 'look up what else can stand where only '}{b''.join(seen)!r} were seen"
+        # - ^ and ] have a meaning inside a set: they stand last
+        members = sorted(characters, key=lambda character: character in b"-^]")
+        form += "%*1[" + "".join(map(escaped, members)) + "]"
+        note += f"{', ' if note else 'look up what else can stand where only '}{b''.join(characters)!r} were seen"
     return form, note
 
 
 def _converter(texts: Sequence[bytes], name: str) -> tuple[str, str]:
-    """A number's converter, as narrow as what was seen, and what to look at."""
+    """A number's converter, as narrow as the replies, and a note on what to look up in the manual ("" if nothing)."""
     decimals = {len(text.partition(b".")[2]) if b"." in text else None for text in texts}
     signed = all(re.search(rb"[+-]", text) for text in texts)
     blank = all(text[:1] in b"+- " for text in texts) and not signed
@@ -241,8 +267,8 @@ def _converter(texts: Sequence[bytes], name: str) -> tuple[str, str]:
     )
 
 
-class _Replay:
-    """A line on which always the same reply comes."""
+class _RepeatedReply:
+    """A line on which the same reply comes to every request."""
 
     def __init__(self, reply: bytes) -> None:
         self._reply = reply

@@ -1,7 +1,12 @@
 """What a line can carry: bytes and milliseconds of a round, and the sampling rate that follows.
 
-The reckoning is the line's own limit: bits on the wire, the silence before each request, and the time that a device
+This is the limit of the line itself: bits on the wire, the silence before each request, and the time that a device
 takes to answer. What the computer adds is not in it.
+
+    exchange = quiet + (sent + received) x character + turnaround,    round = sum of all exchanges,    rate = 1 / round
+
+Example: nine values as int16 in one block (8 bytes there, 23 back) at 19200 baud, 8N1: a character takes 0.52 ms, the
+silence 1.8 ms; with a turnaround of 1.8 ms a round takes 19.8 ms: 51 rounds a second.
 """
 
 from __future__ import annotations
@@ -13,8 +18,8 @@ from dataclasses import dataclass, field
 from compd.configuration import Configuration
 from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
 from compd.errors import Problem
+from compd.lines.open import QUIET_CHARACTERS
 
-QUIET_CHARACTERS = 3.5  # of silence before a frame (Modbus over Serial Line V1.02, 2.5.1.1); also kept on ASCII lines
 SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
 SHORTEST_QUIET_ASCII_S = 1e-3
 # A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
@@ -27,7 +32,7 @@ Traffic = Sequence[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Pace:
-    """How long things take on a line.
+    """Times on a line, s.
 
     character_s : of one character, 0 over TCP.
     quiet_s : silence before a request.
@@ -67,8 +72,8 @@ def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
 
 
 @dataclass(frozen=True)
-class LinePlan:
-    """One line's round: every gauge on it once.
+class LineBudget:
+    """A round on one line, which polls every gauge on it once.
 
     bytes : there and back. ideal_s, usual_s : duration of a round with the shortest and the usual turnaround.
     absent_s : what a round costs more while one device does not answer, before its gauge is put to rest.
@@ -104,8 +109,8 @@ class LinePlan:
         return 1 / max(round_s, self.line.poll_every_s) if self.known else math.nan
 
 
-def plan_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None]) -> LinePlan:
-    """The plan of one line; `gauges`: each one's traffic per poll, None = unknown."""
+def budget_of_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None]) -> LineBudget:
+    """The budget of one line; `gauges`: name -> traffic per poll as (bytes sent, bytes received), None = unknown."""
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
     slowest = pace(line, USUAL_TURNAROUND_S)
     # The request goes out, nothing comes for the timeout, and the line is drained for another one.
@@ -113,7 +118,7 @@ def plan_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None
         (2 * line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
         default=2 * line.timeout_s,
     )
-    return LinePlan(
+    return LineBudget(
         name=name,
         line=line,
         gauges=len(gauges),
@@ -126,70 +131,70 @@ def plan_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None
     )
 
 
-def plan(configuration: Configuration) -> list[LinePlan]:
-    """Every line that a gauge hangs on."""
+def line_budgets(configuration: Configuration) -> list[LineBudget]:
+    """The budget of every line that a gauge hangs on."""
     gauges = configuration.gauge_objects()
     return [
-        plan_line(name, line, {gauge: gauges[gauge].traffic() for gauge in _on(configuration, name)})
+        budget_of_line(name, line, {gauge: gauges[gauge].traffic() for gauge in _gauges_on(configuration, name)})
         for name, line in configuration.lines.items()
-        if _on(configuration, name)
+        if _gauges_on(configuration, name)
     ]
 
 
-def warnings(configuration: Configuration, plans: Sequence[LinePlan]) -> list[Problem]:
+def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
     """What will not work as configured, or will not while one device is absent."""
-    found = []
-    for one in plans:
+    problems = []
+    for budget in budgets:
         stale_after_s = min(
             configuration.gauges[gauge].stale_after_s or configuration.loop.stale_after_s
-            for gauge in _on(configuration, one.name)
+            for gauge in _gauges_on(configuration, budget.name)
         )
-        found += line_warnings(one, stale_after_s, f"{configuration.path} lines.{one.name}")
-    return found
+        problems += line_warnings(budget, stale_after_s, f"{configuration.path} lines.{budget.name}")
+    return problems
 
 
-def _on(configuration: Configuration, line: str) -> list[str]:
+def _gauges_on(configuration: Configuration, line: str) -> list[str]:
     return [gauge for gauge, options in configuration.gauges.items() if options.line == line]
 
 
-def line_warnings(one: LinePlan, stale_after_s: float, where: str) -> list[Problem]:
-    """One line's warnings. `stale_after_s`: how old its strictest gauge lets a reading become; `where`: its place."""
-    if one.unknown:
-        text = f"cannot be planned: {', '.join(one.unknown)} does not say how many bytes it moves"
+def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[Problem]:
+    """One line's warnings. `stale_after_s`: the shortest of its gauges; `where`: the line's place in the file."""
+    if budget.unknown:
+        text = f"cannot be planned: {', '.join(budget.unknown)} does not say how many bytes it moves"
         return [
             Problem(where=where, what=text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")
         ]
-    found = []
-    takes = f"a round of {one.bytes} bytes takes {one.usual_s * 1e3:.1f} ms with 10 ms turnaround"
+    problems = []
+    takes = f"a round of {budget.bytes} bytes takes {budget.usual_s * 1e3:.1f} ms with 10 ms turnaround"
     # A reading is up to a whole round old when the next one comes, and must outlive that one's own reading.
-    if 2 * one.usual_s > stale_after_s:
-        found.append(
+    if 2 * budget.usual_s > stale_after_s:
+        problems.append(
             Problem(
                 where=where,
                 what=f"{takes}: readings go stale between two polls",
                 value=f"{stale_after_s:g} s until stale",
-                allowed=f"{2 * one.usual_s:.3g} s or more",
+                allowed=f"{2 * budget.usual_s:.3g} s or more",
                 next_step="raise the baud rate, read registers in one block, or spread the gauges over more lines",
             )
         )
-    if one.line.poll_every_s and one.usual_s > one.line.poll_every_s:
-        found.append(
+    if budget.line.poll_every_s and budget.usual_s > budget.line.poll_every_s:
+        problems.append(
             Problem(
                 where=where,
                 what=f"{takes}: the wanted rate cannot be reached",
-                value=f"poll_every_s {one.line.poll_every_s:g}",
-                allowed=f"{one.usual_s:.3g} s or more",
+                value=f"poll_every_s {budget.line.poll_every_s:g}",
+                allowed=f"{budget.usual_s:.3g} s or more",
                 next_step="raise poll_every_s, or the baud rate",
             )
         )
-    if one.gauges > 1 and one.usual_s + one.absent_s > stale_after_s:
-        found.append(
+    if budget.gauges > 1 and budget.usual_s + budget.absent_s > stale_after_s:
+        problems.append(
             Problem(
                 where=where,
-                what=f"one absent device of {one.gauges} delays the others by {one.absent_s * 1e3:.0f} ms: "
+                what=f"one absent device of {budget.gauges} delays the others by {budget.absent_s * 1e3:.0f} ms: "
                 "they go stale whenever it is tried again",
                 value=f"{stale_after_s:g} s until stale",
                 next_step="shorten timeout_s, or give that device a line of its own",
             )
         )
-    return found
+    return problems

@@ -1,4 +1,4 @@
-"""Which gauge a command means, and its line with every byte seen."""
+"""The gauge that a command means, its line with every byte shown, and polling it as the daemon does."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ SettingsT = TypeVar("SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusTcpLi
 
 
 @dataclass(frozen=True)
-class TappedWire:
-    """A port as it is given on the command line."""
+class PortArguments:
+    """A port as it is given on the command line; `baud` and `format` (8N1 ...) are None over TCP."""
 
     port: str
     baud: int | None
@@ -45,8 +45,8 @@ class GaugeTarget:
     line: LineSettings
 
 
-def configured(path: Path, name: str | None) -> GaugeTarget:
-    """A gauge of a configuration; ConfigurationError when it has none of that name."""
+def gauge_of_configuration(path: Path, name: str | None) -> GaugeTarget:
+    """The gauge `name` of the configuration `path`; ConfigurationError when it has none of that name."""
     configuration = load_configuration(path)
     if name is None or name not in configuration.gauges:
         raise ConfigurationError(
@@ -61,8 +61,11 @@ def configured(path: Path, name: str | None) -> GaugeTarget:
     return GaugeTarget(name, configuration.drivers[name](options), configuration.lines[options.line])
 
 
-def by_driver(driver: str, wire: TappedWire, assignments: Sequence[str]) -> GaugeTarget:
-    """A gauge without a configuration: its driver's name, a port, and options as KEY=VALUE (YAML)."""
+def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]) -> GaugeTarget:
+    """A gauge without a configuration: its driver's name, a port, and options as KEY=VALUE (VALUE in YAML).
+
+    Raises ConfigurationError for an assignment that is none, and for options that the driver refuses.
+    """
     kind = load(GAUGES, driver, f"driver {driver}")
     options: dict[str, Any] = {"driver": driver, "line": "command_line"}
     for assignment in assignments:
@@ -85,45 +88,49 @@ def by_driver(driver: str, wire: TappedWire, assignments: Sequence[str]) -> Gaug
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    return GaugeTarget(driver, gauge, settings_of(wire, kind.line_kind == "registers"))
+    return GaugeTarget(driver, gauge, line_settings(port, kind.line_kind == "registers"))
 
 
-def settings_of(wire: TappedWire, registers: bool) -> LineSettings:
-    """host:port is TCP, everything else a serial port or pyserial URL, with baud rate and format."""
+def line_settings(port: PortArguments, registers: bool) -> LineSettings:
+    """Settings of a Modbus line (`registers`) or of a line of bytes.
+
+    host:port is TCP, everything else a serial port or pyserial URL, with baud rate and format. Raises
+    ConfigurationError where one of them is missing or not allowed.
+    """
     if not registers:
-        return byte_settings_of(wire)
-    if address := _address(wire.port):
-        return _checked(ModbusTcpLine, kind="modbus_tcp", host=address[0], port=address[1], timeout_s=wire.timeout_s)
-    return _checked(ModbusRtuLine, kind="modbus_rtu", **_serial(wire))
+        return byte_line_settings(port)
+    if address := _tcp_address(port.port):
+        return _validated(ModbusTcpLine, kind="modbus_tcp", host=address[0], port=address[1], timeout_s=port.timeout_s)
+    return _validated(ModbusRtuLine, kind="modbus_rtu", **_serial_settings(port))
 
 
-def byte_settings_of(wire: TappedWire) -> SerialLine | TcpLine:
-    """A line of bytes."""
-    if address := _address(wire.port):
-        return _checked(TcpLine, kind="tcp", host=address[0], port=address[1], timeout_s=wire.timeout_s)
-    return _checked(SerialLine, kind="serial", **_serial(wire))
+def byte_line_settings(port: PortArguments) -> SerialLine | TcpLine:
+    """Settings of a line of bytes, as `line_settings` makes them."""
+    if address := _tcp_address(port.port):
+        return _validated(TcpLine, kind="tcp", host=address[0], port=address[1], timeout_s=port.timeout_s)
+    return _validated(SerialLine, kind="serial", **_serial_settings(port))
 
 
-def _address(port: str) -> tuple[str, int] | None:
+def _tcp_address(port: str) -> tuple[str, int] | None:
     host, colon, number = port.rpartition(":")
     return (host, int(number)) if colon and number.isdigit() and "/" not in port else None
 
 
-def _serial(wire: TappedWire) -> dict[str, Any]:
-    if wire.baud is None or wire.format is None:
+def _serial_settings(port: PortArguments) -> dict[str, Any]:
+    if port.baud is None or port.format is None:
         raise ConfigurationError(
             Problem(
                 where="--baud, --format",
                 what="a serial port needs both",
-                value=wire.port,
+                value=port.port,
                 allowed="--baud 9600 --format 7E2",
                 next_step="look them up in the device's manual; they differ from device to device",
             )
         )
-    return {"port": wire.port, "baud": wire.baud, "format": wire.format, "timeout_s": wire.timeout_s}
+    return {"port": port.port, "baud": port.baud, "format": port.format, "timeout_s": port.timeout_s}
 
 
-def _checked(settings: type[SettingsT], **data: Any) -> SettingsT:
+def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
     try:
         return settings.model_validate(data)
     except ValidationError as error:
@@ -135,53 +142,68 @@ def _checked(settings: type[SettingsT], **data: Any) -> SettingsT:
         ) from error
 
 
-Seen = Callable[[str, bytes], None]
+# Called with ">" and the bytes that were sent, "<" and the bytes that were received.
+ByteListener = Callable[[str, bytes], None]
 
 
 class TappedPort:
-    """A port whose bytes are shown: `seen(">", sent)`, `seen("<", received)`."""
+    """A port that shows every byte to a listener."""
 
-    def __init__(self, port: Port, seen: Seen) -> None:
+    def __init__(self, port: Port, listener: ByteListener) -> None:
         self.character_s = port.character_s
         self._port = port
-        self._seen = seen
+        self._listener = listener
 
     def read(self, timeout_s: float) -> bytes:
         data = self._port.read(timeout_s)
         if data:
-            self._seen("<", data)
+            self._listener("<", data)
         return data
 
     def write(self, data: bytes) -> None:
-        self._seen(">", data)
+        self._listener(">", data)
         self._port.write(data)
 
     def close(self) -> None:
         self._port.close()
 
 
-def open_seen(settings: LineSettings, clock: Clock, seen: Seen) -> Line:
-    """The line as the daemon opens it, with its bytes shown (Modbus TCP's are pymodbus's own: not shown)."""
+def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
+    """The line as the daemon opens it, with its bytes shown (those of Modbus TCP stay inside pymodbus)."""
     if not isinstance(settings, SerialLine | ModbusRtuLine | TcpLine):
         return open_line(settings, clock)
-    stream = open_stream(settings, clock, seen)
+    stream = open_tapped_stream(settings, clock, listener)
     return RtuMaster(stream) if isinstance(settings, ModbusRtuLine) else stream
 
 
-def open_stream(settings: SerialLine | ModbusRtuLine | TcpLine, clock: Clock, seen: Seen) -> StreamLine:
-    """The bytes of a line, whatever speaks over them."""
+def open_tapped_stream(
+    settings: SerialLine | ModbusRtuLine | TcpLine, clock: Clock, listener: ByteListener
+) -> StreamLine:
+    """The byte stream of a line, with its bytes shown, whatever protocol runs over it."""
     if isinstance(settings, TcpLine):
-        port = TappedPort(TcpPort(settings.host, settings.port, settings.timeout_s), seen)
+        port = TappedPort(TcpPort(settings.host, settings.port, settings.timeout_s), listener)
         return StreamLine(port, settings.timeout_s, TCP_GAP_S, clock)
     serial = SerialPort(settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s)
     quiet_s = max(QUIET_CHARACTERS * serial.character_s, TCP_GAP_S)
     if isinstance(settings, ModbusRtuLine):
         quiet_s = max(quiet_s, gap_s(settings.baud))
-    return StreamLine(TappedPort(serial, seen), settings.timeout_s, quiet_s, clock)
+    return StreamLine(TappedPort(serial, listener), settings.timeout_s, quiet_s, clock)
 
 
-def polled(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Sequence[Reading]]:
-    """Poll after poll as a line's thread does it: drained after a fault, opened anew when lost."""
+def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Sequence[Reading]:
+    """One poll on a line that is opened for it and closed again, with its bytes shown. Raises LineFault."""
+    line = open_tapped_line(target.line, clock, listener)
+    try:
+        return target.gauge.read(line)
+    finally:
+        line.close()
+
+
+def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Sequence[Reading]]:
+    """The readings of poll after poll (`polls` of them, or for ever), as a line's thread of the daemon polls.
+
+    After a fault the line is drained, after a loss it is opened anew; every channel then has the fault's quality.
+    """
     line: Line | None = None
     never = threading.Event()
     count = 0
@@ -194,7 +216,7 @@ def polled(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Seq
                 yield target.gauge.read(line)
             except LineFault as fault:
                 yield [bad(clock.monotonic(), fault.quality, fault.detail)] * len(target.gauge.channels)
-                line = _after(line, fault)
+                line = _line_after_fault(line, fault)
                 if line is None:
                     clock.wait(never, target.line.back_off_s[0])
     finally:
@@ -202,7 +224,7 @@ def polled(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Seq
             line.close()
 
 
-def _after(line: Line | None, fault: LineFault) -> Line | None:
+def _line_after_fault(line: Line | None, fault: LineFault) -> Line | None:
     """The line, drained; None when it is lost."""
     if line is None:
         return None

@@ -14,16 +14,9 @@ from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.effect import (
-    ConstantValues,
-    Deltas,
-    Effect,
-    FittedEffect,
-    Port,
-    deltas_by_effect,
-    sum_deltas,
-    unmet_needs,
-)
+from compd.model.deltas import Deltas, deltas_by_effect, sum_deltas
+from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
+from compd.model.effect_needs import unmet_needs
 from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement

@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
-from compd.model.effect import Deltas, FittedEffect, split_by_port, sum_deltas
+from compd.model.deltas import Deltas, split_by_port, sum_deltas
+from compd.model.effect import FittedEffect
 from compd.model.sensitivity import base_joints_by_distances
 from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, gauge_variance, parameter_variance
 from compd.units import UM_PER_MM

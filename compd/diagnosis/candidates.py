@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.selection import CONTRADICTION_COSTS, DESCRIPTION_COSTS
-from compd.model.effect import ConstantValues, Effect, unmet_needs
+from compd.model.effect import ConstantValues, Effect
+from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
 # A candidate whose columns are unknown in more rows than this would cost all others those rows.
@@ -54,7 +55,7 @@ class Candidate:
         """By how much more than another effect it must explain to be believed."""
         if self.described:
             return DESCRIPTION_COSTS
-        return CONTRADICTION_COSTS if self.name == "reference_registration" else 1.0
+        return CONTRADICTION_COSTS if self.effect.registration else 1.0
 
     @property
     def numbers(self) -> int:
@@ -104,7 +105,7 @@ def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording,
 
 def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
     """What it needs and does not get, in words; "" where it has everything."""
-    if effect.id == "reference_registration" and aligned.registered:
+    if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
     if aligned.model is None and effect.live:
         return "acts inside the machine, and of this machine only the model's prediction is known"

@@ -15,7 +15,8 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, Segment, rows_of, segments
 from compd.diagnosis.regression import solve
 from compd.errors import Problem, RecordingError
-from compd.model.effect import FittedEffect, needed_quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
 from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file

@@ -1,7 +1,7 @@
-"""Modbus TCP, by pymodbus: its transaction numbers keep a late reply from passing for the next one.
+"""Modbus TCP, by pymodbus: its transaction numbers keep a late reply from being taken for the next one.
 
-After any fault but the device's own exception the connection is closed and made anew: nothing of an old
-reply can be left in it. pymodbus reports a timeout by ModbusIOException, a lost connection by
+After any fault but the device's own exception the connection is closed, and the next request opens a new one, in which
+nothing of an old reply can be left. pymodbus reports a timeout by ModbusIOException, a lost connection by
 ConnectionException, a device's exception by returning ExceptionResponse.
 """
 
@@ -18,18 +18,18 @@ from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.modbus_rtu import EXCEPTIONS
 
-# Every fault has a name here and reaches the status; pymodbus would print each one besides.
+# Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one as well.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 logging.getLogger("pymodbus").propagate = False
 
 
 class ModbusTcp:
-    """`RegisterLine` over Modbus TCP. One thread uses it."""
+    """A `RegisterLine` over Modbus TCP. Used by one thread."""
 
-    unexpected_bytes = 0  # pymodbus drops them by their transaction number and does not count
+    unexpected_bytes = 0  # pymodbus drops them by their transaction number, uncounted
 
     def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:
-        """Connect within `timeout_s`; LineFault(LINE_LOST) if the device cannot be reached."""
+        """Connect within `timeout_s`. Raises LineFault (LINE_LOST) when the device cannot be reached."""
         self._where = f"{host}:{port}"
         self._timeout_s = timeout_s
         self._clock = clock
@@ -39,14 +39,14 @@ class ModbusTcp:
     def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
         """`count` registers from `address` of slave `unit` by function 3 or 4.
 
-        Raises LineFault: TIMEOUT, MISMATCH, DEVICE_ERROR (the exception's name), LINE_LOST.
+        Raises LineFault: TIMEOUT, MISMATCH, DEVICE_ERROR (with the exception's name), LINE_LOST.
         """
         if not self._client.connected:
             self._connect()
-        ask = self._client.read_holding_registers if function == 3 else self._client.read_input_registers
+        read = self._client.read_holding_registers if function == 3 else self._client.read_input_registers
         time_s = self._clock.monotonic()
         try:
-            reply = ask(address, count=count, device_id=unit)
+            reply = read(address, count=count, device_id=unit)
         except ConnectionException as error:
             raise self._fault(Quality.LINE_LOST, str(error)) from error
         except ModbusIOException as error:
@@ -55,10 +55,10 @@ class ModbusTcp:
             raise self._fault(Quality.MISMATCH, f"not to be decoded: {error}") from error
         except OSError as error:
             raise self._fault(Quality.LINE_LOST, str(error)) from error
-        return RegisterReply(self._checked(reply, function, count), time_s)
+        return RegisterReply(self._registers(reply, function, count), time_s)
 
     def drain(self) -> bytes:
-        """After a fault nothing is left to drain: the connection is new."""
+        """Nothing: after a fault the connection is a new one."""
         return b""
 
     def close(self) -> None:
@@ -69,7 +69,8 @@ class ModbusTcp:
         if not self._client.connect():  # type: ignore[no-untyped-call]
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}")
 
-    def _checked(self, reply: ModbusPDU, function: int, count: int) -> tuple[int, ...]:
+    def _registers(self, reply: ModbusPDU, function: int, count: int) -> tuple[int, ...]:
+        """The registers of a reply that fits its request. Raises LineFault for any other."""
         if isinstance(reply, ExceptionResponse):
             code = reply.exception_code
             raise LineFault(Quality.DEVICE_ERROR, f"exception {code}, {EXCEPTIONS.get(code, 'unknown')}")
@@ -80,5 +81,6 @@ class ModbusTcp:
         return tuple(reply.registers)
 
     def _fault(self, quality: Quality, detail: str) -> LineFault:
+        """Close the connection, and make the fault to raise."""
         self.close()
         return LineFault(quality, detail)

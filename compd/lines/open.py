@@ -1,4 +1,4 @@
-"""From a line's settings to an open line."""
+"""Opening a line: from its settings in the configuration to a `ByteLine` or `RegisterLine`."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from compd.lines.stream import StreamLine
 
 Line = StreamLine | RtuMaster | ModbusTcp
 
-# Over TCP there are no character times; a second copy of a reply follows the first within this.
+# Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
+# TCP has no character times: a second copy of a reply follows the first within this, s.
 TCP_GAP_S = 1e-3
-QUIET_CHARACTERS = 3.5  # before a request, on any serial line: as Modbus RTU asks
-# USB adapters hand over what has come once a millisecond; a second copy of a reply must be seen to begin.
+# On any serial line, as Modbus RTU asks: in characters,
+QUIET_CHARACTERS = 3.5
+# and at least this, s: a USB adapter hands over what has come once a millisecond.
 SERIAL_GAP_S = 2e-3
 
 
 class SerialSettings(Protocol):
-    """A serial port's keys in the configuration."""
+    """The keys of a serial line in the configuration that are needed to open it."""
 
     @property
     def kind(self) -> Literal["serial", "modbus_rtu"]: ...
@@ -37,7 +39,7 @@ class SerialSettings(Protocol):
 
 
 class TcpSettings(Protocol):
-    """A TCP connection's keys in the configuration."""
+    """The keys of a line over TCP in the configuration that are needed to open it."""
 
     @property
     def kind(self) -> Literal["tcp", "modbus_tcp"]: ...
@@ -50,9 +52,9 @@ class TcpSettings(Protocol):
 
 
 def open_line(settings: SerialSettings | TcpSettings, clock: Clock) -> Line:
-    """An open line of the settings' kind; `close()` it after a fault LINE_LOST and open a new one.
+    """Open a line of the settings' kind. After a LineFault with LINE_LOST, `close()` it and open a new one.
 
-    Raises LineFault(LINE_LOST, what the system said) when it cannot be opened.
+    Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
     if settings.kind == "modbus_tcp":
         return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock)

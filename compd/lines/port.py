@@ -1,7 +1,7 @@
-"""What a line's bytes go through: a serial port (device or pyserial URL) or a TCP connection.
+"""Ports, which move a line's bytes: a serial port (device or pyserial URL), or a TCP connection.
 
-A port waits in `select`, so that a waiting thread costs nothing. It raises LineFault(LINE_LOST) for
-everything that the system reports when a plug is pulled; after that only a new port helps.
+A port waits in `select`, so that a waiting thread takes no processor time. It raises LineFault (LINE_LOST) for all that
+the system reports when a plug is pulled; after that a new port must be opened.
 """
 
 from __future__ import annotations
@@ -22,33 +22,36 @@ log = structlog.get_logger()
 # Pulling a plug raises SerialException (an OSError), a plain OSError or termios.error, depending on the call.
 PORT_FAULTS = (OSError, termios.error)
 MOST_BYTES = 4096  # of one read: far more than any reply
-# Ports without a file descriptor (rfc2217://, loop://) can only be asked again and again.
+# How often, s, ports without a file descriptor (rfc2217://, loop://) are asked: `select` cannot wait for them.
 SLICE_S = 0.02
 
 
 class Port(Protocol):
-    """Bytes in and out; `character_s` is the time that one character takes on the wire, 0 if unknown."""
+    """Bytes in and out. `character_s`: time (s) that one character takes on the wire; 0 if unknown."""
 
     character_s: float
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come, as soon as something has; b"" after `timeout_s` without a byte."""
+        """What has come, as soon as a byte has; b"" after `timeout_s` without one."""
         ...
 
     def write(self, data: bytes) -> None:
-        """All of `data`."""
+        """Write all of `data`."""
         ...
 
     def close(self) -> None:
-        """Give the port back; the port is of no further use."""
+        """Close the port, which is of no further use."""
         ...
 
 
 class SerialPort:
-    """A serial port. Everything is set when it is opened and never touched after."""
+    """A serial port. All its parameters are set when it is opened, and never changed."""
 
     def __init__(self, port: str, baud: int, form: str, low_latency: bool, write_timeout_s: float) -> None:
-        """`port`: device path or pyserial URL; `form`: "8N1", "7E2" ... LineFault(LINE_LOST) if it cannot be opened."""
+        """`port`: device path or pyserial URL; `form`: data bits, parity and stop bits, as "8N1" or "7E2".
+
+        Raises LineFault (LINE_LOST) when it cannot be opened.
+        """
         data_bits, parity, stop_bits = int(form[0]), form[1], int(form[2])
         is_device = "://" not in port
         try:
@@ -64,7 +67,7 @@ class SerialPort:
             )
         except (*PORT_FAULTS, ValueError) as error:
             raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error}") from error
-        # Behind a URL the baud rate is the device server's affair.
+        # Behind a URL the device server sets the baud rate, and the time of a character is unknown here.
         bits = 1 + data_bits + (parity != "N") + stop_bits
         self.character_s = bits / baud if is_device else 0.0
         self._fd: int | None = None if port.startswith(("rfc2217:", "loop:")) else self._port.fileno()
@@ -79,8 +82,10 @@ class SerialPort:
                 raise LineFault(Quality.LINE_LOST, f"cannot set up {port}: {error}") from error
 
     def _check_parity(self) -> None:
-        """A character with a wrong parity shall read as NUL, which no reply contains: pyserial leaves
-        checking off, and a damaged digit would pass as another digit (termios(3), INPCK)."""
+        """Make a character with a wrong parity read as NUL, which no reply contains (termios(3), INPCK).
+
+        pyserial leaves the check off, and a damaged digit would be taken for another digit.
+        """
         fd = self._port.fileno()
         attributes = termios.tcgetattr(fd)
         attributes[0] = (attributes[0] | termios.INPCK) & ~(termios.IGNPAR | termios.PARMRK)
@@ -89,7 +94,7 @@ class SerialPort:
     def _ask_low_latency(self, port: str) -> None:
         try:
             self._port.set_low_latency_mode(True)
-        except ValueError as error:  # pyserial's word for an adapter, or a pty, that does not know it
+        except ValueError as error:  # raised for an adapter, or a pty, without this mode
             log.info("low_latency not granted", port=port, reason=str(error))
 
     def read(self, timeout_s: float) -> bytes:
@@ -101,11 +106,12 @@ class SerialPort:
             data = os.read(self._fd, MOST_BYTES)
         except PORT_FAULTS as error:
             raise LineFault(Quality.LINE_LOST, f"read: {error}") from error
-        if not data:  # an unplugged adapter is always ready and has nothing to say
+        if not data:  # an unplugged adapter is always ready and has no bytes
             raise LineFault(Quality.LINE_LOST, "read: the port has hung up")
         return data
 
     def _read_in_slices(self, timeout_s: float) -> bytes:
+        """`read` for a port without a file descriptor."""
         for _ in range(int(timeout_s / SLICE_S) + 1):
             if first := bytes(self._port.read(1)):
                 return first + bytes(self._port.read(self._port.in_waiting))
@@ -130,11 +136,11 @@ class TcpPort:
     character_s = 0.0
 
     def __init__(self, host: str, port: int, timeout_s: float) -> None:
-        """Connect within `timeout_s`; LineFault(LINE_LOST) if it cannot be reached."""
+        """Connect within `timeout_s`. Raises LineFault (LINE_LOST) when the device cannot be reached."""
         try:
             self._socket = socket.create_connection((host, port), timeout=timeout_s)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # A device that lost its power never says so: without this the kernel retries for a quarter of an hour.
+            # A device that lost its power closes nothing: without this the kernel retries for a quarter of an hour.
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, max(1000, int(5000 * timeout_s)))
         except OSError as error:
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {host}:{port}: {error}") from error

@@ -1,4 +1,4 @@
-"""A line of bytes with deadlines: what an ASCII driver, and the Modbus RTU master, talk through."""
+"""A line of bytes with deadlines, for drivers of ASCII and binary protocols and for the Modbus RTU master."""
 
 from __future__ import annotations
 
@@ -8,52 +8,55 @@ from compd.clock import Clock
 from compd.gauge import LineFault, Quality
 from compd.lines.port import Port
 
-SHOWN_BYTES = 40  # of a broken reply, for a person
-# A line that babbles is drained for at most so many timeouts.
+SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
+# A line that is never quiet is drained for at most so many timeouts.
 MOST_DRAIN_TIMEOUTS = 10
-# A rest that takes longer than this on the wire is slept through, not taken byte by byte.
+# If the rest of a reply takes longer than this on the wire, s, it is waited for as a whole instead of byte by byte.
 WORTH_SLEEPING_S = 1e-3
 
 
 def shown(data: bytes) -> str:
-    """Bytes for a fault's detail: b'+    12.34'."""
+    """The first bytes of a reply as text, for a fault's detail: b'+    12.34'."""
     return repr(data[:SHOWN_BYTES]) + ("..." if len(data) > SHOWN_BYTES else "")
 
 
 class StreamLine:
-    """`ByteLine` over a port. One thread uses it.
+    """A `ByteLine` over a port. Used by one thread.
 
-    Two rules keep a reply with its request: a request leaves only when nothing has come for `gap_s`, and
-    what comes unasked is thrown away and counted in `unexpected_bytes`.
+    Two rules keep a reply with its request: a request is written only when nothing has come for `gap_s`, and what came
+    without a request is discarded and counted in `unexpected_bytes`.
     """
 
     def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock) -> None:
-        """`timeout_s`: for the first byte of a reply, and again for the rest of it beside its time on the wire."""
+        """`timeout_s`: for the first byte of a reply, and again for the rest beyond its time on the wire.
+
+        `gap_s`: silence before a request, s.
+        """
         self.unexpected_bytes = 0
         self._port = port
         self._timeout_s = timeout_s
         self._gap_s = gap_s
         self._clock = clock
-        self._never = threading.Event()
-        self._waiting = bytearray()
+        self._no_event = threading.Event()  # never set: the clock waits for it to pause
+        self._received = bytearray()
         self._last_byte_s = clock.monotonic()
 
     def send(self, request: bytes) -> float:
-        """Write `request` once the line is quiet; the monotonic time (s) at which its last bit had left.
+        """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
 
         Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST.
         """
-        self._become_quiet()
+        self._wait_for_silence()
         started_s = self._clock.monotonic()
         self._port.write(request)
         return started_s + len(request) * self._port.character_s
 
     def listen(self) -> float:
-        """Throw away what has come so far, without waiting for quiet; the monotonic time (s) of it.
+        """Discard what has come so far, without waiting for silence; the monotonic time (s) now.
 
-        Raises LineFault: MISMATCH when there is no end of it, LINE_LOST.
+        Raises LineFault: MISMATCH when bytes come faster than they are read, LINE_LOST.
         """
-        self._waiting.clear()
+        self._received.clear()
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(0.0):
             self._last_byte_s = self._clock.monotonic()
@@ -63,28 +66,30 @@ class StreamLine:
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
-        deadline_s = self._first_byte(timeout_s) + count * self._port.character_s
-        while len(self._waiting) < count:
-            self._more(count, deadline_s)
+        deadline_s = self._wait_for_first_byte(timeout_s) + count * self._port.character_s
+        while len(self._received) < count:
+            self._read_more(count, deadline_s)
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
-        """Bytes up to and including `terminator`. Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT,
-        INCOMPLETE, LINE_LOST."""
-        deadline_s = self._first_byte(timeout_s) + limit * self._port.character_s
+        """Bytes up to and including `terminator`.
+
+        Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
+        """
+        deadline_s = self._wait_for_first_byte(timeout_s) + limit * self._port.character_s
         searched = 0
         while True:
-            found = self._waiting.find(terminator, searched)
-            if 0 <= found <= limit - len(terminator):
-                return self._take(found + len(terminator))
-            if len(self._waiting) >= limit:
-                raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._waiting))}")
-            searched = max(0, len(self._waiting) - len(terminator) + 1)
-            self._more(limit, deadline_s)
+            end = self._received.find(terminator, searched)
+            if 0 <= end <= limit - len(terminator):
+                return self._take(end + len(terminator))
+            if len(self._received) >= limit:
+                raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._received))}")
+            searched = max(0, len(self._received) - len(terminator) + 1)
+            self._read_more(limit, deadline_s)
 
     def drain(self) -> bytes:
-        """After a fault: wait until nothing has come for the line's timeout; what came (its first bytes)."""
-        dropped = self._take(len(self._waiting))
+        """After a fault: wait until nothing has come for the line's timeout; all that came."""
+        dropped = self._take(len(self._received))
         until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
         while (data := self._port.read(self._timeout_s)) and self._clock.monotonic() < until_s:
             dropped += data
@@ -95,9 +100,10 @@ class StreamLine:
         """Close the port."""
         self._port.close()
 
-    def _become_quiet(self) -> None:
-        self.unexpected_bytes += len(self._waiting)
-        self._waiting.clear()
+    def _wait_for_silence(self) -> None:
+        """Discard what comes until nothing has come for `gap_s`. Raises LineFault: MISMATCH, LINE_LOST."""
+        self.unexpected_bytes += len(self._received)
+        self._received.clear()
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(self._last_byte_s + self._gap_s - self._clock.monotonic()):
             self._last_byte_s = self._clock.monotonic()
@@ -105,31 +111,33 @@ class StreamLine:
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"the line is never quiet: {shown(data)}")
 
-    def _first_byte(self, timeout_s: float | None) -> float:
-        """Wait for the first byte of a reply; the time (s) by which the rest must be here, its wire time apart."""
-        if not self._waiting:
+    def _wait_for_first_byte(self, timeout_s: float | None) -> float:
+        """Wait for a reply's first byte; the time (s) by which the rest must be here, without its time on the wire."""
+        if not self._received:
             wait_s = self._timeout_s if timeout_s is None else timeout_s
             data = self._port.read(wait_s)
             if not data:
                 raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
-            self._arrived(data)
+            self._store(data)
         return self._last_byte_s + self._timeout_s
 
-    def _more(self, count: int, deadline_s: float) -> None:
-        """More of a reply of at most `count` bytes."""
-        on_the_wire_s = (count - len(self._waiting)) * self._port.character_s
+    def _read_more(self, count: int, deadline_s: float) -> None:
+        """Wait for more of a reply of at most `count` bytes. Raises LineFault: INCOMPLETE, LINE_LOST."""
+        on_the_wire_s = (count - len(self._received)) * self._port.character_s
         if on_the_wire_s > WORTH_SLEEPING_S:
-            self._clock.wait(self._never, on_the_wire_s)
+            self._clock.wait(self._no_event, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
-            raise LineFault(Quality.INCOMPLETE, f"only {len(self._waiting)} bytes: {shown(bytes(self._waiting))}")
-        self._arrived(data)
+            raise LineFault(Quality.INCOMPLETE, f"only {len(self._received)} bytes: {shown(bytes(self._received))}")
+        self._store(data)
 
-    def _arrived(self, data: bytes) -> None:
-        self._waiting += data
+    def _store(self, data: bytes) -> None:
+        """Keep bytes that have come, and the time."""
+        self._received += data
         self._last_byte_s = self._clock.monotonic()
 
     def _take(self, count: int) -> bytes:
-        taken = bytes(self._waiting[:count])
-        del self._waiting[:count]
-        return taken
+        """Remove the first `count` bytes that have come."""
+        data = bytes(self._received[:count])
+        del self._received[:count]
+        return data

@@ -1,4 +1,4 @@
-"""The daemon: every part put together, started in order, stopped in reverse."""
+"""The daemon: acquisition, loop and services of one machine, started in order and stopped in reverse."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
 from compd.live.systemd import Notifier
 
-# How soon the daemon notices that one of its threads has ended.
-_LOOK_EVERY_S = 0.5
+# How often the daemon looks whether one of its threads has ended.
+_CHECK_EVERY_S = 0.5
 
 _log = structlog.get_logger()
 
 
 class Daemon:
-    """One machine's compensation. Raises CompdError from `start` when something cannot be had."""
+    """The compensation of one machine. `start` raises CompdError where a line or socket cannot be opened."""
 
     def __init__(
         self, configuration: Configuration, clock: Clock | None = None, notifier: Notifier | None = None
@@ -78,7 +78,6 @@ class Daemon:
         }
         report = StatusReport(
             version,
-            configuration,
             self.latest,
             self._wires,
             self.commands,
@@ -104,7 +103,7 @@ class Daemon:
         self._state: State | None = None
 
     def start(self) -> None:
-        """Gauges first, then the loop; the sockets appear when there are setpoints to be had."""
+        """Start the acquisition, then the sockets, then the loop."""
         self.acquisition.start()
         try:
             self.publisher.start(self._requests)
@@ -114,7 +113,7 @@ class Daemon:
         self.loop.start()
 
     def stop(self) -> None:
-        """Everything stopped, every thread ended."""
+        """Stop everything; returns when every thread has ended."""
         self._notifier.stopping()
         self.loop.stop()
         self._zero_taker.stop()
@@ -127,11 +126,11 @@ class Daemon:
 
     @property
     def healthy(self) -> bool:
-        """Both threads that nothing replaces are alive."""
+        """Whether the threads of loop and publisher, without which there are no setpoints, are alive."""
         return self.loop.alive and self.publisher.alive
 
     def _zero_on_disk(self) -> MachineZero | StateError:
-        """The daemon runs without a zero, so that one can be taken; it says why it has none."""
+        """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken."""
         configuration = self.configuration
         try:
             zero = load_zero(_directory(configuration), configuration.zero_hash, self._wires.length_channels)
@@ -142,7 +141,7 @@ class Daemon:
         return zero
 
     def _note_state(self, setpoint: Setpoint) -> None:
-        """Each change of state once, for the log and the service manager; on the publisher's thread."""
+        """Report a change of state to the log and the service manager; called on the publisher's thread."""
         if setpoint.state is self._state:
             return
         self._state = setpoint.state
@@ -152,10 +151,10 @@ class Daemon:
 
 
 def run(configuration: Configuration) -> bool:
-    """Run until SIGTERM or Ctrl-C; True when a thread died instead. SIGHUP is kept for later and ignored."""
+    """Run the daemon until SIGTERM or Ctrl-C; True where a thread ended by itself. SIGHUP is ignored."""
     _log_to_stderr()
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    # Blocked before any thread exists, so that none of them is ever interrupted by these.
+    # blocked before any thread exists, so that these signals interrupt none of them
     signals = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     for warning in configuration.warnings:
@@ -172,7 +171,7 @@ def run(configuration: Configuration) -> bool:
     )
     received = None
     while received is None and daemon.healthy:
-        received = signal.sigtimedwait(signals, _LOOK_EVERY_S)
+        received = signal.sigtimedwait(signals, _CHECK_EVERY_S)
     healthy = daemon.healthy
     if received is not None:
         _log.info("stopping", signal=signal.Signals(received.si_signo).name)
@@ -185,21 +184,22 @@ def run(configuration: Configuration) -> bool:
 
 
 def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
-    """Those of the configuration. Raises CompdError for a model file that cannot be used: it was asked for."""
+    """The models with which the daemon starts. Raises CompdError for a model file that cannot be used."""
     file = configuration.state.model_file
     if file is None:
         return Models(loader.without_effects)
     model = loader.read(Path(file))
-    _log.info("model", file=file, hash=model.hash, effects=[one.effect.id for one in model.machine.live_effects])
+    _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.live_effects])
     return Models(model)
 
 
 def _directory(configuration: Configuration) -> Path:
+    """Where machine zero is kept."""
     return Path(configuration.state.directory)
 
 
 def _log_to_stderr() -> None:
-    """One line per event, for the journal; colours only for a person."""
+    """Log one line per event to stderr, with colours on a terminal."""
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,

@@ -1,4 +1,4 @@
-"""What systemd hears from the daemon: sd_notify(3), by the compute loop itself."""
+"""Notifications to systemd, sd_notify(3), sent by the loop itself."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _BEATS_PER_WATCHDOG = 4
 
 
 class Notifier:
-    """Sends to the service manager's datagram socket; without one (not under systemd) it says nothing.
+    """Sends notifications to the socket of the service manager; does nothing where there is none.
 
-    A message that the manager cannot take now is dropped: the loop never waits for it.
+    A message that the manager cannot take at once is dropped, so that the loop never waits.
     """
 
     def __init__(self, address: str, watchdog_s: float = math.inf) -> None:
@@ -26,17 +26,18 @@ class Notifier:
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Notifier:
-        """What systemd asked for; a watchdog meant for another process is not ours."""
+        """The notifier that $NOTIFY_SOCKET and $WATCHDOG_USEC ask for; $WATCHDOG_PID may name another process."""
         usec = environment.get("WATCHDOG_USEC", "")
-        ours = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
-        watchdog_s = int(usec) * 1e-6 if usec.isdigit() and ours else math.inf
+        is_ours = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        watchdog_s = int(usec) * 1e-6 if usec.isdigit() and is_ours else math.inf
         return cls(environment.get("NOTIFY_SOCKET", ""), watchdog_s)
 
     def ready(self) -> None:
-        """The first cycle has run."""
+        """Report that the first cycle has run."""
         self._send("READY=1")
 
     def stopping(self) -> None:
+        """Report that the daemon stops."""
         self._send("STOPPING=1")
 
     def status(self, text: str) -> None:
@@ -44,7 +45,7 @@ class Notifier:
         self._send("STATUS=" + text.replace("\n", " "))
 
     def beat(self, now_s: float) -> None:
-        """Feed the watchdog, when it is time; called once per cycle."""
+        """Reset the watchdog, if a quarter of its interval has passed; called once per cycle."""
         if now_s >= self._next_beat_s:
             self._next_beat_s = now_s + self._beat_every_s
             self._send("WATCHDOG=1")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, Memories, deltas_by_effect
+from compd.model.deltas import Deltas, Memories, deltas_by_effect
 from compd.model.frame import Frame
 from compd.model.kinematics import Mechanism, Pose
 from compd.model.machine import MachineModel

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effect import Deltas, Port
+from compd.model.deltas import Deltas
+from compd.model.effect import Port
 from compd.model.frame import Frame, solve_frame
 from compd.model.joint_correction import joint_shortening, link_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix

@@ -15,7 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas_by_effect, needed_quantities, sum_deltas
+from compd.model.deltas import Deltas, Memories, deltas_by_effect, sum_deltas
+from compd.model.effect import FittedEffect, Port
+from compd.model.effect_needs import needed_quantities
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities

@@ -14,7 +14,8 @@ from compd.comparison.covariates import Covariate, covariates
 from compd.diagnosis.empirical_search import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, in_um
-from compd.model.effect import Effect, needed_quantities
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities
 from compd.report.figures import small_multiples
 from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
 from compd.units import unit_of

@@ -10,7 +10,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model.effect import Constant, Effect, FittedEffect, Parameter, effect_deltas, needed_quantities, unmet_needs
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Constant, Effect, FittedEffect, Parameter
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel, machine_constants
 from compd.model.motion import Movement, update_motion
@@ -221,7 +223,7 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
     elif effect.needs == ("time",):
         hours = spread(0, 10)
         found.append(("time, h", hours, Drive(here, time_s=hours * HOUR_S)))
-    if effect.id in ("joint_comparator_gain", "frame_comparator_gain"):
+    if not effect.needs and effect.ports in (("joint",), ("frame",)):
         reading = spread(-0.02, 0.02)
         changed = Drive(here, joint_mm=reading) if effect.ports == ("joint",) else Drive(here, frame_mm=reading)
         found.append(("reading of all comparators, mm", reading, changed))

@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd_drivers.exchange import ExchangeOptions
-from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 
@@ -20,7 +20,7 @@ class AsciiChannel(MeasuredChannel):
     """One number in the reply."""
 
     decimals: int = Field(default=0, ge=0, le=12, description="of a whole number (%d): 12345 with 4 is 1.2345")
-    instead: dict[str, SaidQuality] = Field(
+    instead: dict[str, ReplyQuality] = Field(
         default={}, description='what may stand in the number\'s place, and what it means: {"ERR6": device_error}'
     )
 
@@ -29,7 +29,7 @@ class ErrorReply(_Section):
     """A reply that stands for the whole poll."""
 
     in_: str = Field(alias="in", description="what it looks like")
-    quality: SaidQuality = Field(description="what it means")
+    quality: ReplyQuality = Field(description="what it means")
     says: str = Field(default="", description="in words, for the status")
 
 
@@ -62,7 +62,7 @@ class SerialAsciiOptions(ExchangeOptions):
     @model_validator(mode="after")
     def _whole(self) -> Self:
         names = [channel.name for channel in self.channels]
-        if doubled := twice(names):
+        if doubled := repeated(names):
             raise ValueError(f"channel named twice: {doubled}")
         description = Description.of(self)
         numbers = description.reply.channels
@@ -97,8 +97,8 @@ class Description(NamedTuple):
         instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
         if single:
             instead[""] = instead[options.channels[0].name]
-        for one in (*options.init, *([options.echo] if options.echo else [])):
-            _format(one.in_)
+        for exchange in (*options.init, *([options.echo] if options.echo else [])):
+            _format(exchange.in_)
         return cls(
             _format(options.in_, instead),
             tuple((_format(error.in_), error) for error in options.errors),

@@ -51,5 +51,5 @@ class Continuity:
 
 
 def _disagreement(now: Reading, before: Reading, earlier: Reading | None) -> str:
-    seen = [f"{reading.value:.4f}" for reading in (earlier, before, now) if reading is not None]
-    return f"values that no part can follow, no two agree: {', '.join(seen)} mm"
+    values = [f"{reading.value:.4f}" for reading in (earlier, before, now) if reading is not None]
+    return f"values that no part can follow, no two agree: {', '.join(values)} mm"

@@ -84,15 +84,15 @@ class Linearisation(BaseModel):
     def reading(self, signal: float, time_s: float) -> Reading:
         """The reading in the channel's unit; OVER_RANGE and UNDER_RANGE speak of the signal."""
         low, high = self.ends
-        said = f"{signal:g} {self.signal}"
+        text = f"{signal:g} {self.signal}"
         if not math.isfinite(signal):
-            return bad(time_s, Quality.NOT_FINITE, said)
+            return bad(time_s, Quality.NOT_FINITE, text)
         if self.signal == "mA" and low >= FAILURE_LOW_mA and not FAILURE_LOW_mA <= signal <= FAILURE_HIGH_mA:
-            return bad(time_s, Quality.SENSOR_FAULT, f"{said}: broken wire or failed sensor")
+            return bad(time_s, Quality.SENSOR_FAULT, f"{text}: broken wire or failed sensor")
         if signal < low:
-            return bad(time_s, Quality.UNDER_RANGE, said)
+            return bad(time_s, Quality.UNDER_RANGE, text)
         if signal > high:
-            return bad(time_s, Quality.OVER_RANGE, said)
+            return bad(time_s, Quality.OVER_RANGE, text)
         return good(self._value(signal), time_s)
 
     def _value(self, signal: float) -> float:

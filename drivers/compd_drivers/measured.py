@@ -18,7 +18,7 @@ WireUnit = Literal[
     "mm", "um", "nm", "inch", "mil", "degC", "degF", "K", "N", "kN", "hPa", "mbar", "kPa", "Pa", "pct", "1", "V", "mA"
 ]
 # What a device may say in place of a number.
-SaidQuality = Literal["sensor_fault", "device_error", "over_range", "under_range", "silent"]
+ReplyQuality = Literal["sensor_fault", "device_error", "over_range", "under_range", "silent"]
 
 
 class _Conversion(NamedTuple):
@@ -98,6 +98,6 @@ class MeasuredChannel(BaseModel):
         return reading
 
 
-def twice(names: list[str]) -> str:
-    """The names that stand more than once, for an error; "" if none does."""
+def repeated(names: list[str]) -> str:
+    """The names that stand more than once, in one text; "" if none does."""
     return ", ".join(sorted({name for name in names if names.count(name) > 1}))

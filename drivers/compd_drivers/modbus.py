@@ -166,8 +166,10 @@ class Modbus(Gauge[RegisterLine]):
         readings = []
         for channel, value, status in zip(self._map, self._values, self._statuses, strict=True):
             registers, time_s = replies[value.block]
-            said = replies[status.block].registers[status.first] if status else None
-            readings.append(_reading(channel, registers[value.first : value.first + channel.length], said, time_s))
+            status_value = replies[status.block].registers[status.first] if status else None
+            readings.append(
+                _reading(channel, registers[value.first : value.first + channel.length], status_value, time_s)
+            )
         return readings
 
     def _place(self, function: int, address: int, length: int) -> _Place:
@@ -180,22 +182,22 @@ class Modbus(Gauge[RegisterLine]):
 
 def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[Block, ...]:
     """(function, address, registers) of every number -> reads that cover adjacent registers and split no number."""
-    found: list[Block] = []
+    reads: list[Block] = []
     for function, address, length in sorted(spans):
         end = address + length
-        if found and found[-1].function == function and address <= found[-1].address + found[-1].length:
-            last = found[-1]
+        if reads and reads[-1].function == function and address <= reads[-1].address + reads[-1].length:
+            last = reads[-1]
             covered = max(end - last.address, last.length)
             if covered <= MOST_REGISTERS:
-                found[-1] = Block(function, last.address, covered)
+                reads[-1] = Block(function, last.address, covered)
                 continue
-        found.append(Block(function, address, length))
-    return tuple(found)
+        reads.append(Block(function, address, length))
+    return tuple(reads)
 
 
-def _reading(channel: ModbusChannel, registers: tuple[int, ...], said: int | None, time_s: float) -> Reading:
-    if channel.status is not None and said is not None and said not in channel.status.ok:
-        return bad(time_s, _status_quality(channel.status, said), f"status {said}")
+def _reading(channel: ModbusChannel, registers: tuple[int, ...], status_value: int | None, time_s: float) -> Reading:
+    if channel.status is not None and status_value is not None and status_value not in channel.status.ok:
+        return bad(time_s, _status_quality(channel.status, status_value), f"status {status_value}")
     raw = decode(channel, registers)
     if raw in channel.invalid:
         return bad(time_s, Quality.SENSOR_FAULT, f"raw value {raw:g}")
@@ -212,10 +214,10 @@ def _reading(channel: ModbusChannel, registers: tuple[int, ...], said: int | Non
     return reading
 
 
-def _status_quality(status: Status, said: int) -> Quality:
-    if said in status.over_range:
+def _status_quality(status: Status, status_value: int) -> Quality:
+    if status_value in status.over_range:
         return Quality.OVER_RANGE
-    return Quality.UNDER_RANGE if said in status.under_range else Quality.SENSOR_FAULT
+    return Quality.UNDER_RANGE if status_value in status.under_range else Quality.SENSOR_FAULT
 
 
 def decode(channel: ModbusChannel, registers: Sequence[int]) -> float:

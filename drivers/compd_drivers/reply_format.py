@@ -122,12 +122,12 @@ class ReplyFormat:
 
         A reply whose checksum does not fit is no match either: see `checksum_fits`.
         """
-        found = self._pattern.fullmatch(reply)
-        if found is None or not self._fits(found, reply):
+        match = self._pattern.fullmatch(reply)
+        if match is None or not self._fits(match, reply):
             return None
         values: list[float | bytes] = []
         for k, number in enumerate(self._numbers):
-            text = found[f"n{k}"]
+            text = match[f"n{k}"]
             if text in self._instead.get(number.channel, ()):
                 values.append(text)
             elif number.text.fullmatch(text):
@@ -138,16 +138,16 @@ class ReplyFormat:
 
     def checksum_fails(self, reply: bytes) -> bool:
         """Whether the reply has the right form and a wrong checksum."""
-        found = self._pattern.fullmatch(reply)
-        return found is not None and not self._fits(found, reply)
+        match = self._pattern.fullmatch(reply)
+        return match is not None and not self._fits(match, reply)
 
-    def _fits(self, found: re.Match[bytes], reply: bytes) -> bool:
+    def _fits(self, match: re.Match[bytes], reply: bytes) -> bool:
         for check in self._checks:
-            expected = CHECKSUMS[check.kind].of(reply[check.start : found.start(check.group)])
-            said = found[check.group]
+            expected = CHECKSUMS[check.kind].of(reply[check.start : match.start(check.group)])
+            received = match[check.group]
             if check.hexadecimal:
-                expected, said = expected[::-1].hex().upper().encode(), said.upper()
-            if said != expected:
+                expected, received = expected[::-1].hex().upper().encode(), received.upper()
+            if received != expected:
                 return False
         return True
 

@@ -82,14 +82,14 @@ class SerialAscii(Gauge[ByteLine]):
         super().__init__(options)
         self._description = Description.of(options)
         self._measured = options.channels
-        self._said = options
+        self._protocol = options
         self._channels = tuple(channel.channel for channel in options.channels)
         order = self._description.reply.channels
         self._order = [order.index(c.name) if c.name in order else 0 for c in options.channels]
         self._instead = [{unescape(word): quality for word, quality in c.instead.items()} for c in options.channels]
         terminator = unescape(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
-        self._exchanges = [(unescape(one.out) + terminator, ReplyFormat(one.in_)) for one in exchanges]
+        self._exchanges = [(unescape(exchange.out) + terminator, ReplyFormat(exchange.in_)) for exchange in exchanges]
         forms = [self._description.reply, *(form for _, form in self._exchanges)]
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]
@@ -107,7 +107,7 @@ class SerialAscii(Gauge[ByteLine]):
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         length = self._description.reply.length
-        if length is None or not self._said.out:
+        if length is None or not self._protocol.out:
             return None
         return [(len(self._description.request), length + len(self._description.terminator))]
 
@@ -121,13 +121,13 @@ class SerialAscii(Gauge[ByteLine]):
             readings = self._readings(line)
         except LineFault as fault:
             self._ready_on = None
-            raise (self._silence.named(fault, line) if self._said.silent_in_menu else fault) from None
+            raise (self._silence.named(fault, line) if self._protocol.silent_in_menu else fault) from None
         self._silence.answered(line)
         return readings
 
     def _readings(self, line: ByteLine) -> Sequence[Reading]:
         if self._ready_on is not line:
-            for request, form in self._exchanges[: len(self._said.init)]:
+            for request, form in self._exchanges[: len(self._protocol.init)]:
                 self._exchange(line, request, form)
             self._until_echo = 0
         self._check_echo(line)
@@ -144,7 +144,7 @@ class SerialAscii(Gauge[ByteLine]):
     def _poll(self, line: ByteLine) -> tuple[bytes, float]:
         """The reply without its terminator, and the time of asking (s)."""
         form = self._description.reply
-        if not self._said.out:
+        if not self._protocol.out:
             time_s = line.listen()
             self._line(line)  # what is left of the line that was under way
             return self._receive(line, form), time_s
@@ -160,23 +160,23 @@ class SerialAscii(Gauge[ByteLine]):
             raise LineFault(Quality(error.quality), _shown(reply, error))
 
     def _check_echo(self, line: ByteLine) -> None:
-        if self._said.echo is None:
+        if self._protocol.echo is None:
             return
         if self._until_echo == 0:
             self._exchange(line, *self._exchanges[-1])
-            self._until_echo = self._said.echo.every
+            self._until_echo = self._protocol.echo.every
         self._until_echo -= 1
 
     def _whole(self, line: ByteLine, form: ReplyFormat) -> bytes:
         """A reply without its last terminator, and nothing behind it."""
         reply = self._receive(line, form)
-        nothing_behind(line, self._said, reply)
+        nothing_behind(line, self._protocol, reply)
         return reply
 
     def _receive(self, line: ByteLine, form: ReplyFormat) -> bytes:
         terminator = self._description.terminator
         if not terminator:
-            return receive(line, self._said, self._limit)
+            return receive(line, self._protocol, self._limit)
         reply = self._line(line)
         for _ in range(form.literal.count(terminator)):
             if self._error(reply) is not None:
@@ -186,10 +186,10 @@ class SerialAscii(Gauge[ByteLine]):
 
     def _line(self, line: ByteLine) -> bytes:
         """Up to the next terminator, without it."""
-        terminator, said = self._description.terminator, self._said
-        if self._fixed_length and said.gap_timeout_s is None:
-            return line.receive_until(terminator, self._limit, said.reply_timeout_s)[: -len(terminator)]
-        return receive_line(line, terminator, self._limit, said.reply_timeout_s, said.gap_timeout_s)
+        terminator, protocol = self._description.terminator, self._protocol
+        if self._fixed_length and protocol.gap_timeout_s is None:
+            return line.receive_until(terminator, self._limit, protocol.reply_timeout_s)[: -len(terminator)]
+        return receive_line(line, terminator, self._limit, protocol.reply_timeout_s, protocol.gap_timeout_s)
 
     def _error(self, reply: bytes) -> ErrorReply | None:
         return next((error for form, error in self._description.errors if form.match(reply) is not None), None)

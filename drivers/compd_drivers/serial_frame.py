@@ -30,7 +30,7 @@ from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quali
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
-from compd_drivers.measured import MeasuredChannel, SaidQuality, twice
+from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -95,7 +95,7 @@ class FrameChannel(MeasuredChannel):
     at: Annotated[int, Field(ge=0)] = Field(description="its first byte, from 0")
     type: NumberType
     byte_order: Literal["little", "big"] = Field(default="little", description="of a number in several bytes")
-    invalid: dict[float, SaidQuality] = Field(default={}, description="numbers that are none, and what they mean")
+    invalid: dict[float, ReplyQuality] = Field(default={}, description="numbers that are none, and what they mean")
 
     @property
     def length(self) -> int:
@@ -117,7 +117,7 @@ class ErrorFrame(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     frame: str = Field(description="its bytes, as in `frame`")
-    quality: SaidQuality = Field(description="what it means")
+    quality: ReplyQuality = Field(description="what it means")
     says: str = Field(default="", description="in words, for the status")
 
 
@@ -135,7 +135,7 @@ class SerialFrameOptions(ExchangeOptions):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        if doubled := twice([channel.name for channel in self.channels]):
+        if doubled := repeated([channel.name for channel in self.channels]):
             raise ValueError(f"channel named twice: {doubled}")
         if self.out_checksum is None:
             bytes.fromhex(self.out)
@@ -195,7 +195,7 @@ class SerialFrame(Gauge[ByteLine]):
 
     def __init__(self, options: SerialFrameOptions) -> None:
         super().__init__(options)
-        self._said = options
+        self._protocol = options
         self._request = options.request
         self._frame = Frame.of(options.frame)
         self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
@@ -218,19 +218,19 @@ class SerialFrame(Gauge[ByteLine]):
     def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         data, error = self._receive(line)
-        nothing_behind(line, self._said, data)
+        nothing_behind(line, self._protocol, data)
         if error is not None:
             detail = f"{data.hex(' ')}: {error.says}" if error.says else data.hex(" ")
             return [bad(time_s, Quality(error.quality), detail)] * len(self._channels)
         place = self._frame.checksum
-        if self._said.checksum and data[place] != self._said.checksum.of(data, place):
+        if self._protocol.checksum and data[place] != self._protocol.checksum.of(data, place):
             raise LineFault(Quality.CRC, data.hex(" "))
         if not self._frame.fits(data):
-            raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._said.frame}")
-        return [_reading(channel, data, time_s) for channel in self._said.channels]
+            raise LineFault(Quality.MISMATCH, f"{data.hex(' ')}, expected {self._protocol.frame}")
+        return [_reading(channel, data, time_s) for channel in self._protocol.channels]
 
     def _rest(self, line: ByteLine, count: int, so_far: bytes) -> bytes:
-        gap_s = self._said.gap_timeout_s
+        gap_s = self._protocol.gap_timeout_s
         return following(line, count if gap_s is None else 1, gap_s, so_far)
 
     def _receive(self, line: ByteLine) -> tuple[bytes, ErrorFrame | None]:
@@ -238,7 +238,7 @@ class SerialFrame(Gauge[ByteLine]):
         data = b""
         for length in sorted({len(frame.fixed) for frame in (self._frame, *(frame for frame, _ in self._errors))}):
             if not data:
-                data = receive(line, self._said, length)
+                data = receive(line, self._protocol, length)
             while len(data) < length:
                 data += self._rest(line, length - len(data), data)
             for frame, error in self._errors:

@@ -10,7 +10,8 @@ import numpy as np
 from compd.gauge import good
 from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.model.effect import FittedEffect, needed_quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.library import library
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
@@ -85,7 +86,12 @@ def _row(durations_s: list[float]) -> list[str]:
 
 def _cycles(measured: Machine) -> dict[str, list[float]]:
     """Durations (s) of compute, JSON, packet, and of all three."""
-    found: dict[str, list[float]] = {"snapshot to setpoint": [], "JSON": [], "UDP packet": [], "snapshot to bytes": []}
+    durations_s: dict[str, list[float]] = {
+        "snapshot to setpoint": [],
+        "JSON": [],
+        "UDP packet": [],
+        "snapshot to bytes": [],
+    }
     config_hash = bytes(8)
     for tick in range(CYCLES):
         measured.now_s += 0.005
@@ -102,10 +108,10 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
         packed = time.perf_counter()
         assert setpoint.valid, setpoint.reason
         for durations, seconds in zip(
-            found.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
+            durations_s.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
         ):
             durations.append(seconds)
-    return found
+    return durations_s
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.commissioning.line_budget import plan_line, serial_pace
+from compd.commissioning.line_budget import budget_of_line, serial_pace
 from compd.configuration.lines import ModbusRtuLine
 from compd.gauge import Gauge
 from compd.lines import open_line
@@ -88,7 +88,7 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
     polled = gauges(kind)
     line = ModbusRtuLine(kind="modbus_rtu", port="/dev/null", baud=baud, format=FORMAT, timeout_s=0.5)
     pace = serial_pace(baud, FORMAT, rtu=True, turnaround_s=turnaround_s)
-    plan = plan_line("x", line, {name: gauge.traffic() for name, gauge in polled.items()})
+    plan = budget_of_line("x", line, {name: gauge.traffic() for name, gauge in polled.items()})
     ideal_s = pace.round_s([exchange for gauge in polled.values() for exchange in gauge.traffic() or ()])
     assert plan.bytes == {"int16": 31, "float32": 49, "units": 135}[kind]
     master, far = os.openpty()

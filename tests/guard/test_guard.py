@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.live.record.replay import RecordedCycles, replay
+from compd.live.record.replay import RecordedCycles, replay_cycles
 from tests.scoreboard.trial import at_once
 from tests.support.live_machine import machine
 from tests.support.paths import SHARED
@@ -33,7 +33,7 @@ VERDICTS = sorted(path.name for path in (HERE / "verdicts").glob("*.json"))
 def test_setpoints_are_bit_for_bit_those_of_0_1_0(run):
     name, on_stale, on_limit = RUNS[run]
     configuration = machine(name, on_stale=on_stale, on_limit=on_limit).configuration
-    cycles = list(replay(configuration, RecordedCycles(HERE / "replay" / run)))
+    cycles = list(replay_cycles(configuration, RecordedCycles(HERE / "replay" / run)))
     assert len(cycles) == 20
     assert [cycle.where for cycle in cycles if cycle.differs] == []
 

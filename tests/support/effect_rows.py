@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from compd.model.effect import Effect, effect_deltas
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Effect
 from compd.model.kinematics import inverse_kinematics
 from compd.model.library import library
 from compd.model.library.scale import PERIODS_MM

@@ -13,11 +13,11 @@ from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.directions import Directions
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.record.recorder import Keeping, Recorder
+from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.service.readings_message import ReadingsMessage
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
 
-ROOMY = Keeping(part_bytes=10**9, part_s=1e9, limit_bytes=10**10, drop_oldest=False)
+ROOMY = RecordingLimits(part_bytes=10**9, part_s=1e9, limit_bytes=10**10, drop_oldest=False)
 _FAULTS = [Quality.TIMEOUT, Quality.CRC, Quality.LINE_LOST, Quality.OVER_RANGE]
 
 
@@ -97,10 +97,10 @@ class Run:
         self.machine.commands.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
 
     @contextmanager
-    def recorder(self, name: Path, keeping=ROOMY, say=None, **watch):
+    def recorder(self, name: Path, limits=ROOMY, reports=None, **watch):
         """A recorder that has written everything when the block ends."""
-        said = [] if say is None else say
-        recorder = Recorder(name, self.version, self.watch | watch, keeping, said.append, MonotonicClock())
+        texts = [] if reports is None else reports
+        recorder = Recorder(name, self.version, self.watch | watch, limits, texts.append, MonotonicClock())
         recorder.start()
         yield recorder
         recorder.close()

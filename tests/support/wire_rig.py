@@ -92,16 +92,16 @@ class WatchedLatest(Latest):
 
     def wait_for(self, channel: str, quality: Quality, after: int = 0) -> Reading:
         """The first reading of `channel` with `quality` since history entry `after`."""
-        found: list[Reading] = []
+        readings: list[Reading] = []
 
         def there() -> bool:
-            found.extend(r for name, r in self.history[after:] if name == channel and r.quality is quality)
-            return bool(found)
+            readings.extend(r for name, r in self.history[after:] if name == channel and r.quality is quality)
+            return bool(readings)
 
         with self._changed:
-            seen = self._changed.wait_for(there, PATIENCE_S)
-        assert seen, f"{channel} never became {quality}: {self.snapshot(0.0).readings[self.index[channel]]}"
-        return found[0]
+            arrived = self._changed.wait_for(there, PATIENCE_S)
+        assert arrived, f"{channel} never became {quality}: {self.snapshot(0.0).readings[self.index[channel]]}"
+        return readings[0]
 
     @property
     def now(self) -> int:

@@ -1,4 +1,4 @@
-"""One driver on one wire: poll it as the daemon does, and hold every number against what the device had."""
+"""One driver on one wire: polled as the daemon does, every number compared with what the device's sensor had."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from compd.commissioning.conformance.peer import Peer, Truth
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.live.acquisition.acquisition import NOTHING_UNDER_WAY
 
-# A gauge's last digit is found by looking at so many readings; beyond COARSEST of its range it is no digit.
-LOOKS = 24
-COARSEST = 0.01
+LOOKS = 24  # fault-free polls that the tolerance, a gauge's last digit, is taken from
+COARSEST = 0.01  # of the range: a difference beyond it is no last digit, but a wrong unit, scale or sign
 # A wrong number is further off than this many of the largest difference that was seen without faults.
 MARGIN = 2.0
 SMALLEST = 1e-9  # of the range: rounding in floating point
@@ -42,7 +41,7 @@ class ConformanceWire(Protocol):
 
 @dataclass(frozen=True)
 class Poll:
-    """What one poll brought. `wrong`: every OK reading that should not be one, in words."""
+    """The readings of one poll. `wrong`: every OK reading that should not be one, in words."""
 
     readings: Sequence[Reading]
     wrong: tuple[str, ...]
@@ -56,9 +55,9 @@ class Poll:
         return self.qualities == {Quality.OK} and not self.wrong
 
     def __str__(self) -> str:
-        came = ", ".join(sorted(self.qualities))
+        qualities = ", ".join(sorted(self.qualities))
         details = sorted({reading.detail for reading in self.readings if reading.detail})
-        return "; ".join([came, *self.wrong] if self.wrong else [came, *details[:1]])
+        return "; ".join([qualities, *self.wrong] if self.wrong else [qualities, *details[:1]])
 
 
 @dataclass
@@ -73,7 +72,7 @@ class ConformanceSession:
     _line: Any = None
 
     def poll(self, faults: Iterable[Fault] = (), turn: bool = True) -> Poll:
-        """One poll under `faults` (one per reply); `turn`: with new values at the sensors."""
+        """One poll; `faults`: one for each of its replies, in order; `turn`: with new values at the sensors."""
         if turn:
             self.truth.turn()
         self.wire.peer.afflict(faults)
@@ -93,7 +92,10 @@ class ConformanceSession:
         return len(polls), Poll(polls[-1].readings, tuple(text for poll in polls for text in poll.wrong))
 
     def calibrate(self) -> str | None:
-        """Find each channel's last digit from fault-free polls; what is wrong if they are not even near."""
+        """Set each channel's tolerance from fault-free polls; says what is wrong where the differences are too large.
+
+        tolerance = MARGIN x largest difference + SMALLEST x range; a difference beyond COARSEST x range is an error.
+        """
         differences: dict[str, list[float]] = {channel.name: [] for channel in self.gauge.channels}
         extents: dict[str, list[float]] = {channel.name: [] for channel in self.gauge.channels}
         self.tolerance = dict.fromkeys(differences, math.inf)
@@ -104,13 +106,12 @@ class ConformanceSession:
             for channel, reading in zip(self.gauge.channels, poll.readings, strict=True):
                 differences[channel.name].append(abs(reading.value - self.truth.values[channel.name]))
                 extents[channel.name].append(self.truth.values[channel.name])
-        for name, found in differences.items():
+        for name, off in differences.items():
             extent = max(extents[name]) - min(extents[name])
-            if max(found) > COARSEST * extent:
-                return (
-                    f"channel {name} is off by {max(found):.6g} of a range of {extent:.6g}: wrong unit, scale or sign"
-                )
-            self.tolerance[name] = MARGIN * max(found) + SMALLEST * extent
+            largest = max(off)
+            if largest > COARSEST * extent:
+                return f"channel {name} is off by {largest:.6g} of a range of {extent:.6g}: wrong unit, scale or sign"
+            self.tolerance[name] = MARGIN * largest + SMALLEST * extent
         return None
 
     def settle(self) -> None:

@@ -18,7 +18,7 @@ GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples modulo 1 spread evenly: neighbo
 
 
 class Truth:
-    """What the sensors see: new values for every poll, so that an old reply is a wrong one."""
+    """The sensors' values by channel: new ones for every poll, so that an old reply is a wrong one."""
 
     def __init__(self, channels: Sequence[Channel], extent: tuple[float, float] | None) -> None:
         self.values: dict[str, float] = {}
@@ -54,7 +54,7 @@ class Peer:
         self._faults: Iterator[Fault] = iter(())
 
     def afflict(self, faults: Iterable[Fault]) -> None:
-        """What happens to the coming replies."""
+        """Set the faults of the next replies, one each."""
         self._faults = iter(faults)
 
     def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:

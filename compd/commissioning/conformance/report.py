@@ -1,4 +1,4 @@
-"""From a driver's name to the table of what held and what did not."""
+"""A driver under test, found by its name, and all its cases on all its wires."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from compd.commissioning.conformance.cases import Result, Subject, run, slowest_line
+from compd.commissioning.conformance.cases import CaseResult, Subject, run_cases, slowest_line
 from compd.commissioning.conformance.harness import ConformanceSession, ConformanceWire
 from compd.commissioning.conformance.peer import Peer, Truth
 from compd.commissioning.conformance.virtual import VirtualWire
@@ -25,8 +25,8 @@ SLOW_TIMEOUT_S = 0.3
 
 
 @dataclass(frozen=True)
-class Driver:
-    """A driver with what is needed to try it."""
+class DriverUnderTest:
+    """A driver with its simulated device and the options that it is tried with."""
 
     name: str
     gauge: type[Gauge[Any]]
@@ -39,13 +39,13 @@ class Driver:
 
     @property
     def error_replies(self) -> Mapping[bytes, Quality]:
-        """Whole replies by which the device says that something is wrong, as its simulator names them."""
+        """Whole replies by which the device reports an error, and the quality of each, as its simulator has them."""
         device = self.simulator(self.options, lambda channel: math.nan)
         replies = getattr(device, "error_replies", {})
         return {reply: Quality(quality) for reply, quality in replies.items()}
 
     def kinds(self) -> tuple[Kind, ...]:
-        """The lines that it can hang on."""
+        """The kinds of line that it can be wired to."""
         return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
 
     def subject(self, over_tcp: bool, exact: bool) -> Subject:
@@ -53,7 +53,7 @@ class Driver:
         return Subject(self.registers, over_tcp, checksum, exact, self.error_replies)
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, Truth]:
-        """A device at the far end, and what it sees. `over_tcp`: a Modbus slave in TCP framing."""
+        """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
         truth = Truth(self.gauge(self.options).channels, self.gauge.sample_range)
         return Peer(self.simulator, self.options, truth, over_tcp), truth
 
@@ -71,7 +71,9 @@ class Driver:
         return ConformanceSession(self.gauge(self.options), wire, truth)
 
 
-def find(name: str, options: Mapping[str, Any] | None = None, simulator: str | None = None) -> Driver:
+def driver_under_test(
+    name: str, options: Mapping[str, Any] | None = None, simulator: str | None = None
+) -> DriverUnderTest:
     """The driver `name` (entry point, or /file.py:ClassName), ready to be tried.
 
     `options` : without `driver` and `line`; the driver's own `sample_options` if None.
@@ -80,9 +82,7 @@ def find(name: str, options: Mapping[str, Any] | None = None, simulator: str | N
     """
     gauge = load(GAUGES, name, f"driver {name}")
     device = load(SIMULATED_GAUGES, simulator or name, f"simulated device of {name}")
-    chosen = gauge.sample_options if options is None else options
-    if chosen is None:
-        chosen = {}
+    chosen = (gauge.sample_options if options is None else options) or {}
     try:
         checked = gauge.Options.model_validate({"driver": name, "line": "test", **chosen})
     except ValidationError as error:
@@ -96,13 +96,16 @@ def find(name: str, options: Mapping[str, Any] | None = None, simulator: str | N
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    return Driver(name, gauge, device, checked)
+    return DriverUnderTest(name, gauge, device, checked)
 
 
-def try_driver(driver: Driver, on_real_wires: bool = True) -> Iterator[tuple[str, Result]]:
-    """Every case on every wire that the driver can hang on: (wire, result) as they come."""
+def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
+    """Every case on every kind of wire, as they come: (wire, result).
+
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; on each kind once at SLOWEST_BAUD.
+    """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
-        yield from _on("virtual time", driver.virtual(), driver.subject(False, True))
+        yield from _cases_on("virtual time", driver.virtual(), driver.subject(False, True))
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
         if not on_real_wires:
@@ -110,7 +113,7 @@ def try_driver(driver: Driver, on_real_wires: bool = True) -> Iterator[tuple[str
         for kind in driver.kinds():
             session = driver.real(kind, Path(temporary))
             subject = driver.subject(kind in ("tcp", "modbus_tcp"), False)
-            yield from _on(kind, session, subject)
+            yield from _cases_on(kind, session, subject)
         session = driver.real(driver.kinds()[0], Path(temporary), baud=SLOWEST_BAUD, timeout_s=SLOW_TIMEOUT_S)
         try:
             yield driver.kinds()[0], slowest_line(session, SLOWEST_BAUD)
@@ -118,9 +121,9 @@ def try_driver(driver: Driver, on_real_wires: bool = True) -> Iterator[tuple[str
             session.close()
 
 
-def _on(wire: str, session: ConformanceSession, subject: Subject) -> Iterator[tuple[str, Result]]:
+def _cases_on(wire: str, session: ConformanceSession, subject: Subject) -> Iterator[tuple[str, CaseResult]]:
     try:
-        for result in run(session, subject):
+        for result in run_cases(session, subject):
             yield wire, result
     finally:
         session.close()

@@ -1,1 +1,1 @@
-"""Driver threads: one per line, each polls the gauges of its line."""
+"""Gauges are polled here: one thread per line, which puts readings into `Latest`."""

@@ -1,7 +1,8 @@
-"""Driver threads, one per line: they poll the line's gauges and put readings into Latest.
+"""The threads that poll the gauges, one per line, and put their readings into `Latest`.
 
-A lost line is closed, waits (first `back_off_s`, doubling) and is made anew; a gauge that does not answer
-rests in the same way, so that an absent unit does not slow the others on its line. No line waits for another.
+A lost line is closed, and opened again after a waiting time that doubles with every failure. A gauge that does not
+answer is left alone in the same way, so that an absent unit does not slow the others on its line. No line waits for
+another.
 """
 
 from __future__ import annotations
@@ -23,26 +24,42 @@ from compd.readings import Latest
 
 log = structlog.get_logger()
 
-# A line without pace of its own (Modbus TCP answers in 0.1 ms) would take the interpreter from the loop.
+# Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
+# take the interpreter from the loop.
 FASTEST_ROUND_S = 2e-3
-# After these the device has said all it will say; after all others a rest of the reply may be under way.
+# Faults after which no byte of a reply can follow. After all others the line is drained, or the rest of a reply would
+# be taken for the answer to the next request.
 NOTHING_UNDER_WAY = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
 class OpenLine(Protocol):
-    """What acquisition itself asks of a line; the rest is between the line and the driver."""
+    """What acquisition itself needs of a line; the rest is between the line and the driver."""
 
     @property
-    def unexpected_bytes(self) -> int: ...
-    def drain(self) -> bytes: ...
-    def close(self) -> None: ...
+    def unexpected_bytes(self) -> int:
+        """Bytes that came without a request, since the line was opened."""
+
+    def drain(self) -> bytes:
+        """Wait until nothing more comes; what came."""
+
+    def close(self) -> None:
+        """Close the line."""
 
 
+# Opens a line from its settings; raises LineFault (LINE_LOST) where it cannot.
 Opener = Callable[[Any, Clock], OpenLine]
 
 
 class LineThread:
-    """One line: opens it, polls its gauges in turn, loses it, opens it again."""
+    """The thread of one line: opens it, polls its gauges in turn, and opens it again when it is lost.
+
+    Attributes
+    ----------
+    state, detail : "opening", "open", "lost" or "stopped", and why it is lost.
+    opened, lost : how often the line was opened and lost.
+    round_s : duration of the last round of polls, s; nan before the first.
+    gauges : the line's gauges, with the counts of their polls and faults.
+    """
 
     def __init__(
         self,
@@ -53,7 +70,7 @@ class LineThread:
         clock: Clock,
         opener: Opener = open_line,
     ) -> None:
-        """`gauges`: (name, driver) in polling order; their channels must be in `latest`."""
+        """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel"."""
         self.name = name
         self.state = "opening"
         self.detail = ""
@@ -70,11 +87,11 @@ class LineThread:
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
 
     def start(self) -> None:
-        """Begin to poll; returns at once, also when the line is not there."""
+        """Start to poll; return at once, whether or not the line can be opened."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Ask the thread to end; it does when its current poll ends."""
+        """Ask the thread to end, which it does after its current poll."""
         self._stop.set()
 
     def join(self, timeout_s: float) -> bool:
@@ -83,28 +100,28 @@ class LineThread:
         return not self._thread.is_alive()
 
     def status(self) -> dict[str, Any]:
-        """Plain data for STATUS; no key for what is not known."""
+        """The line's part of STATUS, as plain data; what is not known is left out."""
         line = self._line
-        found: dict[str, Any] = {"state": self.state, "opened": self.opened, "lost": self.lost}
+        status: dict[str, Any] = {"state": self.state, "opened": self.opened, "lost": self.lost}
         if self.detail:
-            found["detail"] = self.detail
+            status["detail"] = self.detail
         if not math.isnan(self.round_s):
-            found["round_s"] = self.round_s
+            status["round_s"] = self.round_s
         if line is not None:
-            found["unexpected_bytes"] = line.unexpected_bytes
-        found["gauges"] = {gauge.name: gauge.status() for gauge in self.gauges}
-        return found
+            status["unexpected_bytes"] = line.unexpected_bytes
+        status["gauges"] = {gauge.name: gauge.status() for gauge in self.gauges}
+        return status
 
     def _run(self) -> None:
         sharpen_timers()
         while not self._stop.is_set():
             try:
                 self._line = self._opener(self._settings, self._clock)
-                self._now_open()
+                self._mark_open()
                 while not self._stop.is_set():
                     self._round(self._line)
-            except LineFault as fault:  # LINE_LOST: polls name every other fault themselves
-                self._now_lost(fault)
+            except LineFault as fault:  # LINE_LOST alone: `_poll` handles every other fault
+                self._mark_lost(fault)
             finally:
                 if self._line is not None:
                     self._line.close()
@@ -113,14 +130,14 @@ class LineThread:
                 self._clock.wait(self._stop, self._back_off.failed())
         self.state = "stopped"
 
-    def _now_open(self) -> None:
+    def _mark_open(self) -> None:
         self.opened += 1
         self.state, self.detail = "open", ""
         log.info("line is open", line=self.name)
         for gauge in self.gauges:
-            gauge.awake()
+            gauge.resume()
 
-    def _now_lost(self, fault: LineFault) -> None:
+    def _mark_lost(self, fault: LineFault) -> None:
         if self.state != "lost":
             self.lost += 1
             log.warning("line is lost", line=self.name, detail=fault.detail)
@@ -129,7 +146,7 @@ class LineThread:
             gauge.lose(Quality.LINE_LOST, fault.detail, self._clock.monotonic())
 
     def _round(self, line: OpenLine) -> None:
-        """Poll every gauge that does not rest, then wait for the next round. Raises LineFault: LINE_LOST."""
+        """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
         for gauge in self.gauges:
             if gauge.rests_until_s <= start_s and not self._stop.is_set():
@@ -151,7 +168,7 @@ class LineThread:
             if fault.quality not in NOTHING_UNDER_WAY:
                 line.drain()
             gauge.fail(fault.quality, fault.detail, self._clock.monotonic())
-        except Exception as error:  # a driver is anybody's code: whatever it raises must not end the line's thread
+        except Exception as error:  # a driver may raise anything; it must not end the line's thread
             if not gauge.reported:
                 gauge.reported = True
                 log.exception("driver failed", gauge=gauge.name)
@@ -160,7 +177,7 @@ class LineThread:
 
 
 class Acquisition:
-    """All lines of a machine."""
+    """The threads of all lines of a machine."""
 
     def __init__(
         self,
@@ -169,19 +186,19 @@ class Acquisition:
         clock: Clock,
         opener: Opener = open_line,
     ) -> None:
-        """`lines`: name -> (settings, the line's gauges as (name, driver)); `latest` has every "gauge.channel"."""
+        """`lines`: settings of each line and its gauges as (name, driver), by name of the line."""
         self.lines = {
             name: LineThread(name, settings, gauges, latest, clock, opener)
             for name, (settings, gauges) in lines.items()
         }
 
     def start(self) -> None:
-        """Start every line; none waits for another, or for its device."""
+        """Start every line's thread; return at once."""
         for line in self.lines.values():
             line.start()
 
     def stop(self, timeout_s: float = 5.0) -> bool:
-        """End every line; False if one was still busy after `timeout_s` (its thread ends with the program)."""
+        """End every line's thread; False if one was still busy after `timeout_s` (it ends with the program)."""
         for line in self.lines.values():
             line.stop()
         busy = [line.name for line in self.lines.values() if not line.join(timeout_s)]
@@ -190,5 +207,5 @@ class Acquisition:
         return not busy
 
     def status(self) -> dict[str, Any]:
-        """Per line: state, how often opened and lost, round time, and per gauge its polls and faults."""
+        """Each line's part of STATUS, by name: state, how often opened and lost, round time, and each of its gauges."""
         return {name: line.status() for name, line in self.lines.items()}

@@ -27,7 +27,6 @@ from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
 from compd.live.loop.states import State
 from compd.live.loop.tip_uncertainty import uncertainty_um
 from compd.live.loop.wiring import MachineWires
-from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 from compd.readings import Snapshot
 
@@ -65,19 +64,22 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         state = adopt_models(state, models)
     outcome, next_state = _compute(state, inputs, models, settings)
     now_s = inputs.snapshot.time_s
-    valid = outcome.values is not None
+    valid_until_s = now_s if outcome.values is None else min(now_s + settings.valid_for_s, outcome.expires_s)
+    mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
+    age_s = now_s - outcome.oldest_s
+    # positional, as in `_setpoint_values`: keywords cost twice the time
     setpoint = Setpoint(
-        seq=inputs.tick,
-        time_s=now_s,
-        valid_until_s=min(now_s + settings.valid_for_s, outcome.expires_s) if valid else now_s,
-        age_s=now_s - outcome.oldest_s,
-        state=outcome.state,
-        reason=outcome.reason,
-        mode=Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL,
-        values=outcome.values,
-        model=models.applied.hash,
-        inputs=inputs,
-        state_before=state,
+        inputs.tick,
+        now_s,
+        valid_until_s,
+        age_s,
+        outcome.state,
+        outcome.reason,
+        mode,
+        outcome.values,
+        models.applied.hash,
+        inputs,
+        state,
     )
     return setpoint, next_state
 
@@ -116,45 +118,45 @@ def _compute(
     values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
     compensation, warm_start = compensate(machine, values, target, state.warm_start)
-    started_at, scales_seen = state.warm_start, state.scales_seen or target is None
+    scales_seen = state.scales_seen or target is None
     if code := int(compensation.reason):
         # a warm start that failed once may fail for ever: the next cycle starts from machine zero
         warm_start = WarmStart.at_zero(settings.model)._replace(effects=warm_start.effects)
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         what = "this pose" if target is None else "this target"
         return _Outcome(State.REFUSED, f"{what} cannot be computed: {MEANING[Reason(code)]}"), state
-    state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
+
+    correction_mm = compensation.correction_mm
+    limited = limit_correction(correction_mm, state.correction_mm, settings.period_s, settings.limits)
+    refusal = limited.reason if limited.state is State.REFUSED else ""
     if target is not None and (problem := stroke_problem(compensation.link_length_mm, settings.stroke_mm)):
-        return _Outcome(State.REFUSED, f"this target is out of reach: {problem}"), state
+        refusal = f"this target is out of reach: {problem}"
+    if refusal:
+        state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
+        return _Outcome(State.REFUSED, refusal), state
+    correction_mm = limited.applied_mm
 
-    limited = limit_correction(compensation.correction_mm, state.correction_mm, settings.period_s, settings.limits)
-    if limited.state is State.REFUSED:
-        return _Outcome(State.REFUSED, limited.reason), state
-
-    u_tip_um = _tip_uncertainty_um(tick, state, machine, values, compensation.scale_setpoint_mm, settings)
+    u_tip_um, scale_setpoint_mm = state.u_tip_um, compensation.scale_setpoint_mm
+    if settings.noise is not None and (u_tip_um is None or tick % settings.uncertainty_every == 0):
+        u_tip_um = uncertainty_um(machine, settings.noise, values, scale_setpoint_mm, warm_start.effects)
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
-            models.shadow, values, target, snapshot, started_at, shadow_memory, wires.tool_on_plate
+            models.shadow, values, target, snapshot, state.warm_start, shadow_memory, wires.tool_on_plate
         )
-    state = state._replace(correction_mm=limited.applied_mm, u_tip_um=u_tip_um, shadow_memory=shadow_memory)
 
-    late = limited.state is State.CLAMPED or (state.adopting and limited.state is State.SLEWING)
-    if target is None and late:
-        compensation = _with_tip_as_applied(compensation, scale_mm, limited.applied_mm, warm_start, settings)
+    adopting = state.adopting and limited.state is not State.OK
+    next_state = CycleState(
+        zero, warm_start, correction_mm, last_good, scales_seen, shadow_memory, adopting, u_tip_um, zero_vectors, models
+    )
+    if target is None and (limited.state is State.CLAMPED or (adopting and limited.state is State.SLEWING)):
+        compensation = _with_tip_as_applied(compensation, scale_mm, correction_mm, warm_start, settings)
         if code := int(compensation.reason):
-            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), state
-    if state.adopting and limited.state is State.OK:
-        state = state._replace(adopting=False)
-
-    setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
-    reported = max(usable.state, limited.state, key=_rank)
+            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
+    reported = limited.state if limited.state.rank >= usable.state.rank else usable.state
     reason = "; ".join(filter(None, (usable.reason, limited.reason)))
-    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), state
-
-
-def _rank(state: State) -> int:
-    return state.rank
+    setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
+    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), next_state
 
 
 def _explanation(error: StateError) -> str:
@@ -189,20 +191,6 @@ def _live_comparators(
     if lost:
         return None, lost
     return ComparatorSet(lengths.values, snapshot.time_s, oldest_s, quantities), ""
-
-
-def _tip_uncertainty_um(
-    tick: int,
-    state: CycleState,
-    machine: MachineModel,
-    values: GaugeValues,
-    scale_mm: FloatArray,
-    settings: CycleSettings,
-) -> FloatArray | None:
-    """Standard uncertainty (3) of the tip: the last one, or once a second a new one for the scales at scale_mm (n)."""
-    if settings.noise is None or (state.u_tip_um is not None and tick % settings.uncertainty_every):
-        return state.u_tip_um
-    return uncertainty_um(machine, settings.noise, values, scale_mm, state.warm_start.effects)
 
 
 def _with_tip_as_applied(
@@ -240,16 +228,16 @@ def _setpoint_values(
 ) -> SetpointValues:
     frame = compensation.frame
     return SetpointValues(
-        tip_M_mm=compensation.tip_M_mm,
-        tip_B0_mm=compensation.tip_B0_mm,
-        tip_P_mm=compensation.tip_P_mm if tool_on_plate else None,
-        frame_origin_M_mm=frame.origin_M_mm,
-        frame_displacement_M_mm=frame.displacement_M_mm,
-        frame_rotation_M_rad=frame.rotation_M_rad,
-        link_length_mm=compensation.link_length_mm,
-        scale_setpoint_mm=compensation.nominal_scale_mm + applied_mm,
-        correction_mm=applied_mm,
-        sources_mm=compensation.sources,
-        u_tip_um=u_tip_um,
-        shadow=shadow,
+        compensation.tip_M_mm,
+        compensation.tip_B0_mm,
+        compensation.tip_P_mm if tool_on_plate else None,
+        frame.origin_M_mm,
+        frame.displacement_M_mm,
+        frame.rotation_M_rad,
+        compensation.link_length_mm,
+        compensation.nominal_scale_mm + applied_mm,
+        applied_mm,
+        compensation.sources,
+        u_tip_um,
+        shadow,
     )

@@ -50,6 +50,7 @@ class Loop:
         self._thread = threading.Thread(target=self._run_thread, name="loop", daemon=True)
 
     def start(self) -> None:
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -60,7 +61,7 @@ class Loop:
 
     @property
     def alive(self) -> bool:
-        """False once the thread has ended, for whatever reason."""
+        """Whether the thread runs."""
         return self._thread.is_alive()
 
     def _run_thread(self) -> None:

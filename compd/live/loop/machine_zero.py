@@ -1,13 +1,14 @@
-"""Machine zero: what every length gauge reads there, kept on disk."""
+"""Machine zero: what every length gauge reads at the machine's zero position, and its file."""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
 from compd.files import write_files
@@ -17,12 +18,26 @@ _FORMAT = 1
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
 
 
+class _ZeroFile(BaseModel):
+    """The file of a machine zero. Strict: "1" is no number and 1 no text."""
+
+    model_config = ConfigDict(strict=True)
+
+    format: Literal[1]
+    zero_hash: str
+    taken_at: str
+    readings_mm: dict[str, FiniteFloat]
+
+
 @dataclass(frozen=True)
 class MachineZero:
-    """Raw readings (mm) by "gauge.channel", before any sign, and what they belong to.
+    """Raw readings of all length gauges at machine zero.
 
-    zero_hash : of geometry, gauges and wiring; another machine's zero is no zero.
+    Attributes
+    ----------
+    zero_hash : of geometry, gauges and wiring. The zero of a machine with another hash must not be used.
     taken_at : UTC, ISO 8601, for people.
+    readings_mm : by "gauge.channel", as read: before any sign.
     """
 
     zero_hash: str
@@ -30,11 +45,11 @@ class MachineZero:
     readings_mm: Mapping[str, float]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, from which `MachineZero(**data)` is the same again."""
+        """Plain data from which `MachineZero(**data)` makes the same zero again."""
         return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
 
     def save(self, directory: Path) -> Path:
-        """Write it whole or not at all, so that a power cut leaves the old one or the new one.
+        """Write the file in this directory, and return its path. After a power cut it is the old one or the new one.
 
         Raises StateError when the disk refuses.
         """
@@ -55,10 +70,18 @@ class MachineZero:
 
 
 def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> MachineZero:
-    """The zero on disk, if it belongs to this configuration.
+    """The machine zero in the file in this directory.
 
-    channels : every length gauge's "gauge.channel". Raises StateError where there is no zero, it cannot be
-    read, or it was taken with another geometry, other gauges or another wiring.
+    Parameters
+    ----------
+    zero_hash : of the configuration.
+    channels : "gauge.channel" of every length gauge in it.
+
+    Raises
+    ------
+    StateError
+        There is no file, it cannot be read or is damaged, a later release wrote it, it was taken with another
+        geometry, other gauges or another wiring, or it lacks a channel.
     """
     path = directory / FILE_NAME
     try:
@@ -73,7 +96,7 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
         raise StateError(
             Problem(where=str(path), what=f"machine zero is not JSON: {error}", next_step=_TAKE_ONE)
         ) from error
-    zero = _checked(content, path)
+    zero = _parse_zero(content, path)
     if zero.zero_hash != zero_hash:
         raise StateError(
             Problem(
@@ -89,16 +112,29 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
     return zero
 
 
-def _checked(content: Any, path: Path) -> MachineZero:
-    """The file's content, or StateError: half a zero is none."""
-    match content:
-        case {
-            "format": int(version),
-            "zero_hash": str(zero_hash),
-            "taken_at": str(taken_at),
-            "readings_mm": dict(readings),
-        } if version == _FORMAT:
-            numbers = [v for v in readings.values() if isinstance(v, int | float) and not isinstance(v, bool)]
-            if len(numbers) == len(readings) and all(map(math.isfinite, numbers)):
-                return MachineZero(zero_hash, taken_at, {name: float(value) for name, value in readings.items()})
-    raise StateError(Problem(where=str(path), what="is not a machine zero of this release", next_step=_TAKE_ONE))
+def _parse_zero(content: Any, path: Path) -> MachineZero:
+    """The machine zero in the content of the file. Raises StateError for anything that is wrong with it."""
+    if isinstance(content, dict) and isinstance(version := content.get("format"), int) and version > _FORMAT:
+        raise StateError(
+            Problem(
+                where=str(path),
+                what="was written by a later release of compd",
+                value=f"format {version}",
+                allowed=f"format {_FORMAT}",
+                next_step="install that release, or move the file away and take machine zero with this one",
+            )
+        )
+    try:
+        file = _ZeroFile.model_validate(content)
+    except ValidationError as error:
+        raise StateError(
+            [
+                Problem(
+                    where=": ".join([str(path), *map(str, detail["loc"])]),
+                    what=f"is not a machine zero: {detail['msg']}",
+                    next_step=_TAKE_ONE,
+                )
+                for detail in error.errors(include_url=False)
+            ]
+        ) from error
+    return MachineZero(file.zero_hash, file.taken_at, file.readings_mm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +15,8 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
-from compd.model.effect import FittedEffect, needed_quantities, unmet_needs
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
 from compd.model_file import read_model_file
@@ -108,10 +110,8 @@ class ModelLoader:
         if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
-        acting = machine.live_effects
-        names = tuple(
-            dict.fromkeys(name for fitted in acting for name in needed_quantities(fitted.effect, model.links))
-        )
+        needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
+        names = tuple(dict.fromkeys(chain.from_iterable(needed)))
         try_model(machine, names, str(path))
         if _hash(path) != file_hash:
             raise StateError(Problem(where=str(path), what="has changed while it was read", next_step="ask again"))

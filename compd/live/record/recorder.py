@@ -1,18 +1,18 @@
-"""Recording from the running daemon: raw readings on disk, by a process of its own.
+"""The recorder: raw readings of a running daemon, written to disk by a process of its own.
 
-A recorder is a client that watches the daemon's readings. So nothing that it does (disks that stall, files that
-fill up, a crash) can reach the loop, the daemon has no files to look after, and a burst is a second recorder beside
-the first. The daemon gives it a bounded queue as it does every client: one that falls behind is dropped.
+A recorder is a client that watches the daemon's READINGS. Stalling disks, full disks and crashes of the recorder
+therefore cannot reach the loop, and a second recorder may run beside the first. As for every client, the daemon keeps
+a bounded queue for it and drops it when it falls behind.
 
 A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itself:
 
-    NAME-0001.csv           a row per instant, as the recording format says: readings less machine zero
+    NAME-0001.csv           one row per cycle in the recording format: readings less machine zero
     NAME-0001.yaml          its sidecar; `provenance` holds machine zero and signs: raw = zero + sign * column
-    NAME-0001.cycles.jsonl  what the daemon said, line for line and bit for bit: what `compd replay` needs, with
-    NAME-0001.model-*.yaml  copies of the model files that were applied or ran as a shadow
+    NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`
+    NAME-0001.model-*.yaml  copies of the model files that were applied or ran as the shadow
 
-A machine zero that is taken anew begins a new part, since the columns of a part have one zero. Whole lines are
-written and synchronised twice a second: what a power cut or SIGKILL costs is less than a second.
+A new part begins when machine zero is taken anew, since the columns of a part have one zero. Whole lines are written
+and synchronised twice a second, so a power cut or SIGKILL costs less than a second.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ _MAX_WAITING = 20_000
 
 
 @dataclass(frozen=True)
-class Keeping:
-    """How much is kept, and in what pieces.
+class RecordingLimits:
+    """Sizes of a recording and of its parts.
 
-    part_bytes, part_s : a part that has reached either is closed, and the next one begun.
-    limit_bytes : what all parts of the recording may take.
-    drop_oldest : at the limit, delete the oldest part; otherwise recording ends.
+    part_bytes, part_s : a part that has reached either is closed, and the next one begins.
+    limit_bytes : what all parts together may take.
+    drop_oldest : at `limit_bytes` the oldest part is deleted; otherwise recording ends there.
     """
 
     part_bytes: int
@@ -62,57 +62,75 @@ class Keeping:
 
 
 class Recorder:
-    """Takes lines from the thread that reads the socket; a thread of its own writes them."""
+    """Writes a recording. Lines come from the thread that reads the socket; a thread of the recorder writes them.
+
+    Attributes
+    ----------
+    rows : READINGS messages written.
+    missing : cycles whose message never came, where every cycle was asked for.
+    dropped : messages that were not written because the disk stalled.
+    """
 
     def __init__(
-        self, name: Path, version: Message, watch: Message, keeping: Keeping, say: Callable[[str], None], clock: Clock
+        self,
+        name: Path,
+        version: Message,
+        watch: Message,
+        limits: RecordingLimits,
+        report: Callable[[str], None],
+        clock: Clock,
     ) -> None:
-        """`name`: the parts' path without "-0001.csv"; `version`, `watch`: the daemon's first two messages; `say`
-        is told what a person should know. Raises RecordingError where a recording of this name is there already.
+        """`name`: path of the parts without "-0001.csv"; `version`, `watch`: the daemon's first two messages;
+        `report`: called with sentences for the user. Raises RecordingError where a recording of this name exists.
         """
-        if there := sorted(name.parent.glob(f"{name.name}-[0-9][0-9][0-9][0-9]*.*")):
+        if existing := sorted(name.parent.glob(f"{name.name}-[0-9][0-9][0-9][0-9]*.*")):
             raise RecordingError(
-                Problem(where=str(there[0]), what="is there already", next_step="choose another name, or move it away")
+                Problem(
+                    where=str(existing[0]), what="is there already", next_step="choose another name, or move it away"
+                )
             )
         self.rows = 0
         self.dropped = 0
         self.missing = 0
         self._name = name
-        self._opening = (version, watch)
+        self._first_messages = (version, watch)
         self._every_cycle = "rate_hz" not in watch
-        self._keeping = keeping
-        self._say = say
+        self._limits = limits
+        self._report = report
         self._clock = clock
         self._waiting: deque[tuple[bytes, Message]] = deque()
         self._parts: list[RecordingPart] = []
-        self._numbers = 0
+        self._part_count = 0
         self._origin_s = math.nan
         self._failure: CompdError | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def start(self) -> None:
-        """Begin to write."""
+        """Start the writing thread."""
         self._thread.start()
 
     def follow(self, lines: Iterable[tuple[bytes, Message]], for_s: float | None) -> None:
-        """READINGS as they come, until `for_s` seconds of the daemon's time have passed; None = for ever.
+        """Record READINGS as they come, for `for_s` seconds of the daemon's time; None is for ever.
 
         Raises what `put` raises, and DaemonError when the daemon goes away.
         """
-        start_s, before = math.nan, None
+        start_s, last_seq = math.nan, None
         for line, message in lines:
-            if before is None:
+            if last_seq is None:
                 start_s = message["time_s"]
             elif for_s is not None and message["time_s"] - start_s >= for_s:
                 return
             elif self._every_cycle:
-                self.missing += message["seq"] - before - 1
-            before = message["seq"]
+                self.missing += message["seq"] - last_seq - 1
+            last_seq = message["seq"]
             self.put(line, message)
 
     def put(self, line: bytes, message: Message) -> None:
-        """One READINGS line. Raises what ended the writing: the limit, the disk, or a daemon without machine zero."""
+        """Queue one READINGS line.
+
+        Raises what ended the writing: the limit, the disk, or a daemon without machine zero.
+        """
         if self._failure is not None:
             raise self._failure
         if len(self._waiting) >= _MAX_WAITING:
@@ -121,21 +139,21 @@ class Recorder:
         self._waiting.append((line, message))
 
     def close(self) -> None:
-        """Write what waits and close the files. Raises what ended the writing."""
+        """Write the queued lines and close the files. Raises what ended the writing."""
         self._stop.set()
         self._thread.join()
         if self._failure is not None:
             raise self._failure
 
     def summary(self) -> str:
-        """What became of it, for a person."""
-        parts = f"{self.rows} rows in {self._numbers} part{'s' * (self._numbers != 1)}"
-        lost = [
+        """Rows and parts written, and what is missing, as a sentence."""
+        parts = f"{self.rows} rows in {self._part_count} part{'s' * (self._part_count != 1)}"
+        losses = [
             f"{count} {what}"
             for count, what in ((self.missing, "cycles did not come"), (self.dropped, "rows dropped: the disk stalled"))
             if count
         ]
-        return ", ".join([parts, *lost])
+        return ", ".join([parts, *losses])
 
     def _run(self) -> None:
         try:
@@ -161,22 +179,22 @@ class Recorder:
                 self._parts[-1].close()
 
     def write(self) -> None:
-        """Everything that waits, to the disk; the writing thread's."""
+        """Write every queued line to the disk; called by the writing thread."""
         while self._waiting:
             line, message = self._waiting.popleft()
             part = self._part_for(message)
             part.add(line, message)
             for hash_, file in message.get("model_files", {}).items():
-                if fault := part.keep_model(hash_, Path(file)):
-                    self._say(f"the model file {file} {fault}: it is not kept, and replay will ask for it")
+                if problem := part.copy_model(hash_, Path(file)):
+                    self._report(f"the model file {file} {problem}: it is not kept, and replay will ask for it")
             self.rows += 1
-            if self._bytes() > self._keeping.limit_bytes:
+            if self._total_bytes() > self._limits.limit_bytes:
                 self._at_limit()
         if self._parts:
             self._parts[-1].sync()
 
     def _part_for(self, message: Message) -> RecordingPart:
-        """The part that the message belongs to, new where the last one is full or has another zero."""
+        """The part that the message belongs to: a new one where the last is full, or has another machine zero."""
         if "zero" not in message:
             raise StateError(
                 Problem(
@@ -187,31 +205,32 @@ class Recorder:
             )
         if not self._parts:
             self._origin_s = message["time_s"]
-            return self._begin(message)
-        last, keeping = self._parts[-1], self._keeping
+            return self._new_part(message)
+        last, limits = self._parts[-1], self._limits
         if message["zero"] != last.zero:
-            self._say("machine zero was taken anew")
-        elif last.size < keeping.part_bytes and message["time_s"] - last.start_s < keeping.part_s:
+            self._report("machine zero was taken anew")
+        elif last.size < limits.part_bytes and message["time_s"] - last.start_s < limits.part_s:
             return last
         last.close()
-        return self._begin(message)
+        return self._new_part(message)
 
-    def _begin(self, message: Message) -> RecordingPart:
-        self._numbers += 1
-        stem = self._name.with_name(f"{self._name.name}-{self._numbers:04d}")
-        ago = timedelta(seconds=self._clock.monotonic() - message["time_s"])
-        started_at = (datetime.now(UTC) - ago).isoformat(timespec="milliseconds")
-        part = RecordingPart(stem, self._opening, message, self._origin_s, started_at)
+    def _new_part(self, message: Message) -> RecordingPart:
+        self._part_count += 1
+        stem = self._name.with_name(f"{self._name.name}-{self._part_count:04d}")
+        age = timedelta(seconds=self._clock.monotonic() - message["time_s"])
+        started_at = (datetime.now(UTC) - age).isoformat(timespec="milliseconds")
+        part = RecordingPart(stem, self._first_messages, message, self._origin_s, started_at)
         self._parts.append(part)
-        self._say(f"{part.csv_path} begins")
+        self._report(f"{part.csv_path} begins")
         return part
 
-    def _bytes(self) -> int:
+    def _total_bytes(self) -> int:
         return sum(part.size for part in self._parts)
 
     def _at_limit(self) -> None:
-        limit = f"{self._keeping.limit_bytes / 1e6:g} MB"
-        if not self._keeping.drop_oldest:
+        """Delete the oldest parts, or raise RecordingError to end the recording."""
+        limit = f"{self._limits.limit_bytes / 1e6:g} MB"
+        if not self._limits.drop_oldest:
             raise RecordingError(
                 Problem(
                     where=str(self._name),
@@ -220,7 +239,7 @@ class Recorder:
                     next_step="give a larger limit, or let the oldest part be dropped",
                 )
             )
-        while self._bytes() > self._keeping.limit_bytes and len(self._parts) > 1:
+        while self._total_bytes() > self._limits.limit_bytes and len(self._parts) > 1:
             oldest = self._parts.pop(0)
             oldest.delete()
-            self._say(f"limit of {limit}: {oldest.csv_path} deleted, with {oldest.rows} rows")
+            self._report(f"limit of {limit}: {oldest.csv_path} deleted, with {oldest.rows} rows")

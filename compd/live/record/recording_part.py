@@ -1,4 +1,4 @@
-"""One part of a recording: files of whole lines at any time, and the models that the daemon computed with."""
+"""One part of a recording: its CSV, its sidecar, the daemon's messages and copies of the model files."""
 
 from __future__ import annotations
 
@@ -22,55 +22,66 @@ MODEL_MARK = ".model-"
 
 
 class RecordingPart:
-    """NAME.csv, NAME.yaml and NAME.cycles.jsonl, for readings with one machine zero."""
+    """NAME.csv, NAME.yaml and NAME.cycles.jsonl, for readings with one machine zero.
+
+    The files consist of whole lines at any time.
+    """
 
     def __init__(
-        self, stem: Path, opening: Sequence[Message], first: Message, origin_s: float, started_at: str
+        self, stem: Path, first_messages: Sequence[Message], first_readings: Message, origin_s: float, started_at: str
     ) -> None:
-        """`opening`: the daemon's VERSION and its answer to WATCH; `first`: the part's first READINGS.
+        """Write the sidecar and begin the other files. Raises OSError.
 
-        origin_s : monotonic time that is 0 in the column time_s. Raises OSError.
+        Parameters
+        ----------
+        stem : path of the files without their suffixes.
+        first_messages : the daemon's VERSION and its answer to WATCH.
+        first_readings : the first READINGS of the part.
+        origin_s : monotonic time that is 0 in the column time_s.
+        started_at : UTC of the first row, ISO 8601.
         """
-        version, watch = opening
+        version, watch = first_messages
         self.csv_path = stem.with_name(f"{stem.name}.csv")
         self._sidecar_path = stem.with_name(f"{stem.name}.yaml")
         self._cycles_path = stem.with_name(f"{stem.name}{CYCLES_SUFFIX}")
-        self.zero: Message = first["zero"]
-        self.start_s: float = first["time_s"]
+        self.zero: Message = first_readings["zero"]
+        self.start_s: float = first_readings["time_s"]
         self.rows = 0
         self._columns: Sequence[Message] = watch["columns"]
         names = ["time_s", *(column["column"] for column in self._columns)]
         self._decimals = {name: decimals(name) for name in names}
         self._origin_s = origin_s
         sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
-        opened = b"".join(encode_compact(message).encode() + b"\n" for message in opening)
-        self._links = len(first.get("approach", ()))
+        first_lines = b"".join(encode_compact(message).encode() + b"\n" for message in first_messages)
+        self._links = len(first_readings.get("approach", ()))
         header = ",".join([*names, *approach_columns(self._links)]).encode() + b"\n"
         self._stem = stem
         self._models: dict[str, Path] = {}
-        self._whole_size = 0
-        self._write_whole(self._sidecar_path, sidecar)
+        self._complete_size = 0
+        self._write_complete(self._sidecar_path, sidecar)
         self._cycles = LinesFile(self._cycles_path)
         self._csv = LinesFile(self.csv_path)
-        self._cycles.add(opened)
+        self._cycles.add(first_lines)
         self._csv.add(header)
         self.sync()
         sync_directory(stem.parent)
 
     @property
     def size(self) -> int:
-        """Bytes of all files, with what waits to be written."""
-        return self._whole_size + self._cycles.size + self._csv.size
+        """Bytes of all files, with what is still to be written."""
+        return self._complete_size + self._cycles.size + self._csv.size
 
     def add(self, line: bytes, message: Message) -> None:
-        """One READINGS message and the line that it came in; `sync` writes it."""
+        """Append a READINGS message and the line in which it came; `sync` writes both."""
         self._cycles.add(line)
         self._csv.add(self._row(message).encode() + b"\n")
         self.rows += 1
 
-    def keep_model(self, hash_: str, file: Path) -> str:
-        """Copy a model file beside the part, once; what is wrong with it, "" where nothing is. Raises OSError where
-        the copy cannot be written."""
+    def copy_model(self, hash_: str, file: Path) -> str:
+        """Copy a model file beside the part, once. Returns what is wrong with the file, "" where nothing is.
+
+        Raises OSError where the copy cannot be written.
+        """
         if hash_ in self._models:
             return ""
         self._models[hash_] = self._stem.with_name(f"{self._stem.name}{MODEL_MARK}{hash_}.yaml")
@@ -80,16 +91,16 @@ class RecordingPart:
             return f"cannot be read: {error.strerror}"
         if not hashlib.sha256(content).hexdigest().startswith(hash_):
             return "has changed since the daemon read it"
-        self._write_whole(self._models[hash_], content)
+        self._write_complete(self._models[hash_], content)
         return ""
 
     def sync(self) -> None:
-        """What waits, onto the disk. Raises OSError; the files then end with the last line that is whole."""
+        """Write what was added to the disk. Raises OSError; the files then end with their last whole line."""
         self._cycles.sync()
         self._csv.sync()
 
     def close(self) -> None:
-        """Nothing is added any more."""
+        """Write what was added, and close the files."""
         try:
             self.sync()
         finally:
@@ -97,20 +108,20 @@ class RecordingPart:
             self._csv.close()
 
     def delete(self) -> None:
-        """Remove the files; the sidecar last, so that what is left says what it was."""
+        """Delete the files; the sidecar last, so that whatever is left is described."""
         for path in (self._cycles_path, self.csv_path, *self._models.values(), self._sidecar_path):
             path.unlink(missing_ok=True)
 
-    def _write_whole(self, path: Path, content: bytes) -> None:
+    def _write_complete(self, path: Path, content: bytes) -> None:
         write_new_file(path, content)
-        self._whole_size += len(content)
+        self._complete_size += len(content)
 
     def _row(self, message: Message) -> str:
         now_s, readings = message["time_s"], message["readings"]
         cells = [self._number("time_s", now_s - self._origin_s)]
         cells += [self._cell(column, readings[column["channel"]], now_s) for column in self._columns]
         # empty until a link has moved
-        cells += [str(way) if way else "" for way in message.get("approach", ())[: self._links]]
+        cells += [str(direction) if direction else "" for direction in message.get("approach", ())[: self._links]]
         return ",".join(cells)
 
     def _cell(self, column: Message, reading: Message, now_s: float) -> str:
@@ -154,24 +165,24 @@ class RecordingPart:
 
 
 class LinesFile:
-    """A new file to which only whole lines are added, many at a time."""
+    """A new file to which whole lines are appended, many at a time. `size` includes those not yet written."""
 
     def __init__(self, path: Path) -> None:
         self.size = 0
         self._file: FileIO = FileIO(path, "xb")
-        self._waiting: list[bytes] = []
+        self._queue: list[bytes] = []
         self._written = 0
 
     def add(self, lines: bytes) -> None:
-        self._waiting.append(lines)
+        self._queue.append(lines)
         self.size += len(lines)
 
     def sync(self) -> None:
-        """Write what waits. Raises OSError, and takes back the half line that a full disk leaves."""
-        if not self._waiting:
+        """Write the queued lines. Raises OSError; the part of a line that a full disk leaves is cut off."""
+        if not self._queue:
             return
-        block = memoryview(b"".join(self._waiting))
-        self._waiting.clear()
+        block = memoryview(b"".join(self._queue))
+        self._queue.clear()
         try:
             while block:
                 block = block[self._file.write(block) :]

@@ -1,4 +1,4 @@
-"""A recorded run through the live path again: do the same readings give the same setpoints, bit for bit?"""
+"""Replay of a recording: every recorded cycle computed anew, and compared with the setpoint that was sent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from compd.live.service.readings_message import RecordedCycle, parse_readings
 
 
 class ReplayedCycle(NamedTuple):
-    """One cycle: where its line is, the SETPOINT line that was sent, and the one that comes out now."""
+    """One cycle of a recording, computed again.
+
+    where : file and line of its READINGS message. tick : number of the cycle.
+    sent, replayed : the SETPOINT line that was sent, and the one that is computed now.
+    """
 
     where: str
     tick: int
@@ -30,21 +34,21 @@ class ReplayedCycle(NamedTuple):
 
 
 class RecordedCycles:
-    """The cycles of one recording's parts, oldest first."""
+    """The cycles in all parts of a recording, oldest first. `torn_lines` counts lines that were cut off by a kill."""
 
     def __init__(self, name: Path) -> None:
-        """`name`: as given to the recorder (all parts), or one part's own, with or without a suffix.
+        """`name`: as it was given to the recorder, for all parts; or that of one part, with or without a suffix.
 
-        Raises RecordingError where there is none.
+        Raises RecordingError where there is no such recording.
         """
         stem = name.name.removesuffix(CYCLES_SUFFIX).removesuffix(".csv").removesuffix(".yaml")
-        one = name.with_name(stem + CYCLES_SUFFIX)
-        self.paths = [one] if one.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
-        self.torn = 0
+        path = name.with_name(stem + CYCLES_SUFFIX)
+        self.paths = [path] if path.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
+        self.torn_lines = 0
         if not self.paths:
             raise RecordingError(
                 Problem(
-                    where=str(one),
+                    where=str(path),
                     what="is not there, nor parts of it",
                     allowed=f"a recording by `compd record` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
                     next_step="give its name",
@@ -52,16 +56,12 @@ class RecordedCycles:
             )
 
     def config_hashes(self) -> set[str]:
-        """Of the configurations that the daemon ran."""
-        found = set()
-        for path in self.paths:
-            for _, message in self._messages(path):
-                found.add(str(message.get("config_hash")))
-                break
-        return found
+        """Hashes of the configurations with which the parts were recorded."""
+        first_messages = [next(self._messages(path), None) for path in self.paths]
+        return {str(message.get("config_hash")) for _, message in filter(None, first_messages)}
 
     def model_files(self) -> list[Path]:
-        """Copies of the models that the daemon computed with, kept beside the parts."""
+        """Copies of the model files beside the parts."""
         stems = [path.name.removesuffix(CYCLES_SUFFIX) for path in self.paths]
         return [
             copy
@@ -70,7 +70,7 @@ class RecordedCycles:
         ]
 
     def cycles(self) -> Iterator[tuple[str, Message]]:
-        """(file:line, READINGS). A line that was torn when the recorder was killed is the last; it is counted."""
+        """(file:line, READINGS message) of every cycle. An incomplete last line is left out and counted."""
         for path in self.paths:
             for where, message in self._messages(path):
                 if message.get("class") == "READINGS":
@@ -80,7 +80,7 @@ class RecordedCycles:
         with path.open("rb") as file:
             for number, line in enumerate(file, start=1):
                 if not line.endswith(b"\n"):
-                    self.torn += 1
+                    self.torn_lines += 1
                     return
                 where = f"{path}:{number}"
                 try:
@@ -92,14 +92,23 @@ class RecordedCycles:
                 yield where, message
 
 
-def replay(
+def replay_cycles(
     configuration: Configuration, recording: RecordedCycles, model_files: Sequence[Path] = ()
 ) -> Iterator[ReplayedCycle]:
-    """Every recorded cycle, computed anew by the daemon's own cycle from what it computed from then.
+    """Compute every recorded cycle again with `step`, from the state and the inputs in its READINGS message.
 
-    `model_files`: applied or shadow models that are not kept beside the recording. Time is the recording's.
-    Raises RecordingError for a damaged line, readings of another machine or a model that is not given, StateError
-    for a model file that cannot be used.
+    Parameters
+    ----------
+    configuration : with which the daemon ran.
+    recording : whose cycles to compute.
+    model_files : applied or shadow models that are not beside the recording.
+
+    Raises
+    ------
+    RecordingError
+        A damaged line, readings of another machine, or a model file that is missing.
+    StateError
+        A model file that cannot be used.
     """
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     files = [*recording.model_files(), *model_files]

@@ -30,7 +30,7 @@ class RecordedCycle(NamedTuple):
 
     Attributes
     ----------
-    state : what the cycle before left.
+    state : the state that the cycle had from the one before it.
     inputs : what the cycle computed from.
     setpoint_line : the SETPOINT line that it made, with its newline.
 
@@ -52,7 +52,10 @@ class ReadingsMessage:
         self._directions = directions
 
     def line(self, setpoint: Setpoint) -> bytes:
-        """The READINGS line of the cycle that made `setpoint`, with its newline."""
+        """The READINGS line of the cycle that made `setpoint`, with its newline.
+
+        Called with the setpoints of a run in order, since the direction of travel is that of the newest cycle.
+        """
         inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
         assert state is not None, "and its state"

@@ -1,7 +1,8 @@
 """What a client may ask of the daemon: one class per request, with its keys, who may ask, and its answer.
 
 To add a request, derive a class from `Request` here, add a method to `compd.client.Client`, and test both. The class
-gives the name on the wire, the keys as pydantic fields (checked strictly, unknown keys refused) and `answer`.
+gives the name on the wire, the keys as pydantic fields (checked strictly, unknown keys refused), `answer`, and the keys
+of the answer's message.
 """
 
 from __future__ import annotations
@@ -19,6 +20,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from compd.live.loop.commands import Commands, Target
 from compd.live.loop.setpoint import Setpoint
 from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES, ClientSession
+from compd.live.service.message_keys import (
+    ErrorKeys,
+    Keys,
+    ModelsKeys,
+    ReadingsKeys,
+    SentMessage,
+    SetpointKeys,
+    StatusKeys,
+    VersionKeys,
+)
 from compd.live.service.messages import (
     LARGEST_NUMBER,
     QUOTED_CHARACTERS,
@@ -68,12 +79,13 @@ class TargetKeys:
 class Request(BaseModel):
     """Base of all requests; the fields of a subclass are the keys of its message.
 
-    wire_name : the message's "class".
+    wire_name : the message's "class".  reply : the keys of its answer; None where there is none.
     asker : who may ask.  refusal : the text of the error that anybody else gets.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
     wire_name: ClassVar[str]
+    reply: ClassVar[type[SentMessage] | None] = None
     asker: ClassVar[Asker] = Asker.ANYBODY
     refusal: ClassVar[str] = ""
 
@@ -90,10 +102,29 @@ class Request(BaseModel):
         """
 
 
+class ColumnKeys(Keys):
+    """One column of a recording: sign * (value - machine zero) for a length, the value itself for anything else."""
+
+    column: str = Field(description="the column's name, which ends in its unit")
+    channel: str = Field(description='the gauge\'s channel, "gauge.channel", as in READINGS')
+    sign: Literal[1, -1] | None = Field(default=None, description="lengths: -1 where the display falls as it grows")
+    stale_after_s: float = Field(description="a reading older than this is stale, s")
+
+
+class WatchKeys(SentMessage):
+    """Answers WATCH, with the keys of the request."""
+
+    wire_name = "WATCH"
+    what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
+    rate_hz: float | None = Field(default=None, description="as in the request, Hz")
+    columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
+
+
 class WatchRequest(Request):
     """Send me setpoints, or the readings behind them, from now on; answered by WATCH with the same keys."""
 
     wire_name = "WATCH"
+    reply = WatchKeys
     what: Literal["setpoints", "readings"] = Field(
         default="setpoints",
         description="setpoints: SETPOINT messages; readings: READINGS messages, over the Unix socket only",
@@ -149,10 +180,17 @@ class TargetRequest(Request):
         return b""
 
 
+class ReleaseKeys(SentMessage):
+    """Answers RELEASE: the mode is CMM again."""
+
+    wire_name = "RELEASE"
+
+
 class ReleaseRequest(Request):
     """Take the controller's role back from me: the mode is CMM again. Answered by RELEASE."""
 
     wire_name = "RELEASE"
+    reply = ReleaseKeys
     asker = Asker.CONTROLLER
     refusal = "only the controller can release its role"
 
@@ -165,6 +203,7 @@ class StatusRequest(Request):
     """How is the daemon doing? Answered by STATUS."""
 
     wire_name = "STATUS"
+    reply = StatusKeys
 
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
         return line(requests.status())
@@ -174,21 +213,38 @@ class VersionRequest(Request):
     """Which daemon, machine and configuration is this? Answered by VERSION, which also greets every new client."""
 
     wire_name = "VERSION"
+    reply = VersionKeys
 
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
         return requests.version
+
+
+class ZeroKeys(SentMessage):
+    """Answers ZERO when machine zero has been taken."""
+
+    wire_name = "ZERO"
+    taken_at: str = Field(description="when, UTC, ISO 8601")
+    path: str = Field(description="the file in which it is kept")
+    readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
 
 
 class ZeroRequest(Request):
     """Take machine zero, with the machine at rest at its zero position. Answered by ZERO after about a second."""
 
     wire_name = "ZERO"
+    reply = ZeroKeys
     asker = Asker.LOCAL
     refusal = "machine zero is taken over the Unix socket only"
 
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
         requests.take_zero(send_later)
         return b""
+
+
+class ModelKeys(SentMessage, ModelsKeys):
+    """Answers MODEL."""
+
+    wire_name = "MODEL"
 
 
 class ModelRequest(Request):
@@ -198,6 +254,7 @@ class ModelRequest(Request):
     """
 
     wire_name = "MODEL"
+    reply = ModelKeys
     asker = Asker.LOCAL
     refusal = "models are asked for and adopted over the Unix socket only"
     file: str = Field(
@@ -229,6 +286,13 @@ class ModelRequest(Request):
 
 
 REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in Request.__subclasses__()}
+_SENT: tuple[type[SentMessage], ...] = (
+    *(kind.reply for kind in REQUESTS.values() if kind.reply is not None),
+    ErrorKeys,
+    SetpointKeys,
+    ReadingsKeys,
+)
+SENT_MESSAGES: Mapping[str, type[SentMessage]] = {kind.wire_name: kind for kind in _SENT}
 
 
 class Requests:

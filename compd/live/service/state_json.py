@@ -1,8 +1,7 @@
 """The state that a cycle hands to the next one, as plain data for JSON, and back bit for bit.
 
 An array becomes the base64 text of its bytes, with its type and shape: so nan, which JSON has no number for, is kept,
-and writing it takes less time than decimals. A named tuple carries a tag, so that a field more in a state needs no
-change here.
+and writing it takes less time than decimals. A named tuple carries a tag that says what it is.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import Clock
-from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.json_text import omit_unknown
@@ -33,7 +32,6 @@ class StatusReport:
     """
 
     version: Mapping[str, Any]
-    configuration: Configuration
     latest: Latest
     wires: MachineWires
     commands: Commands

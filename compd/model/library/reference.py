@@ -130,5 +130,6 @@ EFFECTS = (
         mistaken_for=(),
         separated_by="three reference marks on the surface plate",
         basis=memoryless_basis(_registration),
+        registration=True,
     ),
 )

@@ -34,8 +34,8 @@ class SimulatedAscii(SimulatedByteDevice):
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
         end = plain(options.out_terminator)
-        others = [*options.init, *([options.echo] if options.echo else [])]
-        self._replies = {(plain(one.out) + end).encode("latin-1"): one.in_ for one in others}
+        exchanges = [*options.init, *([options.echo] if options.echo else [])]
+        self._replies = {(plain(exchange.out) + end).encode("latin-1"): exchange.in_ for exchange in exchanges}
         if options.out:
             self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
         self._heard = b""
@@ -56,12 +56,12 @@ class SimulatedAscii(SimulatedByteDevice):
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""
         places = {request: self._heard.find(request) for request in self._replies}
-        found = {request: place for request, place in places.items() if place >= 0}
-        if not found:
+        requests = {request: place for request, place in places.items() if place >= 0}
+        if not requests:
             self._heard = self._heard[-max(map(len, self._replies), default=0) :]
             return b""
-        first = min(found, key=lambda request: (found[request], -len(request)))
-        self._heard = self._heard[found[first] + len(first) :]
+        first = min(requests, key=lambda request: (requests[request], -len(request)))
+        self._heard = self._heard[requests[first] + len(first) :]
         return first
 
     def _answer(self, request: bytes) -> str:
@@ -107,7 +107,7 @@ class SimulatedAscii(SimulatedByteDevice):
         return filler * int(token[4] or 1)
 
     def _number(self, name: str, form: str) -> str:
-        channel = next(one for one in self.options.channels if one.name == name)
+        channel = next(channel for channel in self.options.channels if channel.name == name)
         value = self.sense(name)
         match channel.unit:
             case "V" | "mA":

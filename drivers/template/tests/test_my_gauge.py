@@ -6,7 +6,7 @@ import pytest
 from my_gauge.driver import MyGauge
 from my_gauge.simulated import SimulatedMyGauge
 
-from compd.commissioning.conformance.report import Driver, try_driver
+from compd.commissioning.conformance.report import DriverUnderTest, run_conformance
 from compd.gauge import LineFault, Quality, Reading
 
 
@@ -22,10 +22,10 @@ class Transcript:
         return 12.5
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
-        reply, found, self.waiting = self.waiting.partition(terminator)
-        assert found
-        assert len(reply + found) <= limit
-        return reply + found
+        reply, end, self.waiting = self.waiting.partition(terminator)
+        assert end
+        assert len(reply + end) <= limit
+        return reply + end
 
 
 def gauge(unit: str) -> MyGauge:
@@ -69,6 +69,6 @@ def test_anything_else_is_no_number(received: bytes) -> None:
 
 @pytest.mark.parametrize("unit", ["mm", "in"])
 def test_every_fault_of_a_wire(unit: str) -> None:
-    driver = Driver("my_gauge", MyGauge, SimulatedMyGauge, gauge(unit).options)
-    found = list(try_driver(driver, on_real_wires=False))
-    assert [f"{result.case}: {result.came}" for _, result in found if result.verdict == "FAIL"] == []
+    driver = DriverUnderTest("my_gauge", MyGauge, SimulatedMyGauge, gauge(unit).options)
+    results = list(run_conformance(driver, on_real_wires=False))
+    assert [f"{result.case}: {result.observed}" for _, result in results if result.verdict == "FAIL"] == []

@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from compd.cli import driver as driver_cli
 from compd.cli import gauge as gauge_cli
 from compd.commissioning.capture import read_capture
-from compd.commissioning.describe import learn, verify
+from compd.commissioning.describe import describe_replies, read_replies
 from compd.commissioning.gauge_statistics import GaugeStatistics
-from compd.commissioning.scan import PresetCandidate, candidates, ports, probe_port
+from compd.commissioning.scan import PresetCandidate, preset_candidates, probe_port, serial_ports
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError
 from compd.gauge import Channel, Quality, bad, good
@@ -134,12 +134,12 @@ def test_scan_and_probe(scale: str, tmp_path: Path) -> None:
     by_id = tmp_path / "by-id"
     by_id.mkdir()
     (by_id / "usb-Scale_1").symlink_to(scale)
-    assert str(by_id / "usb-Scale_1") in {port.path for port in ports(by_id)}
+    assert str(by_id / "usb-Scale_1") in {port.path for port in serial_ports(by_id)}
     nd28x = load(GAUGES, "heidenhain_nd28x", "x")
     candidate = PresetCandidate("nd", nd28x(nd28x.Options(driver="nd", line="x")), 115200, "8N1")
     assert probe_port(scale, candidate) == "position 1.25 mm"
     assert "line_lost" in probe_port(str(tmp_path / "nothing"), candidate)
-    assert {"heidenhain_nd28x", "sylvac_optors", "adam_4017p"} <= {found.name for found in candidates()}
+    assert {"heidenhain_nd28x", "sylvac_optors", "adam_4017p"} <= {found.name for found in preset_candidates()}
 
 
 def test_scan_without_probe_sends_nothing() -> None:
@@ -171,16 +171,16 @@ OBSERVED = {
 @pytest.mark.parametrize("case", OBSERVED)
 def test_learned_description_reads_what_was_observed(case: str) -> None:
     request, replies, values = OBSERVED[case]
-    learned = learn(request, replies, "mm")
-    assert verify(learned, load(GAUGES, "serial_ascii", "x"), replies) == values
+    learned = describe_replies(request, replies, "mm")
+    assert read_replies(learned, load(GAUGES, "serial_ascii", "x"), replies) == values
 
 
 def test_learned_description_is_narrow() -> None:
     request, replies, _ = OBSERVED["fixed decimals"]
-    learned = learn(request, replies, "mm")
+    learned = describe_replies(request, replies, "mm")
     for damaged in (b"+001.23\r\n", b"+0001.2\r\n", b"+0001.234\r\n", b"0001.23\r\n", b"+00x1.23\r\n", b"\r\n"):
         with pytest.raises(CompdError, match="does not fit"):
-            verify(learned, load(GAUGES, "serial_ascii", "x"), [damaged])
+            read_replies(learned, load(GAUGES, "serial_ascii", "x"), [damaged])
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_learned_description_is_narrow() -> None:
 )
 def test_inconsistent_replies_are_refused_with_their_place(replies: list[bytes], said: str) -> None:
     with pytest.raises(CompdError, match=said):
-        learn(b"?", replies, "mm")
+        describe_replies(b"?", replies, "mm")
 
 
 def test_learn_from_a_file_gives_a_usable_gauge(tmp_path: Path) -> None:

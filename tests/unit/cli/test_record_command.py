@@ -19,8 +19,7 @@ from compd.errors import DaemonError
 from compd.gauge import good
 from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
-from compd.live.record.replay import RecordedCycles
-from compd.live.record.replay import replay as replay_cycles
+from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.recording.reader import read_recording
 from tests.support.live_machine import CONFIG
 

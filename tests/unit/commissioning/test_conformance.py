@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compd.commissioning.conformance import faults
-from compd.commissioning.conformance.cases import Result, Subject, tried
+from compd.commissioning.conformance.cases import CaseResult, Subject, run_case
 from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.report import Driver, find, try_driver
+from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.plugins import GAUGES, names
 from compd.simulation.wires.device import SimulatedByteDevice
@@ -24,20 +24,20 @@ from compd.simulation.wires.device import SimulatedByteDevice
 NAMES = names(GAUGES)
 
 
-def failures(found: Sequence[tuple[str, Result]]) -> list[str]:
-    return [f"{wire}: {result.case}: {result.came}" for wire, result in found if result.verdict == "FAIL"]
+def failures(found: Sequence[tuple[str, CaseResult]]) -> list[str]:
+    return [f"{wire}: {result.case}: {result.observed}" for wire, result in found if result.verdict == "FAIL"]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_installed_driver_in_virtual_time(name: str) -> None:
-    found = list(try_driver(find(name), on_real_wires=False))
+    found = list(run_conformance(driver_under_test(name), on_real_wires=False))
     assert failures(found) == []
     assert sum(result.verdict == "pass" for _, result in found) >= 12
 
 
 @pytest.mark.parametrize("name", ["heidenhain_nd28x", "modbus"])
 def test_driver_on_ptys_and_ports(name: str) -> None:
-    found = list(try_driver(find(name)))
+    found = list(run_conformance(driver_under_test(name)))
     assert failures(found) == []
     assert len({wire for wire, _ in found}) == 3
 
@@ -46,7 +46,7 @@ def test_driver_on_ptys_and_ports(name: str) -> None:
 @pytest.mark.timeout(400)  # real time on real wires: a busy computer takes its share
 @pytest.mark.parametrize("name", NAMES)
 def test_every_driver_on_ptys_and_ports(name: str) -> None:
-    assert failures(list(try_driver(find(name)))) == []
+    assert failures(list(run_conformance(driver_under_test(name)))) == []
 
 
 @pytest.mark.parametrize(("failing", "exact", "verdict"), [(1, False, "pass"), (3, False, "FAIL"), (1, True, "FAIL")])
@@ -54,9 +54,9 @@ def test_a_computer_may_be_late_by_chance_in_real_time_and_a_driver_wrong_never(
     failing: int, exact: bool, verdict: str
 ) -> None:
     results = iter(["FAIL"] * failing + ["pass"] * 3)
-    case = Mock(side_effect=lambda session, subject: Result("late", "ok", "timeout", next(results)))
+    case = Mock(side_effect=lambda session, subject: CaseResult("late", "ok", "timeout", next(results)))
     subject = Subject(registers=False, over_tcp=True, checksum=False, exact=exact, error_replies={})
-    assert tried(case, Mock(), subject).verdict == verdict
+    assert run_case(case, Mock(), subject).verdict == verdict
 
 
 # --- random interleavings ------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ modbus_only = st.one_of(
 with_checksum = st.one_of(harmless_to_format, st.builds(faults.flipped, st.integers(0, 10_000)))
 
 
-def run_through(driver: Driver, polls: Sequence[Sequence[Fault]]) -> None:
+def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> None:
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
@@ -101,7 +101,7 @@ def run_through(driver: Driver, polls: Sequence[Sequence[Fault]]) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.DataObject) -> None:
-    driver = find(name)
+    driver = driver_under_test(name)
     kinds = harmless_to_format
     if driver.registers:
         kinds = st.one_of(harmless_to_format, modbus_only)
@@ -197,12 +197,12 @@ class CutOff(Careful):
             return [bad(line.send(b""), Quality.SENSOR_FAULT)]
 
 
-def driver_of(gauge: type[Gauge[Any]], options: Mapping[str, Any] | None = None) -> Driver:
-    return Driver("x", gauge, Scale, GaugeOptions(driver="x", line="test", **(options or {})))
+def driver_of(gauge: type[Gauge[Any]], options: Mapping[str, Any] | None = None) -> DriverUnderTest:
+    return DriverUnderTest("x", gauge, Scale, GaugeOptions(driver="x", line="test", **(options or {})))
 
 
 def test_a_careful_driver_passes() -> None:
-    assert failures(list(try_driver(driver_of(Careful), on_real_wires=False))) == []
+    assert failures(list(run_conformance(driver_of(Careful), on_real_wires=False))) == []
 
 
 @pytest.mark.parametrize(
@@ -216,22 +216,22 @@ def test_a_careful_driver_passes() -> None:
     ],
 )
 def test_a_wrong_driver_is_found(gauge: type[Gauge[Any]], case: str) -> None:
-    found = list(try_driver(driver_of(gauge), on_real_wires=False))
+    found = list(run_conformance(driver_of(gauge), on_real_wires=False))
     assert case in {result.case for _, result in found if result.verdict == "FAIL"}, found
 
 
 def test_flips_that_a_wire_cannot_show_are_said_and_not_hidden() -> None:
-    found = {result.case: result for _, result in try_driver(driver_of(Careful), on_real_wires=False)}
+    found = {result.case: result for _, result in run_conformance(driver_of(Careful), on_real_wires=False)}
     flips = found["one bit turned"]
     assert flips.verdict == "-"
-    assert "not detectable on this wire" in flips.came
+    assert "not detectable on this wire" in flips.observed
 
 
 def test_a_checksum_that_is_not_checked_is_a_failure() -> None:
     class Claims(Careful):
         integrity = "checksum"
 
-    found = list(try_driver(driver_of(Claims), on_real_wires=False))
+    found = list(run_conformance(driver_of(Claims), on_real_wires=False))
     assert "one bit turned" in {result.case for _, result in found if result.verdict == "FAIL"}
 
 
@@ -240,8 +240,8 @@ def test_error_replies_that_the_simulated_device_names_are_tried() -> None:
         error_replies = {b"ERROR\r\n": "sensor_fault", b"E9\r\n": "device_error"}  # noqa: RUF012
 
     options = GaugeOptions(driver="x", line="test")
-    found = list(try_driver(Driver("x", Careful, WithErrors, options), on_real_wires=False))
-    assert any("device_error" in result.wanted and result.verdict == "FAIL" for _, result in found)
+    found = list(run_conformance(DriverUnderTest("x", Careful, WithErrors, options), on_real_wires=False))
+    assert any("device_error" in result.required and result.verdict == "FAIL" for _, result in found)
 
 
 def test_real_wire_replugs(tmp_path: Path) -> None:

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from compd.cli.line_plan import print_line_plan
-from compd.commissioning.line_budget import LinePlan, character_bits, line_warnings, plan, plan_line, warnings
+from compd.commissioning.line_budget import (
+    LineBudget,
+    budget_of_line,
+    budget_warnings,
+    character_bits,
+    line_budgets,
+    line_warnings,
+)
 from compd.configuration import load
 from compd.configuration.lines import ModbusRtuLine, ModbusTcpLine, SerialLine
 from tests.support.paths import CONFIG
@@ -34,7 +41,7 @@ INT16, FLOAT32, UNITS = [(8, 23)], [(8, 41)], [(8, 7)] * 9
     ],
 )
 def test_nine_comparators(traffic: list[tuple[int, int]], count: int, baud: int, ideal_hz: str, usual_hz: str) -> None:
-    found = plan_line("x", rtu(baud), {"gauge": traffic})
+    found = budget_of_line("x", rtu(baud), {"gauge": traffic})
     assert found.bytes == count
     assert f"{found.ideal_hz:.0f}" == ideal_hz
     assert f"{found.usual_hz:.{1 if '.' in usual_hz else 0}f}" == usual_hz
@@ -48,43 +55,43 @@ def test_parity_and_stop_bits_cost_time() -> None:
     traffic = {"gauge": [(1, 17)]}
     forms = ("8N1", "7E2")
     lines = [SerialLine(kind="serial", port="/dev/x", baud=9600, format=form, timeout_s=0.1) for form in forms]
-    fast, slow = (plan_line("x", line, traffic).ideal_s for line in lines)
+    fast, slow = (budget_of_line("x", line, traffic).ideal_s for line in lines)
     # 18 characters and twice 3.5 of silence, one bit more each
     assert slow - fast == pytest.approx(25 / 9600)
 
 
 def test_tcp_counts_exchanges_not_bits() -> None:
     line = ModbusTcpLine(kind="modbus_tcp", host="h", timeout_s=0.3)
-    short, long = plan_line("x", line, {"a": [(8, 7)]}), plan_line("x", line, {"a": [(8, 255)]})
+    short, long = budget_of_line("x", line, {"a": [(8, 7)]}), budget_of_line("x", line, {"a": [(8, 255)]})
     assert short.ideal_s == long.ideal_s > 0
-    assert plan_line("x", line, {"a": UNITS}).ideal_s == pytest.approx(9 * short.ideal_s)
+    assert budget_of_line("x", line, {"a": UNITS}).ideal_s == pytest.approx(9 * short.ideal_s)
 
 
 def test_slower_by_wish() -> None:
-    assert plan_line("x", rtu(115200, poll_every_s=0.1), {"a": INT16}).ideal_hz == pytest.approx(10)
+    assert budget_of_line("x", rtu(115200, poll_every_s=0.1), {"a": INT16}).ideal_hz == pytest.approx(10)
 
 
 def test_unknown_traffic_has_no_rate_and_says_so() -> None:
-    found = plan_line("x", rtu(9600), {"a": INT16, "mystery": None})
+    found = budget_of_line("x", rtu(9600), {"a": INT16, "mystery": None})
     assert not found.known
     assert math.isnan(found.ideal_hz)
     (warning,) = line_warnings(found, 1.0, "lines.x")
     assert "mystery" in str(warning)
 
 
-def said(found: LinePlan, stale_after_s: float) -> str:
+def said(found: LineBudget, stale_after_s: float) -> str:
     return "\n".join(str(problem) for problem in line_warnings(found, stale_after_s, "lines.x"))
 
 
 def test_warnings_where_they_belong() -> None:
     nine = {f"g{i}": [(8, 7)] for i in range(9)}
-    slow = plan_line("x", rtu(19200), nine)
+    slow = budget_of_line("x", rtu(19200), nine)
     assert "go stale between two polls" in said(slow, 0.2)
     assert "one absent device of 9" in said(slow, 0.3)
     assert said(slow, 1.0) == ""
-    alone = plan_line("x", rtu(19200, timeout_s=5.0), {"g": INT16})
+    alone = budget_of_line("x", rtu(19200, timeout_s=5.0), {"g": INT16})
     assert said(alone, 1.0) == ""
-    hurried = plan_line("x", rtu(19200, poll_every_s=0.01), {"g": INT16})
+    hurried = budget_of_line("x", rtu(19200, poll_every_s=0.01), {"g": INT16})
     assert "the wanted rate cannot be reached" in said(hurried, 1.0)
 
 
@@ -93,7 +100,7 @@ def test_shipped_machines(name: str, capsys: pytest.CaptureFixture[str]) -> None
     configuration = load(CONFIG / f"{name}.yaml")
     assert print_line_plan(configuration) == []
     printed = capsys.readouterr().out
-    assert all(one.known and one.usual_hz > 1 for one in plan(configuration))
+    assert all(one.known and one.usual_hz > 1 for one in line_budgets(configuration))
     assert all(line in printed for line in configuration.lines)
 
 
@@ -103,6 +110,6 @@ def test_a_line_that_is_too_slow_is_named_with_its_place(tmp_path: Path) -> None
     path = tmp_path / "slow.yaml"
     path.write_text(head + "usb-joints\n" + tail.replace("baud: 38400", "baud: 1200", 1))
     configuration = load(path)
-    (warning,) = warnings(configuration, plan(configuration))
+    (warning,) = budget_warnings(configuration, line_budgets(configuration))
     assert f"{path} lines.joints" in str(warning)
     assert "stale" in str(warning)

@@ -11,7 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from compd.commissioning.catalogue import catalogue, driver_description
-from compd.commissioning.conformance.report import find, try_driver
+from compd.commissioning.conformance.report import driver_under_test, run_conformance
 from compd.errors import CompdError
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd_drivers.preset_directory import PresetDirectory
@@ -151,7 +151,7 @@ def test_a_yaml_file_and_its_transcript_are_a_new_gauge(made_up: Path, name: str
     assert name in names(SIMULATED_GAUGES)
     replay_transcript(made_up / f"{name}.txt")
     check_simulated_device(made_up / f"{name}.txt")
-    results = [result for _, result in try_driver(find(name), on_real_wires=False)]
+    results = [result for _, result in run_conformance(driver_under_test(name), on_real_wires=False)]
     assert [result for result in results if result.verdict == "FAIL"] == []
     assert sum(result.verdict == "pass" for result in results) >= 12
 

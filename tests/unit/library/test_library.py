@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError, PluginError
-from compd.model.effect import PORTS, Effect, FittedEffect, deltas_by_effect, needed_quantities, port_size, unmet_needs
+from compd.model.deltas import deltas_by_effect, port_size
+from compd.model.effect import PORTS, Effect, FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find, library
 from compd.model.motion import update_motion
 from compd.model.observe import observe_tip

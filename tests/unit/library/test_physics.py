@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.model.effect import Deltas, FittedEffect, effect_deltas
+from compd.model.deltas import Deltas, effect_deltas
+from compd.model.effect import FittedEffect
 from compd.model.motion import Movement
 from compd.model.prediction import predict
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, added, at_tips, at_zero, solved_tip

@@ -16,6 +16,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
 from compd.live.acquisition.acquisition import Acquisition, LineThread
+from compd.live.service.message_keys import LineStatusKeys
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, Rig, WatchedLatest, rig
 from tests.unit.drivers.test_simulated import CASES, Case
 
@@ -211,7 +212,7 @@ class Bench:
         assert self.thread.join(PATIENCE_S)
         assert self.thread.status()["state"] == "stopped"
         assert all(line.closed for line in self.lines)
-        json.dumps(self.thread.status(), allow_nan=False)
+        LineStatusKeys.model_validate_json(json.dumps(self.thread.status(), allow_nan=False))
 
     def qualities(self, channel: str) -> list[Quality]:
         return [reading.quality for name, reading in self.latest.history if name == channel]

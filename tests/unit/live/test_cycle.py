@@ -12,9 +12,11 @@ from compd.configuration import load
 from compd.errors import Problem, StateError
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
+from compd.live.loop.cycle import step
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.setpoint import Mode
 from compd.live.loop.states import State
+from compd.live.service.state_json import to_plain
 from tests.support.live_machine import CONFIG, HOLD_S, PERIOD_S, RAW_AT_ZERO_MM, STEP_MM, Machine, machine
 
 ZERO_TIP_M_MM = [0.0, 0.0, 190.0]
@@ -280,15 +282,36 @@ def test_a_hexapods_target_may_turn_the_platform():
 
 
 def test_the_same_snapshots_give_the_same_setpoints_bit_for_bit():
-    one, other = machine(), machine()
+    first, second = machine(), machine()
     random = np.random.default_rng(7)
     for _ in range(50):
-        changes = {channel: float(random.normal(0, 0.005)) for channel in one.change_mm}
-        one.change_mm |= changes
-        other.change_mm |= changes
-        a, b = one.step(), other.step()
+        changes = {channel: float(random.normal(0, 0.005)) for channel in first.change_mm}
+        first.change_mm |= changes
+        second.change_mm |= changes
+        a, b = first.step(), second.step()
         assert a.to_json() == b.to_json()
         assert a.to_packet(bytes(8)) == b.to_packet(bytes(8))
+
+
+def test_a_step_changes_neither_state_nor_inputs_and_may_be_repeated(tripod):
+    tripod.change_mm |= {"joints.4": 0.02, "cabinet.t1": 0.004}
+    tripod.settle()
+    before, setpoint = tripod.state, tripod.step()
+    first, after = step(before, setpoint.inputs, tripod.settings)
+    step(after, setpoint.inputs._replace(tick=tripod.tick + 1), tripod.settings)
+    second, after_again = step(before, setpoint.inputs, tripod.settings)
+    assert first.to_packet(bytes(8)) == second.to_packet(bytes(8)) == setpoint.to_packet(bytes(8))
+    states = [to_plain(state._replace(zero=None)) for state in (after, after_again, tripod.state)]
+    assert states[0] == states[1] == states[2]
+
+
+def test_an_invalid_setpoint_keeps_the_correction_that_is_applied(tripod):
+    tripod.change_mm["joints.4"] = 0.02
+    tripod.settle()
+    before = tripod.state
+    tripod.faults["scale_1.position"] = Quality.TIMEOUT
+    assert not tripod.step().valid
+    assert tripod.state.correction_mm is before.correction_mm
 
 
 def test_a_new_zero_leaves_nothing_of_the_old_one_and_does_not_jump(tripod):
@@ -307,7 +330,7 @@ def test_an_unusable_thermometer_is_nan_and_stops_nothing(tripod):
     tripod.faults["cabinet.room"] = Quality.SENSOR_FAULT
     assert tripod.step().state is State.OK
     wires = tripod.wires.quantity_wires(["temperature_room_degC", "temperature_link_1_degC"])
-    found = wires.read(tripod.latest.snapshot(tripod.now_s), np.zeros(2))
-    assert math.isnan(found.values[0])
-    assert found.values[1] == 20.0
-    assert "temperature_room_degC (cabinet.room): sensor_fault" in found.lost
+    read = wires.read(tripod.latest.snapshot(tripod.now_s), np.zeros(2))
+    assert math.isnan(read.values[0])
+    assert read.values[1] == 20.0
+    assert "temperature_room_degC (cabinet.room): sensor_fault" in read.lost

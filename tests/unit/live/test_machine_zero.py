@@ -37,7 +37,17 @@ def test_what_is_saved_is_what_is_loaded(tmp_path):
         ("", "not JSON"),
         ('{"format": 1, "zero_hash": "abc"', "not JSON"),
         ("[]", "not a machine zero"),
-        ('{"format": 2, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "not a machine zero"),
+        ('{"format": 2, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
+        ('{"zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "format: is not a machine zero: Field required"),
+        ('{"format": 1, "zero_hash": 7, "taken_at": "", "readings_mm": {}}', "zero_hash: is not a machine zero"),
+        (
+            '{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": true}}',
+            "a.1: is not a machine zero",
+        ),
+        (
+            '{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": "1"}}',
+            "a.1: is not a machine zero",
+        ),
         ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": NaN}}', "not a machine zero"),
         ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": null}}', "not a machine zero"),
         ('{"format": 1, "zero_hash": "abc", "taken_at": "", "readings_mm": {"a.1": 1}}', "lacks b.1"),

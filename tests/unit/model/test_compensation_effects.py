@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.model.effect import Effect, FittedEffect, deltas_by_effect, sum_deltas
+from compd.model.deltas import deltas_by_effect, sum_deltas
+from compd.model.effect import Effect, FittedEffect
 from compd.model.machine import MachineModel, machine_constants
 from compd.model.motion import Movement, update_motion
 from compd.model.observations import Observations

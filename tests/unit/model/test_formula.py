@@ -12,7 +12,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from compd.errors import ConfigurationError
-from compd.model.effect import Effect, FittedEffect, effect_deltas, unmet_needs
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.formula.evaluator import FUNCTIONS, Formula
 from compd.model.formula.parser import DEEPEST, LONGEST, parse

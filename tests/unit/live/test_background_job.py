@@ -1,0 +1,49 @@
+"""Work beside the publisher: one piece at a time, and free again as soon as the answer goes out."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from compd.live.service.background_job import BackgroundJob
+from compd.live.service.messages import ErrorCode, ProtocolError
+
+TIMEOUT_S = 20
+
+
+def test_a_second_request_is_refused_while_the_first_is_worked_on():
+    job = BackgroundJob("test", "one thing at a time")
+    finish = threading.Event()
+    answers = []
+
+    def work():
+        assert finish.wait(TIMEOUT_S)
+        return b"done"
+
+    job.start(work, answers.append)
+    with pytest.raises(ProtocolError, match="one thing at a time") as caught:
+        job.start(work, answers.append)
+    assert caught.value.code is ErrorCode.BUSY
+    finish.set()
+    job.join()
+    assert answers == [b"done"]
+
+
+def test_whoever_has_the_answer_may_ask_for_the_next_at_once():
+    job = BackgroundJob("test", "busy")
+    answers = []
+    finished = threading.Event()
+
+    def last(answer):
+        answers.append(answer)
+        finished.set()
+
+    def ask_again(answer):
+        answers.append(answer)
+        job.start(lambda: b"second", last)
+
+    job.start(lambda: b"first", ask_again)
+    assert finished.wait(TIMEOUT_S)
+    job.join()
+    assert answers == [b"first", b"second"]
