@@ -1,8 +1,12 @@
 """The closure of the links: what a pose makes of link lengths and revolute axes, and the derivatives.
 
 One mechanism in two sizes, n + k = 6: the tripod (3-SPR) has n = 3 links and k = 3 revolute axes, the hexapod
-(6-UPS) n = 6 links and k = 0. With d_i = p + R c_i - a_i the link vector, the rows are |d_i| for every link and
-d_i . (R e_i) for every revolute axis; axis i belongs to link i.
+(6-UPS) n = 6 links and k = 0. With d_i = p + R c_i - a_i the link vector and u_i = d_i / |d_i|, the rows are
+
+    |d_i|            for every link,            d|d_i| = u_i . v + (R c_i x u_i) . w
+    d_i . R e_i      for every revolute axis,   d(d_i . R e_i) = R e_i . v + (R e_i x (p - a_i)) . w
+
+for a displacement v and a rotation w of the platform about {M}'s axes through its origin; axis i belongs to link i.
 """
 
 from __future__ import annotations
@@ -99,7 +103,7 @@ def known(
     origin_M: FloatArray,
     R: FloatArray,
 ) -> bool:
-    """The mechanism and a pose (or the guess of one) are all numbers."""
+    """Whether all numbers of the mechanism and of a pose, or of a guess of one, are finite."""
     for i in range(3):
         if not all_finite(R[i]):
             return False
@@ -114,7 +118,7 @@ def known(
 
 @helper
 def turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
-    """R lies more than a right angle from the guess, about whatever axis: trace(R^T guess) = 1 + 2 cos < 1."""
+    """Whether R lies more than a right angle from the guess, about any axis: trace(R^T guess) = 1 + 2 cos(angle) < 1."""
     trace = 0.0
     for i in range(3):
         for j in range(3):

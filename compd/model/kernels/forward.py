@@ -1,4 +1,12 @@
-"""Forward kinematics as a kernel: from link lengths to the pose of the moving platform."""
+"""Forward kinematics as a kernel: from link lengths to the pose of the moving platform.
+
+Newton's method in the six coordinates of the pose, v in mm and w in rad times the platform's radius,
+
+    (v, w) = J^-1 (l - |d_i|, -d_i . R e_i),   p <- p + v,   R <- R(w) R,
+
+with the closure and its derivatives J from `kernels.closure`. A step longer than STEP_LIMIT times the platform's radius
+is shortened to that.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +68,7 @@ def _newton(
     iterations: IntArray,
     J: FloatArray,
 ) -> int:
-    """Newton in the six coordinates of the pose, from what `origin_M` and `R` hold; J is left factored."""
+    """Newton in the six coordinates of the pose, from the guess in `origin_M` and `R`, in place; leaves J factored."""
     n = lengths_mm.shape[0]
     limit_mm = STEP_LIMIT * radius_mm
     x = np.empty(6)
@@ -104,7 +112,7 @@ def _pose_from(
     iterations: IntArray,
     residual_mm: FloatArray,
 ) -> int:
-    """Solve from what `origin_M` and `R` hold, and judge the solution; returns the reason."""
+    """Solve from the guess in `origin_M` and `R`, in place, and check the solution; returns the reason."""
     n = lengths_mm.shape[0]
     radius_mm = platform_radius(platform_joints_P)
     J = np.empty((6, 6))

@@ -1,4 +1,8 @@
-"""Inverse kinematics as a kernel: from the place of the tip to the pose and the link lengths."""
+"""Inverse kinematics as a kernel: from the place of the tip to the pose and the link lengths.
+
+The hexapod's attitude R is chosen, so that p = tip_M - R tip_P and l_i = |p + R c_i - a_i| follow at once. The tripod's
+attitude follows from the tip: three equations d_i . R e_i = 0 in three angles, by Newton's method.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +42,10 @@ def _attitude_from(
     R: FloatArray,
     iterations: IntArray,
 ) -> int:
-    """The tripod's attitude at a tip: Newton in three angles, from what `R` holds; returns the reason.
+    """The tripod's attitude at a tip: Newton in three angles, from the guess in `R`, in place; returns the reason.
 
-    With the tip fixed only the attitude is free, and d_i . R e_i = (tip - a_i) . R e_i + (c_i - tip_P) . e_i.
+    With p = tip_M - R tip_P the equations are d_i . R e_i = (tip_M - a_i) . R e_i + (c_i - tip_P) . e_i = 0; their
+    derivative by a rotation w about {M}'s axes is (R e_i x (tip_M - a_i)) . w.
     """
     J = np.empty((3, 3))
     x = np.empty(3)

@@ -1,7 +1,20 @@
 """The frame from nine distances, as one kernel: supports, {B}, the base joints, and how {B} has moved.
 
-Six reference points, three on the surface plate and three on the base platform, span an octahedron; nine of its
-edges are measured. (Oiwa, figures 7 and 8.)
+Six reference points, m1..m3 on the surface plate and b1..b3 on the base platform, span an octahedron (paper, figures 7
+and 8); nine of its twelve edges are measured, the other three lie in the plate. Equation (3) and its triangle b1 b2 b3,
+
+    |b_i - b_j| = t,  |b_i - m_j| = u    (nine equations),
+
+is solved for the nine coordinates of b1..b3 by Newton's method,
+
+    b <- b + c J^-1 (measured - computed),   J = d(lengths)/d(b1, b2, b3)   (9 x 9, pure numbers),
+
+where c <= 1 shortens a step that is longer than STEP_LIMIT times the shortest edge. Three checks follow:
+
+- amplification |J^-1| (Frobenius norm) at most AMPLIFICATION_LIMIT: root of the sum of squares of the supports' errors
+  for independent errors of one unit on each distance; 4.6 for the tripod at machine zero;
+- det J has the same sign at guess and solution: between two assemblies lies a singular one, where it changes;
+- {B} is not farther from machine zero than FURTHEST.
 """
 
 from __future__ import annotations
@@ -43,8 +56,10 @@ SHORTEST_EDGE_MM = 1e-6
 
 @helper
 def edges(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatArray, J: FloatArray) -> bool:
-    """Lengths t1..t3, u1..u6 (9,) of the edges, equation (3), and their derivatives J (9, 9).
+    """Lengths t1..t3, u1..u6 (9,) of the edges, equation (3), and their derivatives J (9, 9) by b1, b2, b3.
 
+    Row e of J holds the unit vector of edge e: positive at its near support, negative at its far one if that is a
+    support too.
     False where two points coincide.
     """
     for i in range(9):
@@ -74,7 +89,9 @@ def edges(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatA
 
 @helper
 def place_base(supports_M: FloatArray, R: FloatArray, origin_M: FloatArray) -> bool:
-    """{B} by its convention: origin in the centroid, z_B = (b2-b1) x (b3-b1), y_B from the origin to b1.
+    """{B} by its convention: origin in the centroid, z_B along (b2-b1) x (b3-b1), y_B from the origin to b1.
+
+    supports_M (3, 3) -> R (3, 3), its columns x_B, y_B, z_B in {M}, and origin_M (3,).
 
     False where the supports lie on one line.
     """
@@ -132,7 +149,7 @@ def _input_reason(lengths_mm: FloatArray, plate_points_M: FloatArray, guess_supp
 def _newton(
     lengths_mm: FloatArray, plate_points_M: FloatArray, supports_M: FloatArray, iterations: IntArray, J: FloatArray
 ) -> int:
-    """Newton in the nine coordinates of the supports, from what `supports_M` holds; J is left factored."""
+    """Newton in the nine coordinates of the supports, from the guess in `supports_M`, in place; leaves J factored."""
     limit_mm = STEP_LIMIT * np.min(lengths_mm)
     x = np.empty(9)
     pivot = np.empty(9, np.int64)
@@ -170,7 +187,7 @@ def _supports_from(
     iterations: IntArray,
     residual_mm: FloatArray,
 ) -> int:
-    """Solve from what `supports_M` holds, and judge the solution; returns the reason."""
+    """Solve from the guess in `supports_M`, in place, and check the solution; returns the reason."""
     reason = _input_reason(lengths_mm, plate_points_M, supports_M)
     if reason != OK:
         return reason
