@@ -71,8 +71,8 @@ def inverse_frame_jacobian(geometry: FrameGeometry) -> FloatArray:
 def base_pose_jacobian(geometry: FrameGeometry) -> FloatArray:
     """d (displacement, rotation vector) / d (b1, b2, b3) of {B} at machine zero, (6, 9); rows 3..5 in rad/mm.
 
-    The origin is the centroid: a third of each support's displacement. A rotation w of {B} moves its axes by w x y_B and
-    w x z_B; written in {B} these are (-w_z, 0, w_x) and (w_y, -w_x, 0), so that
+    The origin is the centroid: a third of each support's displacement. A rotation w of {B} moves its axes by w x y_B
+    and w x z_B; written in {B} these are (-w_z, 0, w_x) and (w_y, -w_x, 0), so that
 
         w_x = z_B . dy_B,   w_y = x_B . dz_B,   w_z = -x_B . dy_B,
 
@@ -106,7 +106,7 @@ def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> Insta
     return InstantaneousFrame(supports, pose[..., :3], pose[..., 3:])
 
 
-def difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
+def frame_difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
     """How far the two ways of the paper differ, row by row; nan where the exact one failed."""
 
     def length(vector: FloatArray) -> FloatArray:

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.closure import close, known, platform_radius
+from compd.model.kernels.closure import evaluate_closure, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, solve
-from compd.model.kinematics import Mechanism, checked
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve
+from compd.model.kinematics import Mechanism, check_mechanism
 from compd.model.solve_status import AMPLIFICATION_LIMIT, Reason
 
 OK = int(Reason.OK)
@@ -66,7 +66,7 @@ def _forces(
     lateral_N[:] = math.nan
     radius_mm = platform_radius(platform_joints_P)
     load = all_finite(force_M) and all_finite(at_M) and all_finite(weight_N) and all_finite(weight_at_P)
-    if not (load and known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
+    if not (load and pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
         reason[0] = NOT_FINITE
         return
     J = np.empty((6, 6))
@@ -75,12 +75,12 @@ def _forces(
     reason[0] = NEAR_SINGULAR
     if not radius_mm > 0.0:
         return
-    if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
         return
     for i in range(6):  # J^T
         for j in range(i):
             J[i, j], J[j, i] = J[j, i], J[i, j]
-    if factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
         return
     # arms of the load and of the weight about the origin of {P}, along {M}'s axes
     rx, ry, rz = at_M[0] - origin_M[0], at_M[1] - origin_M[1], at_M[2] - origin_M[2]
@@ -90,7 +90,7 @@ def _forces(
     x[3] = (ry * force_M[2] - rz * force_M[1] - wy * weight_N[0]) / radius_mm
     x[4] = (rz * force_M[0] - rx * force_M[2] + wx * weight_N[0]) / radius_mm
     x[5] = (rx * force_M[1] - ry * force_M[0]) / radius_mm
-    solve(J, pivot, x)
+    lu_solve(J, pivot, x)
     for i in range(n):
         axial_N[i] = x[i]
     for i in range(n, 6):
@@ -121,5 +121,5 @@ def link_forces(
     Raises ValueError for arrays of a wrong shape.
     """
     return LinkForces(
-        *_forces(*checked(mechanism), origin_M_mm, rotation_M_P, force_M_N, at_M_mm, weight_N, weight_at_P_mm)
+        *_forces(*check_mechanism(mechanism), origin_M_mm, rotation_M_P, force_M_N, at_M_mm, weight_N, weight_at_P_mm)
     )

@@ -29,7 +29,7 @@ SHORTEST_LINK_MM = 1e-6
 
 
 @helper
-def close(
+def evaluate_closure(
     origin_M: FloatArray,
     R: FloatArray,
     base_joints_M: FloatArray,
@@ -96,7 +96,7 @@ def platform_radius(platform_joints_P: FloatArray) -> float:
 
 
 @helper
-def known(
+def pose_is_finite(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
@@ -117,8 +117,8 @@ def known(
 
 
 @helper
-def turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
-    """Whether R lies more than a right angle from the guess, about any axis: trace(R^T guess) = 1 + 2 cos(angle) < 1."""
+def is_turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
+    """Whether R lies more than a right angle from the guess, about any axis: trace(R^T guess) = 1 + 2 cos < 1."""
     trace = 0.0
     for i in range(3):
         for j in range(3):
@@ -150,9 +150,9 @@ def closure(
     value_mm = np.empty(6)
     J = np.empty((6, 6))
     reason[0] = OK
-    if not known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R):
+    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R):
         reason[0] = NOT_FINITE
-    elif not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, 1.0, value_mm, J):
+    elif not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, 1.0, value_mm, J):
         reason[0] = NEAR_SINGULAR
     if reason[0] != OK:
         value_mm[:] = math.nan

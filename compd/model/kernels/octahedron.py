@@ -25,8 +25,8 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, largest, solve
-from compd.model.kernels.rotation import vector_of
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.rotation import set_rotation_vector
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -55,7 +55,7 @@ SHORTEST_EDGE_MM = 1e-6
 
 
 @helper
-def edges(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatArray, J: FloatArray) -> bool:
+def edge_lengths(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatArray, J: FloatArray) -> bool:
     """Lengths t1..t3, u1..u6 (9,) of the edges, equation (3), and their derivatives J (9, 9) by b1, b2, b3.
 
     Row e of J holds the unit vector of edge e: positive at its near support, negative at its far one if that is a
@@ -159,17 +159,17 @@ def _newton(
     while step > STEP_TOLERANCE_MM:
         if iterations[0] == ITERATION_LIMIT:
             return NO_CONVERGENCE
-        if not edges(supports_M, plate_points_M, x, J):
+        if not edge_lengths(supports_M, plate_points_M, x, J):
             return NEAR_SINGULAR
         for i in range(9):
             x[i] = lengths_mm[i] - x[i]
-        sign = factor(J, pivot)
+        sign = lu_factor(J, pivot)
         if iterations[0] == 0:
             first_sign = sign
         if sign == 0.0:
             return NEAR_SINGULAR
-        solve(J, pivot, x)
-        step = largest(x)
+        lu_solve(J, pivot, x)
+        step = max_abs(x)
         shortened = limit_mm / max(step, limit_mm)
         for i in range(3):
             for j in range(3):
@@ -199,11 +199,11 @@ def _supports_from(
     if inverse_norm(J, X) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     x = X[0]
-    if not edges(supports_M, plate_points_M, x, J):
+    if not edge_lengths(supports_M, plate_points_M, x, J):
         return NEAR_SINGULAR
     for i in range(9):
         x[i] -= lengths_mm[i]
-    residual_mm[0] = largest(x)
+    residual_mm[0] = max_abs(x)
     return NO_CONVERGENCE if residual_mm[0] > RESIDUAL_TOLERANCE_MM else reason
 
 
@@ -222,7 +222,7 @@ def _compare(
         displacement_M[i] = origin_M[i] - zero_origin_M[i]
         for j in range(3):
             turned[i, j] = R[i, 0] * zero_R[j, 0] + R[i, 1] * zero_R[j, 1] + R[i, 2] * zero_R[j, 2]
-    vector_of(turned, rotation_M)
+    set_rotation_vector(turned, rotation_M)
 
 
 @kernel(
@@ -275,7 +275,7 @@ def octahedron(
         reason[0] = NEAR_SINGULAR
     if reason[0] == OK:
         _compare(origin_M, R, zero_origin_M, zero_R, displacement_M, rotation_M)
-        if max(largest(displacement_M) / np.min(lengths_mm), largest(rotation_M)) > FURTHEST:
+        if max(max_abs(displacement_M) / np.min(lengths_mm), max_abs(rotation_M)) > FURTHEST:
             reason[0] = OTHER_ASSEMBLY
     if reason[0] != OK:
         supports_M[:, :] = math.nan

@@ -12,7 +12,7 @@ from compd.errors import CompdError, PluginError
 from compd.model.deltas import deltas_by_effect, port_size
 from compd.model.effect import PORTS, Effect, FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
-from compd.model.library import BUNDLED, find, library
+from compd.model.library import BUNDLED, find_effect, load_library
 from compd.model.motion import update_motion
 from compd.model.observe import observe_tip
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, at_zero, part, rows_of, some_shape, varied
@@ -194,17 +194,17 @@ def own_file(tmp_path: Path) -> Path:
 
 
 def test_an_effect_from_a_file(own_file: Path) -> None:
-    assert find(f"{own_file}:MINE", "model.yaml:3").id == "mine"
+    assert find_effect(f"{own_file}:MINE", "model.yaml:3").id == "mine"
     with pytest.raises(PluginError, match="is not an effect"):
-        find(f"{own_file}:NOT_ONE", "model.yaml:3")
+        find_effect(f"{own_file}:NOT_ONE", "model.yaml:3")
     own_file.chmod(0o666)
     with pytest.raises(PluginError, match="written by group or others"):
-        find(f"{own_file}:MINE", "model.yaml:3")
+        find_effect(f"{own_file}:MINE", "model.yaml:3")
 
 
 def test_an_unknown_id_lists_what_there_is() -> None:
     with pytest.raises(PluginError, match="link_expansion_lag"):
-        find("link_expansoin", "model.yaml:3")
+        find_effect("link_expansoin", "model.yaml:3")
 
 
 def test_effects_of_an_installed_package(own_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,11 +213,11 @@ def test_effects_of_an_installed_package(own_file: Path, tmp_path: Path, monkeyp
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-effects\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[compd.effects]\nmine = my_effect:MINE\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert set(library()) == set(LIBRARY) | {"mine"}
+    assert set(load_library()) == set(LIBRARY) | {"mine"}
     own_file.write_text(own_file.read_text().replace('id="mine"', 'id="link_zero"'))
     monkeypatch.delitem(__import__("sys").modules, "my_effect")
     with pytest.raises(PluginError, match="this id is taken"):
-        library()
+        load_library()
 
 
 def test_a_stiffness_is_fitted_as_a_compliance() -> None:
