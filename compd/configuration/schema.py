@@ -6,11 +6,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from compd.configuration.load import SECTIONS
+from compd.configuration.machine_configuration import SECTIONS
 from compd.plugins import GAUGES, load, names
 
 
-def schema() -> dict[str, Any]:
+def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a configuration, with the options of every installed driver."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = {}

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from compd.configuration import load
-from compd.configuration.schema import schema
+from compd.configuration.schema import json_schema
 from compd.errors import ConfigurationError
 from tests.support.paths import ROOT
 
@@ -146,7 +146,7 @@ def test_a_driver_in_a_file_must_not_be_writable_by_others(tmp_path: Path) -> No
 
 
 def test_the_schema_names_every_key_that_the_shipped_files_use() -> None:
-    document = schema()
+    document = json_schema()
     json.dumps(document)
     data = yaml.safe_load(TRIPOD.read_text())
     assert set(data) <= set(document["properties"])
