@@ -19,11 +19,21 @@ from compd.recording.recording import travel_direction
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from tests.support.paths import ROOT, SHARED
-from tests.support.recordings import HEADER, SIDECAR, Edit, cell, column, csv_text, header, put, without
+from tests.support.recordings import (
+    HEADER,
+    SIDECAR,
+    Edit,
+    csv_text,
+    drop_columns,
+    rename_column,
+    set_cell,
+    set_column,
+    write_recording_files,
+)
 
 TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
 EXAMPLES = ("elastic-and-backlash", "link-expansion", "not-in-the-library", "nothing-missing", "plate-bending")
-NO_REFERENCE = without("reference_x_mm", "reference_y_mm", "reference_z_mm")
+NO_REFERENCE = drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm")
 
 
 @pytest.mark.parametrize("part", ["train", "valid"])
@@ -80,8 +90,10 @@ def test_real_recording_reads_without_complaint() -> None:
 
 
 def test_units_and_order(tmp_path: Path) -> None:
-    text = cell(2, "joint_3_um", "-6.61")(cell(2, "frame_u6_um", "1.25")(cell(2, "frame_t1_um", "2.5")(csv_text())))
-    found = read_recording(put(tmp_path, text))
+    text = set_cell(2, "joint_3_um", "-6.61")(
+        set_cell(2, "frame_u6_um", "1.25")(set_cell(2, "frame_t1_um", "2.5")(csv_text()))
+    )
+    found = read_recording(write_recording_files(tmp_path, text))
     assert found.joint_mm is not None
     assert found.frame_mm is not None
     assert found.joint_mm[0, 2] == float("-0.00661"), "the very number that a gauge in mm delivers"
@@ -109,8 +121,8 @@ def test_what_means_one_thing_only_is_taken(tmp_path: Path, habit: str) -> None:
     text = TOLERATED[habit](csv_text())
     assert text != csv_text()
     (tmp_path / "plain").mkdir()
-    plain = read_recording(put(tmp_path / "plain", csv_text()))
-    found = read_recording(put(tmp_path, text))
+    plain = read_recording(write_recording_files(tmp_path / "plain", csv_text()))
+    found = read_recording(write_recording_files(tmp_path, text))
     assert list(found.columns) == list(plain.columns)
     assert all(np.array_equal(found.columns[name], plain.columns[name]) for name in plain.columns)
     assert np.array_equal(found.row, plain.row)
@@ -121,17 +133,17 @@ def test_what_means_one_thing_only_is_taken(tmp_path: Path, habit: str) -> None:
 def test_empty_cells_are_left_out_where_needed_and_counted(tmp_path: Path) -> None:
     text = csv_text()
     for edit in (
-        cell(4, "scale_2_mm", ""),
-        cell(5, "scale_2_mm", ""),
-        cell(5, "pressure_hPa", ""),
-        cell(6, "time_s", ""),
-        cell(9, "session", ""),
+        set_cell(4, "scale_2_mm", ""),
+        set_cell(5, "scale_2_mm", ""),
+        set_cell(5, "pressure_hPa", ""),
+        set_cell(6, "time_s", ""),
+        set_cell(9, "session", ""),
     ):
         text = edit(text)
     lines = text.split("\n")
     lines.insert(11, "")
     sidecar = SIDECAR + "excluded_rows: [{row: 5, reason: door}, {rows: 7-8, reason: beam cut}]\n"
-    found = read_recording(put(tmp_path, "\n".join(lines), sidecar))
+    found = read_recording(write_recording_files(tmp_path, "\n".join(lines), sidecar))
     assert found.left_out == {"time_s is empty": 1, "empty row": 1}
     assert found.rows == 19
     assert np.isfinite(found.time_s).all()
@@ -147,14 +159,14 @@ def test_empty_cells_are_left_out_where_needed_and_counted(tmp_path: Path) -> No
 
 def test_any_subset_of_axes_and_own_sigmas(tmp_path: Path) -> None:
     sidecar = SIDECAR.replace("0.15", "[0.1, 0.3]").replace("frame: machine", "frame: instrument")
-    found = read_recording(put(tmp_path, without("reference_y_mm")(csv_text()), sidecar))
+    found = read_recording(write_recording_files(tmp_path, drop_columns("reference_y_mm")(csv_text()), sidecar))
     assert found.reference_axes == ("x", "z")
     assert found.reference_mm is not None
     assert found.reference_mm.shape == (20, 2)
     assert found.reference_sigma_mm == pytest.approx([0.0001, 0.0003])
     assert found.reference is not None
     assert found.reference.frame == "instrument"
-    unknown = read_recording(put(tmp_path, csv_text(), SIDECAR.replace("  sigma_um: 0.15\n", "")))
+    unknown = read_recording(write_recording_files(tmp_path, csv_text(), SIDECAR.replace("  sigma_um: 0.15\n", "")))
     assert np.isnan(unknown.reference_sigma_mm).all()
 
 
@@ -164,17 +176,21 @@ def test_pose_with_attitude(tmp_path: Path) -> None:
         rows[0] + ",reference_rx_rad,reference_ry_rad,reference_rz_rad",
         *(row + ",0.1,0.2,0.3" for row in rows[1:]),
     ]
-    found = read_recording(put(tmp_path, "\n".join(rows), SIDECAR.replace("tool_position", "tool_pose")))
+    found = read_recording(
+        write_recording_files(tmp_path, "\n".join(rows), SIDECAR.replace("tool_position", "tool_pose"))
+    )
     assert found.reference_rotation_rad is not None
     assert found.reference_rotation_rad[3].tolist() == [0.1, 0.2, 0.3]
 
 
 def test_link_length_needs_no_frame(tmp_path: Path) -> None:
     frame = [name for name in HEADER if name.startswith("frame_")]
-    text = header("reference_x_mm", "reference_link_2_mm")(
-        without("reference_y_mm", "reference_z_mm", *frame)(csv_text())
+    text = rename_column("reference_x_mm", "reference_link_2_mm")(
+        drop_columns("reference_y_mm", "reference_z_mm", *frame)(csv_text())
     )
-    found = read_recording(put(tmp_path, text, "machine: tripod-cmm\nreference: {quantity: link_length}\n"))
+    found = read_recording(
+        write_recording_files(tmp_path, text, "machine: tripod-cmm\nreference: {quantity: link_length}\n")
+    )
     assert found.reference_links == (2,)
     assert found.reference_link_mm is not None
     assert found.reference_link_mm.shape == (20, 1)
@@ -183,10 +199,10 @@ def test_link_length_needs_no_frame(tmp_path: Path) -> None:
 
 
 def test_ball_plate(tmp_path: Path) -> None:
-    text = header("pressure_hPa", "ball")(NO_REFERENCE(csv_text()).replace("1013.25", "17"))
+    text = rename_column("pressure_hPa", "ball")(NO_REFERENCE(csv_text()).replace("1013.25", "17"))
     (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n18,0,0,0\n17,50.001,-50,0.5\n")
     sidecar = "machine: tripod-cmm\nreference: {quantity: ball_plate, balls: plate.csv}\n"
-    found = read_recording(put(tmp_path, text, sidecar))
+    found = read_recording(write_recording_files(tmp_path, text, sidecar))
     assert found.reference is not None
     assert found.reference.frame == "instrument", "a plate's coordinates are its own"
     assert found.reference_mm is not None
@@ -199,43 +215,45 @@ def test_ball_plate(tmp_path: Path) -> None:
 def test_external_model_needs_no_gauges(tmp_path: Path) -> None:
     text = "time_s,wind_m_per_s,model_x_mm,reference_x_mm\n0,1,2,3\n1,1,2,3.5\n"
     sidecar = SIDECAR.replace("tripod-cmm", "external")
-    found = read_recording(put(tmp_path, text, sidecar))
+    found = read_recording(write_recording_files(tmp_path, text, sidecar))
     assert found.model_mm is not None
     assert found.model_mm.tolist() == [[2.0], [2.0]]
     assert list(found.quantities) == ["wind_m_per_s"]
 
 
 def test_points_may_have_names(tmp_path: Path) -> None:
-    text = header("visit", "point")(csv_text())
+    text = rename_column("visit", "point")(csv_text())
     lines = text.split("\n")
     lines[1:3] = [line.replace(",1,0,", ",1,P-07,") for line in lines[1:3]]
-    found = read_recording(put(tmp_path, "\n".join(lines)))
+    found = read_recording(write_recording_files(tmp_path, "\n".join(lines)))
     assert found.point is not None
     assert found.point[0] == found.point[1] != found.point[2]
 
 
 def test_gauges_alone_are_for_join_only(tmp_path: Path) -> None:
-    path = put(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
+    path = write_recording_files(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
     with pytest.raises(RecordingError, match="compd join"):
         read_recording(path)
     assert read_recording(path, needs_reference=False).reference is None
 
 
 def test_implausible_values_are_warned_of_not_refused(tmp_path: Path) -> None:
-    text = column("temperature_room_degC", "68")(cell(3, "joint_1_um", "5000")(csv_text()))
-    warnings = "\n".join(str(warning) for warning in read_recording(put(tmp_path, text)).warnings)
+    text = set_column("temperature_room_degC", "68")(set_cell(3, "joint_1_um", "5000")(csv_text()))
+    warnings = "\n".join(str(warning) for warning in read_recording(write_recording_files(tmp_path, text)).warnings)
     assert "joint_1_um (G), row 3: implausible" in warnings
     assert "temperature_room_degC (Y), rows 2, 3, 4 and 17 more rows" in warnings
 
 
 def test_unknown_unit_is_kept_and_warned_of(tmp_path: Path) -> None:
-    found = read_recording(put(tmp_path, header("pressure_hPa", "coolant_flow_foo")(csv_text())))
+    found = read_recording(
+        write_recording_files(tmp_path, rename_column("pressure_hPa", "coolant_flow_foo")(csv_text()))
+    )
     assert "coolant_flow_foo" in found.quantities
     assert "ends in no unit that is known" in str(found.warnings[0])
 
 
 def test_check_against_counts_gauges(tmp_path: Path) -> None:
-    found = read_recording(put(tmp_path, without("joint_9_um")(csv_text())))
+    found = read_recording(write_recording_files(tmp_path, drop_columns("joint_9_um")(csv_text())))
     with pytest.raises(RecordingError, match="8 joint comparator columns, tripod-cmm has 9"):
         check_against(found, load(TRIPOD))
 
@@ -248,7 +266,7 @@ def test_direction_ignores_creep_but_adds_it_up() -> None:
 
 
 def test_check_prints_what_there_is(tmp_path: Path) -> None:
-    result = CliRunner().invoke(recording, ["check", str(put(tmp_path, csv_text()))])
+    result = CliRunner().invoke(recording, ["check", str(write_recording_files(tmp_path, csv_text()))])
     assert result.exit_code == 0
     assert "20 rows" in result.output
     assert "3 scales, 9 joint comparators, 9 frame comparators" in result.output
@@ -314,7 +332,7 @@ def test_failed_second_file_leaves_what_was_there(tmp_path: Path) -> None:
 
 
 def test_a_sidecar_without_a_format_is_format_1_and_what_is_written_is_format_2(tmp_path: Path) -> None:
-    first = read_recording(put(tmp_path, csv_text()))
+    first = read_recording(write_recording_files(tmp_path, csv_text()))
     assert first.sidecar.format == 1
     write_recording(tmp_path / "again.csv", first.columns, sidecar_contents("tripod-cmm", {"quantity": "link_length"}))
     text = (tmp_path / "again.yaml").read_text()
