@@ -86,10 +86,10 @@ def test_all_mistakes_come_at_once_in_the_order_of_the_file(tmp_path: Path) -> N
         text = text.replace("on_stale: hold", "on_stale: maybe")
         return text.replace("correction_mm: 0.2", "correction_mm: 0")
 
-    found = problems_of(tmp_path, edit)
+    messages = problems_of(tmp_path, edit)
     for key in ("tool.zero_tip_M_mm", "lines.frame_u.baud", "heds", "loop.on_stale", "limits.correction_mm"):
-        assert any(key in text for text in found), (key, found)
-    numbers = [int(text.split(" ")[0].rsplit(":", 1)[1]) for text in found]
+        assert any(key in text for text in messages), (key, messages)
+    numbers = [int(text.split(" ")[0].rsplit(":", 1)[1]) for text in messages]
     assert numbers == sorted(numbers)
 
 

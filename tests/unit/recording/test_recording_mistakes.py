@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.recording import recording
+from compd.cli.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import read_recording
@@ -126,7 +126,7 @@ def test_mistake_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
     for part in wanted:
         assert part in message
     assert str(tmp_path / "run.csv") in message
-    assert len(problems) <= 2, "one mistake is not told many times"
+    assert len(problems) <= 2, "one mistake is reported once"
 
 
 SIDECARS: dict[str, tuple[str, list[str]]] = {
@@ -247,11 +247,11 @@ def test_nothing_but_words_comes_of_any_file(tmp_path: Path, data: st.DataObject
         text = text[:at] + data.draw(st.text("0,;\n\r\t\"'#.-eE_x \u00b0\u2212\x00", max_size=6)) + text[at + cut :]
     sidecar = data.draw(st.sampled_from([SIDECAR, SIDECAR[1:], SIDECAR[:40], SIDECAR + "excluded_rows: [{rows: 3-4}]"]))
     try:
-        found = read_recording(write_recording_files(tmp_path, text, sidecar))
+        recording = read_recording(write_recording_files(tmp_path, text, sidecar))
     except RecordingError:
         return
-    assert np.isfinite(found.time_s).all()
-    assert (np.diff(found.time_s) > 0).all()
+    assert np.isfinite(recording.time_s).all()
+    assert (np.diff(recording.time_s) > 0).all()
 
 
 def test_ball_plate_mistakes(tmp_path: Path) -> None:
@@ -282,7 +282,7 @@ def test_sidecar_of_another_machine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("machine", "wanted"), [("hexapod", "hexapod has 6"), ("tripod-cm", "--machine PATH")])
 def test_check_finds_the_machine_that_the_sidecar_names(tmp_path: Path, machine: str, wanted: str) -> None:
     path = write_recording_files(tmp_path, csv_text(), SIDECAR.replace("tripod-cmm", machine))
-    result = CliRunner().invoke(recording, ["check", str(path)])
+    result = CliRunner().invoke(recording_command, ["check", str(path)])
     assert isinstance(result.exception, RecordingError)
     assert wanted in str(result.exception)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["run.csv", "run.yaml"]
