@@ -44,7 +44,7 @@ def record(
     """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs."""
     from compd.client import connect
     from compd.clock import MonotonicClock
-    from compd.live.record.recorder import RecordingLimits, Recorder
+    from compd.live.record.recorder import Recorder, RecordingLimits
 
     keeping = RecordingLimits(
         round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB), when_full is WhenFull.DROP_OLDEST

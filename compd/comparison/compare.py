@@ -16,12 +16,13 @@ from compd.comparison.aligned_recording import AlignedRecording, added_by
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.fit import free_motion_of
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, outlier_rows, repeat_scatter
-from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, first_order, gauge_noise
+from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
 from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
-from compd.model.prediction import pull_back
+from compd.model.sensitivity import link_residuals
+from compd.model.uncertainty import GaugeNoise
 from compd.units import UM_PER_MM
 
 # A ratio beyond what chance makes of a model at the floor in 97.5 of 100 recordings is above the floor.
@@ -204,7 +205,7 @@ def compare(
     )
     links_um = None
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
-        links_um = pull_back(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
+        links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
         links_um[~known] = np.nan
     turned = aligned.attitude_residual_urad(added)
     return Comparison(
@@ -249,14 +250,14 @@ def _uncertainty(
     """The gauges' noise and the prediction's uncertainty."""
     joint = _blocks([one.covariance for one in fitted]) if covariance is None else covariance
     if aligned.model is None:
-        return None, first_order(aligned, None, fitted, joint)
+        return None, first_order_uncertainty(aligned, None, fitted, joint)
     gauges = gauge_noise(aligned)
-    found = first_order(aligned, gauges, fitted, joint)
+    found = first_order_uncertainty(aligned, gauges, fitted, joint)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
     # what the gauges' scatter alone would do to the residual cannot be more than the residual's own scatter
     if repeats is not None and (np.sqrt(np.mean(found.gauges_um[used] ** 2, axis=0)) > 1.5 * repeats.by_axis_um).any():
         gauges = gauge_noise(aligned, from_repeats=False)
-        found = first_order(aligned, gauges, fitted, joint)
+        found = first_order_uncertainty(aligned, gauges, fitted, joint)
     return gauges, found
 
 

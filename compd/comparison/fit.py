@@ -11,7 +11,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording, added_by
 from compd.comparison.noise_floor import outlier_rows, robust_sigma
 from compd.errors import CompdError, Problem
-from compd.model.effect import Effect, FittedEffect, Shape
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.recording.recording import Recording
 from compd.units import UM_PER_MM
 
@@ -53,7 +53,7 @@ class FitResult:
         return float(np.sqrt(np.mean(self.residual_um[self.used] ** 2)))
 
 
-def start(effect: Effect, shape: Shape, links: int) -> FittedEffect:
+def start(effect: Effect, shape: ConstantValues, links: int) -> FittedEffect:
     """An effect that does nothing yet: where a fit begins."""
     count = len(effect.columns(links))
     return FittedEffect(effect, np.zeros(count), shape, np.full((count, count), np.nan))
@@ -76,7 +76,7 @@ def fit(
     usable, _ = aligned.usable
     begun = tuple(effects)
     added_by(begun, aligned.rows)  # refuses here what cannot be fitted
-    columns_um = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in begun]
+    columns_um = [aligned.columns(one.effect, one.constants) * UM_PER_MM for one in begun]
     ends = np.cumsum([0, *(column.shape[2] for column in columns_um)])
     G_um = np.concatenate([*columns_um, aligned.free_columns * UM_PER_MM], axis=2)
     usable = usable & np.isfinite(G_um).all(axis=(1, 2))

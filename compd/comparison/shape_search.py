@@ -11,7 +11,7 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import FitResult, fit, start
 from compd.comparison.noise_floor import OUTLIER_SIGMAS
-from compd.model.effect import Effect, FittedEffect, Shape
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 
 # A searched constant is known well enough when it moves the error by less than its own standard error: 1 % is.
 FINE = 0.01
@@ -26,13 +26,13 @@ def search_constants(
     Raises CompdError as `fit` does.
     """
     links = aligned.rows.links
-    shapes = effect.shapes(aligned.rows)
+    shapes = effect.constant_grid(aligned.rows)
     if len(shapes) == 1:
         return fit(aligned, [*model, start(effect, shapes[0], links)], sigma_um)
     without = fit(aligned, model, sigma_um)
     limit = (OUTLIER_SIGMAS * without.rms_um) ** 2
 
-    def tried(shape: Shape) -> tuple[float, FitResult]:
+    def tried(shape: ConstantValues) -> tuple[float, FitResult]:
         found = fit(aligned, [*model, start(effect, shape, links)], sigma_um)
         known = np.isfinite(found.residual_um).all(axis=1)
         # gross rows count as much as a gross row can, whichever each fit calls so

@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.selection import CONTRADICTION_COSTS, DESCRIPTION_COSTS
-from compd.model.effect import Effect, Shape, missing
+from compd.model.effect import ConstantValues, Effect
+from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
 # A candidate whose columns are unknown in more rows than this would cost all others those rows.
@@ -34,7 +35,7 @@ class Candidate:
 
     name: str
     effect: Effect
-    shape: Shape
+    shape: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
     searched: int
@@ -54,7 +55,7 @@ class Candidate:
         """By how much more than another effect it must explain to be believed."""
         if self.described:
             return DESCRIPTION_COSTS
-        return CONTRADICTION_COSTS if self.name == "reference_registration" else 1.0
+        return CONTRADICTION_COSTS if self.effect.registration else 1.0
 
     @property
     def numbers(self) -> int:
@@ -82,7 +83,7 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
         if why:
             untestable[effect.id] = why
             continue
-        shapes = effect.shapes(aligned.rows)
+        shapes = effect.constant_grid(aligned.rows)
         searched = sum(
             CHOICE_COUNTS if constant.choice else SEARCH_COUNTS
             for constant in effect.constants
@@ -97,18 +98,18 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
     return Pool(tuple(found), untestable)
 
 
-def _candidate(effect: Effect, shape: Shape, aligned: AlignedRecording, searched: int) -> Candidate:
-    limits = np.array([column.parameter.fitted_range for column in effect.columns(aligned.rows.links)])
+def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording, searched: int) -> Candidate:
+    limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
     return Candidate(effect.id, effect, shape, aligned.columns(effect, shape) * UM_PER_MM, limits, searched)
 
 
 def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
     """What it needs and does not get, in words; "" where it has everything."""
-    if effect.id == "reference_registration" and aligned.registered:
+    if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
     if aligned.model is None and effect.live:
         return "acts inside the machine, and of this machine only the model's prediction is known"
-    return "; ".join(problem.what for problem in missing(effect, aligned.rows.available, aligned.rows.links))
+    return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
 
 
 def _silent(variants: Sequence[Candidate], usable: BoolArray) -> str:

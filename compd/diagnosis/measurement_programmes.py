@@ -13,8 +13,9 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.errors import Problem, RecordingError
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
-from compd.model.observations import Constants, Observations, REFERENCE_TEMPERATURE_degC
-from compd.model.observe import Movement, observe
+from compd.model.motion import Movement
+from compd.model.observations import MachineConstants, Observations, REFERENCE_TEMPERATURE_degC
+from compd.model.observe import observe
 from compd.model.solve_status import Reason
 
 # Places along each edge of the workspace's box.
@@ -159,7 +160,7 @@ def _together(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def rows_of(
-    model: MachineModel, common: Constants, chosen: Sequence[Segment], aligned: AlignedRecording
+    model: MachineModel, common: MachineConstants, chosen: Sequence[Segment], aligned: AlignedRecording
 ) -> Observations:
     """The segments as rows that effects can see, each a session of its own, with perfect gauges.
 

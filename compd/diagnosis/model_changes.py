@@ -15,7 +15,7 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect, FittedEffect
 from compd.model.library import library
-from compd.model_file import Declaration, Kind, ModelFile, ModelStep, Stored
+from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
     return _change(file, file, found, before, "fit", "", date)
 
 
-def undo(stored: Stored, date: str, where: str) -> Stored:
+def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
     """The model before its last standing step; the ledger keeps both. Raises StateError where there is none."""
     standing = [k for k, step in enumerate(stored.steps) if step.kind != "undo" and not step.undone]
     if not standing:
@@ -91,11 +91,11 @@ def undo(stored: Stored, date: str, where: str) -> Stored:
         last.noise_floor_um,
         {},
     )
-    return Stored(stored.machine, last.replaced, (*steps, taken_back), stored.geometry)
+    return StoredModel(stored.machine, last.replaced, (*steps, taken_back), stored.geometry)
 
 
 def _afresh(one: FittedEffect, links: int) -> FittedEffect:
-    return start(one.effect, one.shape, links)
+    return start(one.effect, one.constants, links)
 
 
 def _change(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,9 +15,11 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, Segment, rows_of, segments
 from compd.diagnosis.regression import solve
 from compd.errors import Problem, RecordingError
-from compd.model.effect import FittedEffect, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
-from compd.model.prediction import columns, sensitivities
+from compd.model.sensitivity import effect_sensitivity, sensitivities
+from compd.recording.plan_file import plan_row, plan_text, write_plan_file
 from compd.units import UM_PER_MM
 
 # Rows of one purpose teach less and less; what was measured already keeps its weight.
@@ -40,17 +41,11 @@ class MeasurementPlan:
 
     def write_to(self, stream: TextIO) -> None:
         """As CSV."""
-        writer = csv.DictWriter(stream, list(self.rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
+        stream.write(plan_text(self.rows))
 
     def write(self, path: Path) -> None:
         """As CSV. Raises RecordingError where it cannot be written."""
-        try:
-            with path.open("w", newline="", encoding="utf-8") as stream:
-                self.write_to(stream)
-        except OSError as error:
-            raise RecordingError(Problem(where=str(path), what=f"cannot be written: {error.strerror}")) from error
+        write_plan_file(path, self.rows)
 
 
 class _Parting:
@@ -95,15 +90,15 @@ def plan(
             )
         )
     links = aligned.rows.links
-    names = list(dict.fromkeys(name for one in pair for name in quantities(one.effect, links)))
+    names = list(dict.fromkeys(name for one in pair for name in needed_quantities(one.effect, links)))
     programmes = [one for one in segments(aligned, limits, names) if len(one) <= rows]
     fresh = rows_of(aligned.model, aligned.rows.constants, programmes, aligned)
     ports = {port for one in (*model, *pair) for port in one.effect.ports}
     by = sensitivities(aligned.model, fresh, ports)
 
     def of(one: FittedEffect) -> FloatArray:
-        basis, _ = one.effect.basis(fresh, one.shape, None)
-        found = columns(one.effect, fresh, basis, by)
+        basis, _ = one.effect.basis(fresh, one.constants, None)
+        found = effect_sensitivity(one.effect, fresh, basis, by)
         return (
             (found.link_length if aligned.of_links else found.tip)[:, list(aligned.axes)]
             * UM_PER_MM
@@ -111,7 +106,7 @@ def plan(
         )
 
     usable, _ = aligned.usable
-    old = [aligned.columns(one.effect, one.shape) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
+    old = [aligned.columns(one.effect, one.constants) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
     good = usable & np.all([np.isfinite(one).all(axis=(1, 2)) for one in old], axis=0)
     new = [of(one) for one in (*model, *pair)]
     ends = np.cumsum([0, *(len(one) for one in programmes)])
@@ -167,13 +162,14 @@ def _by_programme(
 
 def _rows(one: Segment, fresh: Observations, begin: int, names: Sequence[str]) -> list[dict[str, Any]]:
     """What a person sets, row by row, in the columns of a recording where there are such."""
-    found = []
-    for k in range(len(one)):
-        at = begin + k
-        row: dict[str, Any] = {"purpose": one.purpose, "time_s": round(float(one.time_s[k]), 1)}
-        row |= {f"tip_{axis}_mm": round(float(v), 3) for axis, v in zip("xyz", one.tip_M_mm[k], strict=True)}
-        row |= {name: round(float(fresh.quantities[name][at]), 3) for name in names}
-        row |= {f"approach_{i + 1}": int(v) for i, v in enumerate(fresh.direction[at])}
-        row["speed_mm_per_s"] = round(float(np.abs(fresh.velocity_mm_per_s[at]).max()), 2)
-        found.append(row)
-    return found
+    return [
+        plan_row(
+            one.purpose,
+            one.time_s[k],
+            one.tip_M_mm[k],
+            {name: fresh.quantities[name][begin + k] for name in names},
+            fresh.direction[begin + k],
+            np.abs(fresh.velocity_mm_per_s[begin + k]).max(),
+        )
+        for k in range(len(one))
+    ]

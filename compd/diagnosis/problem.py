@@ -75,7 +75,7 @@ def _always_um(before: Comparison) -> FloatArray:
     """(N, m, Q) columns of the model's own numbers and of the instrument's frame."""
     aligned = before.aligned
     own: Sequence[FittedEffect] = before.fitted
-    columns = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in own]
+    columns = [aligned.columns(one.effect, one.constants) * UM_PER_MM for one in own]
     return np.concatenate([*columns, aligned.free_columns * UM_PER_MM], axis=2)
 
 

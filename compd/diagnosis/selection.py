@@ -71,14 +71,14 @@ def numbers(effect: Effect, links: int, theta: FloatArray, covariance: FloatArra
     found = []
     for k, column in enumerate(effect.columns(links)):
         std = float(np.sqrt(covariance[k, k])) if k < len(covariance) else float("nan")
-        value, shown_std = column.parameter.shown(float(theta[k]), std)
+        value, shown_std = column.parameter.from_theta(float(theta[k]), std)
         found.append(
             Number(
                 column.name,
                 value,
                 shown_std,
                 column.parameter.unit,
-                plausible(column.parameter.fitted_range, float(theta[k]), std),
+                plausible(column.parameter.theta_range, float(theta[k]), std),
             )
         )
     return found

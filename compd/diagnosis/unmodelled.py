@@ -38,7 +38,7 @@ def with_disturbances(
             others[one.name] = _whitened(one.columns_um, found, sigma_um)
     if not others or not found.fitted:
         return found
-    own = [aligned.columns(one.effect, one.shape) * UM_PER_MM for one in found.fitted]
+    own = [aligned.columns(one.effect, one.constants) * UM_PER_MM for one in found.fitted]
     G = _whitened(np.concatenate([*own, aligned.free_columns * UM_PER_MM], axis=2), found, sigma_um)
     size = np.linalg.norm(G, axis=0)
     size[size == 0] = 1.0

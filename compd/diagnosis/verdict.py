@@ -47,7 +47,7 @@ class DiagnosisStep:
             "explained_fraction": self.explained_fraction,
             "p_adjusted": self.p_adjusted,
             "parameters": [one.as_json() for one in self.numbers],
-            "constants": dict(self.fitted.shape),
+            "constants": dict(self.fitted.constants),
             "equation": self.effect.equation,
             "alike": {one.name: one.cosine for one in self.rivals},
         }

@@ -189,7 +189,7 @@ def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
     if file is None:
         return Models(loader.without_effects)
     model = loader.read(Path(file))
-    _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.acting])
+    _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.live_effects])
     return Models(model)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import MATRIX, VECTOR, kernel
 from compd.model.kernels.octahedron import edges, octahedron, place_base
-from compd.model.transform import to_inner, to_outer
+from compd.model.kernels.rotation import to_inner, to_outer
 
 
 class FrameGeometry(NamedTuple):

@@ -10,7 +10,7 @@ from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
 from compd.comparison.residual_trends import covariates
-from compd.model_file import ModelFile, Stored, numbers_of
+from compd.model_file import ModelFile, StoredModel, parameter_estimates
 from compd.report.figures import against, arrows, at_links, falling, histogram, switched_off, workspace
 from compd.report.page import PageTable, Panel, write_page
 
@@ -69,7 +69,7 @@ def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile
     write_page(path, f"Model and measurement: {machine}", verdict, panels, f"Effects in the model: {effects}. {hashes}")
 
 
-def write_ledger(path: Path, model: Stored) -> None:
+def write_ledger(path: Path, model: StoredModel) -> None:
     """The picture of the falling error, and every step."""
     steps = model.steps
     labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
@@ -94,7 +94,7 @@ def write_ledger(path: Path, model: Stored) -> None:
 LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
 
 
-def ledger_rows(model: Stored) -> list[list[str]]:
+def ledger_rows(model: StoredModel) -> list[list[str]]:
     """One line per step."""
     return [
         [
@@ -172,7 +172,7 @@ def _excluded(one: Comparison) -> PageTable:
 def _effects(model: ModelFile, one: Comparison) -> PageTable:
     rows = [
         [effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"]]
-        for effect, number in numbers_of(model.fitted, one.aligned.rows.links)
+        for effect, number in parameter_estimates(model.fitted, one.aligned.rows.links)
     ]
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 

@@ -14,7 +14,8 @@ from compd.comparison.residual_trends import Covariate, covariates
 from compd.diagnosis.empirical_search import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, in_um
-from compd.model.effect import Effect, quantities
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities
 from compd.report.figures import small_multiples
 from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
 from compd.units import unit_of
@@ -70,7 +71,7 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
         [one.name, f"{one.value:.4g} +- {one.std:.2g} {one.unit}" + ("" if one.plausible else ", implausible")]
         for one in step.numbers
     ]
-    rows += [[name, f"{value:.4g}, searched"] for name, value in step.fitted.shape.items()]
+    rows += [[name, f"{value:.4g}, searched"] for name, value in step.fitted.constants.items()]
     rows += [
         ["explains", f"{100 * step.explained_fraction:.0f} % of what was left above the noise"],
         ["error on rows left out", f"{step.heldout_rms_um:.3g} um"],
@@ -99,7 +100,7 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
 def _drivers(effect: Effect, comparison: Comparison) -> list[Covariate]:
     """What drives an effect, among what can be drawn; place and link lengths where there is nothing else."""
     every = covariates(comparison.aligned)
-    needed = quantities(effect, comparison.aligned.rows.links)
+    needed = needed_quantities(effect, comparison.aligned.rows.links)
     names = {_name(name) for name in needed}
     found = [one for one in every if one.name in names]
     if "direction" in effect.needs:

@@ -10,11 +10,14 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model.effect import Constant, Effect, FittedEffect, Parameter, delta, missing, quantities
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Constant, Effect, FittedEffect, Parameter
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.kinematics import inverse_kinematics
-from compd.model.machine import MachineModel
-from compd.model.observations import Observations, REFERENCE_PRESSURE_hPa, moved
-from compd.model.observe import Details, Movement, constants, observe
+from compd.model.machine import MachineModel, machine_constants
+from compd.model.motion import Movement, update_motion
+from compd.model.observations import MachineDetails, Observations, REFERENCE_PRESSURE_hPa
+from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.units import UM_PER_MM
 
@@ -72,14 +75,14 @@ class Signature(NamedTuple):
     taken: dict[str, str]
 
 
-def signature(effect: Effect, model: MachineModel, details: Details) -> Signature:
+def signature(effect: Effect, model: MachineModel, details: MachineDetails) -> Signature:
     """Arrows and curves of one effect with parameters from the middle of their plausible range.
 
     Raises CompdError where this machine lacks what the effect needs (a plate thickness, revolute axes).
     """
-    needed = quantities(effect, model.links)
+    needed = needed_quantities(effect, model.links)
     place = _Place(effect, model, details, needed)
-    lacking = missing(effect, place.rows(Drive(np.zeros((1, 3)))).available, model.links)
+    lacking = unmet_needs(effect, place.rows(Drive(np.zeros((1, 3)))).available, model.links)
     if lacking:
         raise CompdError(lacking)
     across = np.linspace(-REACH_MM, REACH_MM, 5)
@@ -90,7 +93,7 @@ def signature(effect: Effect, model: MachineModel, details: Details) -> Signatur
         grid + model.zero.contact.tip_M_mm,
         place.tip_um(Drive(grid, apart=True)),
         curves,
-        _taken(effect, place.fitted.shape),
+        _taken(effect, place.fitted.constants),
     )
 
 
@@ -114,11 +117,11 @@ def _taken(effect: Effect, shape: Mapping[str, float]) -> dict[str, str]:
 class _Place:
     """One effect on one machine."""
 
-    def __init__(self, effect: Effect, model: MachineModel, details: Details, needed: Sequence[str]) -> None:
+    def __init__(self, effect: Effect, model: MachineModel, details: MachineDetails, needed: Sequence[str]) -> None:
         self._model, self._needed = model, needed
-        self._common = constants(model, details)
+        self._common = machine_constants(model, details)
         columns = effect.columns(model.links)
-        theta = np.array([column.parameter.fitted(middle(column.parameter)) for column in columns])
+        theta = np.array([column.parameter.to_theta(middle(column.parameter)) for column in columns])
         if any(parameter.per == "link_axis" for parameter in effect.parameters):
             theta[1:] = 0.0  # all joints moved alike would only move the whole machine
         period = details.scale_signal_period_mm
@@ -154,7 +157,7 @@ class _Place:
     def tip_um(self, drive: Drive) -> FloatArray:
         """(N, 3) by which the effect moves the tip."""
         rows = self.rows(drive)
-        deltas, _ = delta(self.fitted, rows)
+        deltas, _ = effect_deltas(self.fitted, rows)
         with_effect = predict(self._model, rows, deltas)
         return np.asarray(UM_PER_MM * (with_effect.tip_mm - predict(self._model, rows, {}).tip_mm))
 
@@ -174,7 +177,7 @@ def _directions(scale_mm: FloatArray) -> FloatArray:
     motion = None
     found = np.empty_like(scale_mm)
     for row, scales in enumerate(scale_mm):
-        motion = moved(motion, float(row), scales, np.zeros(0))
+        motion = update_motion(motion, float(row), scales, np.zeros(0))
         found[row] = np.where(motion.direction == 0, 1.0, motion.direction)
     return found
 
@@ -220,7 +223,7 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
     elif effect.needs == ("time",):
         hours = spread(0, 10)
         found.append(("time, h", hours, Drive(here, time_s=hours * HOUR_S)))
-    if effect.id in ("joint_comparator_gain", "frame_comparator_gain"):
+    if not effect.needs and effect.ports in (("joint",), ("frame",)):
         reading = spread(-0.02, 0.02)
         changed = Drive(here, joint_mm=reading) if effect.ports == ("joint",) else Drive(here, frame_mm=reading)
         found.append(("reading of all comparators, mm", reading, changed))

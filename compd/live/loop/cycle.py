@@ -116,7 +116,7 @@ def _compute(
 
     change_mm, joints = comparators.change_mm, wires.joints
     values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
-    machine = applied.machine if usable.weight == 1.0 else applied.machine.fading(usable.weight)
+    machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
     compensation, warm_start = compensate(machine, values, target, state.warm_start)
     scales_seen = state.scales_seen or target is None
     if code := int(compensation.reason):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,9 +15,10 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
-from compd.model.effect import FittedEffect, missing, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
-from compd.model.observations import settings
+from compd.model.observations import available_settings
 from compd.model_file import read_model_file
 from compd.readings import Snapshot
 
@@ -54,7 +56,7 @@ class LiveModel:
     @property
     def summary(self) -> Mapping[str, Any]:
         """For MODEL and STATUS. `not_live` are effects at the reference instrument, which the machine does not need."""
-        summary: dict[str, Any] = {"effects": [fitted.effect.id for fitted in self.machine.acting]}
+        summary: dict[str, Any] = {"effects": [fitted.effect.id for fitted in self.machine.live_effects]}
         if self.file:
             summary |= {"model": self.hash, "file": self.file}
         if not_live := [fitted.effect.id for fitted in self.machine.effects if not fitted.effect.live]:
@@ -108,8 +110,8 @@ class ModelLoader:
         if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
-        acting = machine.acting
-        names = tuple(dict.fromkeys(name for fitted in acting for name in quantities(fitted.effect, model.links)))
+        needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
+        names = tuple(dict.fromkeys(chain.from_iterable(needed)))
         try_model(machine, names, str(path))
         if _hash(path) != file_hash:
             raise StateError(Problem(where=str(path), what="has changed while it was read", next_step="ask again"))
@@ -119,9 +121,9 @@ class ModelLoader:
         """Live effects that need a gauge or a setting which is not there, or the time since a recording's start."""
         model = self.without_effects.machine
         assert model.constants is not None
-        available = {*self._wires.quantity_names, *settings(model.constants)}
+        available = {*self._wires.quantity_names, *available_settings(model.constants)}
         live = [fitted for fitted in effects if fitted.effect.live]
-        problems = [problem for fitted in live for problem in missing(fitted.effect, available, model.links)]
+        problems = [problem for fitted in live for problem in unmet_needs(fitted.effect, available, model.links)]
         return problems + [
             Problem(
                 where=f"effect {fitted.effect.id}",
@@ -159,7 +161,7 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
             next_step="fit it again with `compd effect fit`",
         )
         for fitted in effects
-        if not np.isfinite([*fitted.theta, *fitted.shape.values()]).all()
+        if not np.isfinite([*fitted.theta, *fitted.constants.values()]).all()
     ]
 
 
@@ -177,8 +179,7 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
         dict.fromkeys(names, np.array(np.nan)),
         0.0,
     )
-    zero = machine.zero.contact
-    target_mm = zero.tip_P_mm if hasattr(machine.arrangement, "tool_M_mm") else zero.tip_M_mm
+    target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
     try:
         _, warm = compensate_cmm(machine, values, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, values._replace(time_s=1.0), warm)

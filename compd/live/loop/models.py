@@ -9,7 +9,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import ShadowResult
-from compd.model.apply_effects import EffectMemory, kept
+from compd.model.apply_effects import EffectMemory, carry_over
 from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 from compd.readings import Snapshot
@@ -28,7 +28,7 @@ def adopt_models(state: CycleState, models: Models) -> CycleState:
     if old.shadow is not None and models.applied is old.shadow:
         machine, memory = old.shadow.machine, shadow_memory
     elif models.shadow is not None and models.shadow is not old.shadow:
-        shadow_memory = kept(memory, machine, models.shadow.machine)
+        shadow_memory = carry_over(memory, machine, models.shadow.machine)
     state = state._replace(models=models, shadow_memory=shadow_memory)
     if models.applied is old.applied:
         return state
@@ -36,7 +36,7 @@ def adopt_models(state: CycleState, models: Models) -> CycleState:
     if last_good is not None and not set(models.applied.quantities) <= set(last_good.quantities):
         # the new effects need gauges that the last good set does not have
         last_good = None
-    effects = kept(memory, machine, models.applied.machine)
+    effects = carry_over(memory, machine, models.applied.machine)
     return state._replace(
         warm_start=state.warm_start._replace(effects=effects), last_good=last_good, adopting=True, u_tip_um=None
     )

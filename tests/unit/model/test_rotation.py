@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from compd.model.kernels.linear import factor, finite, inverse_norm, largest, solve
-from compd.model.kernels.rotation import compose, orthonormalise, rotation_matrix, rotation_vector, turn
-from compd.model.transform import to_inner, to_outer
+from compd.model.kernels.rotation import (
+    compose,
+    orthonormalise,
+    rotation_matrix,
+    rotation_vector,
+    to_inner,
+    to_outer,
+    turn,
+)
 
 ANGLES = st.tuples(*[st.floats(-6.0, 6.0)] * 3)
 

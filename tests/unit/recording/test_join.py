@@ -14,7 +14,7 @@ from compd.cli.join import join as join_command
 from compd.errors import RecordingError
 from compd.recording.clock_offset import estimate_offset
 from compd.recording.instrument_export import Track, read_track
-from compd.recording.join import Instrument, join
+from compd.recording.join import Instrument, join_reference
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 from tests.support.two_clocks import Path3, path3, track_of
@@ -96,7 +96,7 @@ def test_joined_recording_is_right_where_the_machine_dwells(tmp_path: Path) -> N
     time_s = np.arange(10.0, motion.end_s + 5.0, 0.1)
     humidity = {"humidity_pct": np.linspace(40, 50, len(time_s))}
     recording = read_recording(gauges(tmp_path / "g.csv", motion, time_s, rng, **humidity), needs_reference=False)
-    joined = join(
+    joined = join_reference(
         recording, read_track(export(tmp_path / "t.csv", track), {}), tmp_path / "out.csv", Instrument(sigma_um=5)
     )
     found = read_recording(tmp_path / "out.csv")
@@ -205,7 +205,7 @@ def test_exclusions_keep_their_rows(tmp_path: Path) -> None:
     path.with_suffix(".yaml").write_text("machine: tripod-cmm\nexcluded_rows: [{row: 9, reason: door}]\n")
     recording = read_recording(path, needs_reference=False)
     track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
-    join(recording, track, tmp_path / "out.csv", Instrument(), 4.5)
+    join_reference(recording, track, tmp_path / "out.csv", Instrument(), 4.5)
     found = read_recording(tmp_path / "out.csv")
     assert found.time_s[found.excluded] == recording.time_s[recording.excluded]
     assert list(found.sidecar.excluded.values()) == ["door"]
@@ -255,8 +255,8 @@ def test_length_needs_its_link(tmp_path: Path) -> None:
     seen_s = np.arange(0.0, motion.end_s, 0.05)
     track = Track(tmp_path / "l.csv", seen_s - 12.0, motion.scales(seen_s)[:, :1], ("length",), {}, 0)
     with pytest.raises(RecordingError, match="--link"):
-        join(recording, track, tmp_path / "out.csv", Instrument())
-    join(recording, track, tmp_path / "out.csv", Instrument(link=1))
+        join_reference(recording, track, tmp_path / "out.csv", Instrument())
+    join_reference(recording, track, tmp_path / "out.csv", Instrument(link=1))
     found = read_recording(tmp_path / "out.csv")
     assert found.reference_links == (1,)
     assert found.reference is not None

@@ -15,7 +15,7 @@ from compd.cli.recording import recording
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording
-from compd.recording.recording import last_direction
+from compd.recording.recording import travel_direction
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from tests.support.paths import ROOT, SHARED
@@ -55,7 +55,7 @@ def test_direction_from_the_scales_is_the_recorded_one(name: str) -> None:
     found = read_recording(path)
     assert found.scale_mm is not None
     assert found.approach is not None
-    derived = last_direction(found.scale_mm, found.session)
+    derived = travel_direction(found.scale_mm, found.session)
     there = np.isfinite(derived)
     assert there.mean() > 0.95
     assert (derived[there] == found.approach[there]).mean() > 0.95
@@ -242,7 +242,9 @@ def test_check_against_counts_gauges(tmp_path: Path) -> None:
 
 def test_direction_ignores_creep_but_adds_it_up() -> None:
     scale_mm = np.array([[0.0, 1.0, 1.0002, 0.9998, 0.5, 0.4996, 0.4992, 0.4988, 0.5]]).T
-    assert np.array_equal(last_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True)
+    assert np.array_equal(
+        travel_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True
+    )
 
 
 def test_check_prints_what_there_is(tmp_path: Path) -> None:

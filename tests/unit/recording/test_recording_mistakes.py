@@ -150,7 +150,8 @@ def test_sidecar_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
 
 
 def test_every_mistake_of_a_sidecar_comes_at_once_with_its_line(tmp_path: Path) -> None:
-    sidecar = "format: two\nreference:\n  quantity: tip\n  frame: tracker\n  sigma_um: -1\nexcluded_rows:\n- {row: 5}\nnotes: 3\n"
+    sidecar = "format: two\nreference:\n  quantity: tip\n  frame: tracker\n  sigma_um: -1\n"
+    sidecar += "excluded_rows:\n- {row: 5}\nnotes: 3\n"
     problems = [problem.split(": ")[0] for problem in problems_of(put(tmp_path, csv_text(), sidecar))]
     path = tmp_path / "run.yaml"
     assert problems == [
