@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import AfterValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
 from compd.gauge import Unit
 from compd_drivers.linearisation import Linearisation
+from compd_drivers.measured import Section
 from compd_drivers.modbus import Address, Function, RegisterType, Status
 
 INPUTS = 8  # of every module that is described here
@@ -42,11 +43,7 @@ SPANS: Mapping[str, Span] = {
 }
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class AnalogueInput(_Section):
+class AnalogueInput(Section):
     """One input that is wired to a sensor."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
@@ -57,7 +54,7 @@ class AnalogueInput(_Section):
     highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
 
 
-class AnalogueData(_Section):
+class AnalogueData(Section):
     """How the module gives an input's signal."""
 
     type: RegisterType = Field(description="how the number is stored")
@@ -92,7 +89,7 @@ class AnalogueData(_Section):
         return channel
 
 
-class AnalogueModule(_Section):
+class AnalogueModule(Section):
     """The registers of a module of eight inputs."""
 
     function: Function = Field(description="3: holding registers, 4: input registers")

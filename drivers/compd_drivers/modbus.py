@@ -19,10 +19,11 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
 from compd_drivers.linearisation import Linearisation
+from compd_drivers.measured import Section, repeated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -34,10 +35,8 @@ MOST_REGISTERS = 124
 _FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 
 
-class Status(BaseModel):
+class Status(Section):
     """A register that says whether a channel's value counts."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     address: Address = Field(description="of the status register; read by the channel's own function")
     ok: tuple[int, ...] = Field(default=(0,), description="values that mean: good")
@@ -45,10 +44,8 @@ class Status(BaseModel):
     under_range: tuple[int, ...] = Field(default=(), description="values that mean: under range")
 
 
-class ModbusChannel(BaseModel):
+class ModbusChannel(Section):
     """One value in the register map: value = raw x scale + offset."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     function: Function = Field(description="3: holding registers, 4: input registers")
@@ -89,9 +86,8 @@ class ModbusOptions(GaugeOptions):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [channel.name for channel in self.channels]
-        if doubled := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"channel named twice: {', '.join(doubled)}")
+        if doubled := repeated([channel.name for channel in self.channels]):
+            raise ValueError(f"channel named twice: {doubled}")
         return self
 
 

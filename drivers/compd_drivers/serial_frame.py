@@ -24,13 +24,13 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
-from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.measured import MeasuredChannel, ReplyQuality, Section, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -63,10 +63,8 @@ class Frame(NamedTuple):
         return len(data) == len(self.fixed) and all(fixed in (None, byte) for fixed, byte in pairs)
 
 
-class FrameChecksum(BaseModel):
+class FrameChecksum(Section):
     """How the checksum of a frame is made."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: ChecksumKind
     first: Annotated[int, Field(ge=0)] = Field(default=0, description="first byte that it covers, from 0")
@@ -111,10 +109,8 @@ class FrameChannel(MeasuredChannel):
         return float(int.from_bytes(raw, self.byte_order, signed=self.type.startswith("int")))
 
 
-class ErrorFrame(BaseModel):
+class ErrorFrame(Section):
     """A reply that stands for the whole poll."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     frame: str = Field(description="its bytes, as in `frame`")
     quality: ReplyQuality = Field(description="what it means")

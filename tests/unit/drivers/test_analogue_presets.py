@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from compd.gauge import Quality, Reading, RegisterReply
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.simulated.transducer import signal_for
+from compd_drivers.simulated.shared import signal_for
 
 TABLE = {"signal": "V", "table": [[-10, -1.0], [0, 0.002], [10, 1.0]]}
 LOOP = {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}
