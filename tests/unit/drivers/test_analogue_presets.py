@@ -109,10 +109,10 @@ class Wire:
         return RegisterReply(tuple(registers), 1.0)
 
 
-def module(driver: str, seen: dict[str, float], **options: Any) -> tuple[Any, Wire]:
+def module(driver: str, values: dict[str, float], **options: Any) -> tuple[Any, Wire]:
     gauge = load(GAUGES, driver, driver)
     checked = gauge.Options.model_validate({"driver": driver, "line": "l", "unit": 1, **options})
-    return gauge(checked), Wire(load(SIMULATED_GAUGES, driver, driver)(checked, lambda name: seen[name]))
+    return gauge(checked), Wire(load(SIMULATED_GAUGES, driver, driver)(checked, lambda name: values[name]))
 
 
 V10 = {"name": "a", "input": 1, "linearisation": {"signal": "V", "table": [[-9.5, -1], [9.5, 1]]}}

@@ -113,12 +113,12 @@ def test_adjacent_registers_are_read_together_and_stamped_with_their_own_read() 
     st.lists(st.tuples(st.sampled_from([3, 4]), st.integers(0, 400), st.sampled_from([1, 2])), min_size=1, max_size=200)
 )
 def test_every_number_is_whole_in_one_read(spans: list[tuple[int, int, int]]) -> None:
-    found = blocks(spans)
-    assert all(1 <= block.length <= 124 for block in found)
+    reads = blocks(spans)
+    assert all(1 <= block.length <= 124 for block in reads)
     for function, address, length in spans:
         assert any(
             block.function == function and block.address <= address and address + length <= block.address + block.length
-            for block in found
+            for block in reads
         )
 
 
