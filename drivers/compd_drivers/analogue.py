@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from compd.gauge import Unit
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.measured import Section
+from compd_drivers.measured import DescriptionSection
 from compd_drivers.modbus import Address, Function, RegisterType, Status
 
 INPUTS = 8  # of every module that is described here
@@ -43,7 +43,7 @@ SPANS: Mapping[str, Span] = {
 }
 
 
-class AnalogueInput(Section):
+class AnalogueInput(DescriptionSection):
     """One input that is wired to a sensor."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
@@ -54,7 +54,7 @@ class AnalogueInput(Section):
     highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
 
 
-class AnalogueData(Section):
+class AnalogueData(DescriptionSection):
     """How the module gives an input's signal."""
 
     type: RegisterType = Field(description="how the number is stored")
@@ -89,7 +89,7 @@ class AnalogueData(Section):
         return channel
 
 
-class AnalogueModule(Section):
+class AnalogueModule(DescriptionSection):
     """The registers of a module of eight inputs."""
 
     function: Function = Field(description="3: holding registers, 4: input registers")

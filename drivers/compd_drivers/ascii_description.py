@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 from pydantic import Field, model_validator
 
 from compd_drivers.exchange import ExchangeOptions
-from compd_drivers.measured import MeasuredChannel, ReplyQuality, Section, repeated
+from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 
@@ -21,7 +21,7 @@ class AsciiChannel(MeasuredChannel):
     )
 
 
-class ErrorReply(Section):
+class ErrorReply(DescriptionSection):
     """A reply that stands for the whole poll."""
 
     in_: str = Field(alias="in", description="what it looks like")
@@ -29,7 +29,7 @@ class ErrorReply(Section):
     says: str = Field(default="", description="in words, for the status")
 
 
-class Exchange(Section):
+class Exchange(DescriptionSection):
     """One request and its reply, without a value in it."""
 
     out: str = Field(min_length=1)

@@ -51,13 +51,13 @@ CONVERSIONS: Mapping[str, _Conversion] = {
 SIGNALS = ("V", "mA")
 
 
-class Section(BaseModel):
+class DescriptionSection(BaseModel):
     """A part of a description: unknown keys are refused, and nothing changes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class MeasuredChannel(Section):
+class MeasuredChannel(DescriptionSection):
     """One number that a device sends."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")

@@ -23,7 +23,7 @@ from pydantic import Field, model_validator
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.measured import Section, repeated
+from compd_drivers.measured import DescriptionSection, repeated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -35,7 +35,7 @@ MOST_REGISTERS = 124
 _FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 
 
-class Status(Section):
+class Status(DescriptionSection):
     """A register that says whether a channel's value counts."""
 
     address: Address = Field(description="of the status register; read by the channel's own function")
@@ -44,7 +44,7 @@ class Status(Section):
     under_range: tuple[int, ...] = Field(default=(), description="values that mean: under range")
 
 
-class ModbusChannel(Section):
+class ModbusChannel(DescriptionSection):
     """One value in the register map: value = raw x scale + offset."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
@@ -91,7 +91,7 @@ class ModbusOptions(GaugeOptions):
         return self
 
 
-class Block(NamedTuple):
+class RegisterBlock(NamedTuple):
     """Adjacent registers that are read together."""
 
     function: int
@@ -99,7 +99,7 @@ class Block(NamedTuple):
     length: int
 
 
-class _Place(NamedTuple):
+class _RegisterPlace(NamedTuple):
     """Where a channel's registers are in the blocks."""
 
     block: int
@@ -168,26 +168,26 @@ class Modbus(Gauge[RegisterLine]):
             )
         return readings
 
-    def _place(self, function: int, address: int, length: int) -> _Place:
+    def _place(self, function: int, address: int, length: int) -> _RegisterPlace:
         return next(
-            _Place(i, address - block.address)
+            _RegisterPlace(i, address - block.address)
             for i, block in enumerate(self.blocks)
             if block.function == function and 0 <= address - block.address <= block.length - length
         )
 
 
-def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[Block, ...]:
+def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[RegisterBlock, ...]:
     """(function, address, registers) of every number -> reads that cover adjacent registers and split no number."""
-    reads: list[Block] = []
+    reads: list[RegisterBlock] = []
     for function, address, length in sorted(spans):
         end = address + length
         if reads and reads[-1].function == function and address <= reads[-1].address + reads[-1].length:
             last = reads[-1]
             covered = max(end - last.address, last.length)
             if covered <= MOST_REGISTERS:
-                reads[-1] = Block(function, last.address, covered)
+                reads[-1] = RegisterBlock(function, last.address, covered)
                 continue
-        reads.append(Block(function, address, length))
+        reads.append(RegisterBlock(function, address, length))
     return tuple(reads)
 
 

@@ -15,19 +15,19 @@ from pydantic.fields import FieldInfo
 
 from compd.gauge import GaugeOptions
 from compd_drivers.analogue import AnalogueModule
-from compd_drivers.measured import Section
+from compd_drivers.measured import DescriptionSection
 
 Value = str | int | float
 
 
-class LineAsDelivered(Section):
+class LineAsDelivered(DescriptionSection):
     """How the manual says that the device's port is set."""
 
     baud: int = Field(ge=50, description="bits per second")
     format: str = Field(pattern=r"^[78][NEO][12]$", description="data bits, parity, stop bits: 8N1, 7E2 ...")
 
 
-class PresetOption(Section):
+class PresetOption(DescriptionSection):
     """An option that the person has to choose: exactly one of `one_of`, `some_of`, `whole` and `like`."""
 
     one_of: tuple[Value, ...] = Field(default=(), description="the values of which one is chosen")
@@ -70,7 +70,7 @@ class PresetOption(Section):
         return (annotation | None if default is None else annotation), Field(default=default, description=description)
 
 
-class PresetVariant(Section):
+class PresetVariant(DescriptionSection):
     """A part of the description that holds for some values of the options only."""
 
     when: dict[str, Value | tuple[Value | None, ...] | None] = Field(
@@ -87,7 +87,7 @@ class PresetVariant(Section):
         )
 
 
-class Preset(Section):
+class Preset(DescriptionSection):
     """One described gauge."""
 
     title: str = Field(min_length=1, description="maker, instrument and what it is, in one line")

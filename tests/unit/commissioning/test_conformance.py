@@ -88,9 +88,9 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
-    for afflictions in polls:
-        poll = session.poll(afflictions)
-        assert not poll.wrong, (afflictions, poll)
+    for faults_by_reply in polls:
+        poll = session.poll(faults_by_reply)
+        assert not poll.wrong, (faults_by_reply, poll)
     session.settle()
     count, poll = session.recover()
     assert poll.ok, (count, poll)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from compd.gauge import LineFault, Quality, Reading, RegisterReply
-from compd_drivers.modbus import Block, Modbus, ModbusChannel, blocks, decode
+from compd_drivers.modbus import Modbus, ModbusChannel, RegisterBlock, blocks, decode
 
 
 def channel(**keys: Any) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def test_every_number_is_whole_in_one_read(spans: list[tuple[int, int, int]]) ->
 
 
 def test_a_long_map_is_split_between_numbers() -> None:
-    assert blocks([(4, 2 * i, 2) for i in range(63)]) == (Block(4, 0, 124), Block(4, 124, 2))
+    assert blocks([(4, 2 * i, 2) for i in range(63)]) == (RegisterBlock(4, 0, 124), RegisterBlock(4, 124, 2))
 
 
 def test_a_block_that_fails_leaves_no_values() -> None:
