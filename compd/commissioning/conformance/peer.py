@@ -1,4 +1,4 @@
-"""The far end of the wire under test: a simulated device with known values at its sensors, and faults in its replies."""
+"""The far end of the wire under test: a simulated device whose sensors have known values, and faults in its replies."""
 
 from __future__ import annotations
 
