@@ -104,14 +104,12 @@ class AnalogueModule(DescriptionSection):
         return tuple(name for data in self.data for name in data.ranges)
 
     def field(self, model_name: str) -> tuple[Any, FieldInfo]:
-        """Annotation and field of the option `channels`, for pydantic."""
+        """Annotation and field of the option `channels`, for pydantic. `model_name`: of the model of one input."""
         model: Any = AnalogueInput
         if self.ranges:
             choice: Any = Literal[self.ranges]
             setting = Field(description="what the input is set to in the module")
-            model = create_model(
-                f"{model_name}Input", __base__=_RangedInput, __module__=__name__, range=(choice, setting)
-            )
+            model = create_model(model_name, __base__=_RangedInput, __module__=__name__, range=(choice, setting))
         inputs: Any = Annotated[tuple[model, ...], AfterValidator(_check_once)]
         return inputs, Field(min_length=1, description="the inputs that are wired")
 

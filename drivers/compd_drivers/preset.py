@@ -142,7 +142,7 @@ class Preset(DescriptionSection):
 
         fields: dict[str, Any] = {key: option.field(base) for key, option in self.options.items()}
         if self.inputs is not None:
-            fields["channels"] = self.inputs.field(name)
+            fields["channels"] = self.inputs.field(f"{name.removesuffix('Options')}Input")
         return create_model(
             name, __base__=CheckedOptions, __module__=__name__, __doc__=f"Options of {self.title}", **fields
         )
