@@ -1,7 +1,8 @@
 """What a gauge driver implements, and what it delivers.
 
 A driver is a class derived from `Gauge`, named in the entry-point group `compd.gauges` (or by
-`driver: /etc/compd/my_gauge.py:MyGauge`). It knows its device's bytes and nothing else: the line's
+`driver: /etc/compd/my_gauge.py:MyGauge`); a gauge that is pure description is a preset instead, a YAML file in a folder
+of the group `compd.gauge_presets`. A driver knows its device's bytes and nothing else: the line's
 thread calls `read`, and the line does the waiting, the timeouts and the recovery.
 """
 
