@@ -1,4 +1,4 @@
-"""Arrays as the whole program names them in annotations; their shapes stand in the docstrings."""
+"""Arrays as the whole program names them in annotations (shapes stand in the docstrings), and their rms."""
 
 from __future__ import annotations
 
@@ -10,3 +10,8 @@ from numpy.typing import NDArray
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+def rms(values: FloatArray) -> float:
+    """Root of the mean square over all values; nan of none."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

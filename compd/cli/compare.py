@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.comparison.aligned_recording import AlignedRecording
     from compd.comparison.compare import Comparison
-    from compd.configuration import Configuration
     from compd.model_file import ModelFile
 
 # More sentences than this nobody reads in a terminal.
@@ -35,6 +33,7 @@ def compare(
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
     from compd.comparison.compare import compare as compared
+    from compd.comparison.open import open_model, open_recording
     from compd.errors import CompdError, Problem
 
     problems: list[Problem] = []
@@ -42,7 +41,7 @@ def compare(
     file: ModelFile | None = None
     for path in recordings:
         try:
-            aligned, _ = open_recording(path, machine)
+            aligned = open_recording(path, machine)
             file = open_model(model, aligned)
             found.append(compared(aligned, file.fitted, file.covariance))
         except CompdError as error:
@@ -61,23 +60,6 @@ def compare(
     print_comparisons(found)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
-
-
-def open_recording(path: Path, machine: Path | None) -> tuple[AlignedRecording, Configuration | None]:
-    """A recording on its machine. Raises RecordingError with every problem."""
-    from compd.cli.recording import read_with_machine
-    from compd.comparison.aligned_recording import align_recording
-
-    recording, configuration = read_with_machine(path, machine)
-    return align_recording(recording, configuration), configuration
-
-
-def open_model(path: Path | None, aligned: AlignedRecording) -> ModelFile:
-    """The model file, or the model without effects where none is named. Raises StateError."""
-    from compd.model_file import ModelFile, read_model_file
-
-    machine = aligned.recording.machine
-    return ModelFile(machine) if path is None else read_model_file(path, machine, aligned.rows.links)
 
 
 def write_page_to(path: Path) -> None:
@@ -111,12 +93,12 @@ def print_comparisons(found: list[Comparison]) -> None:
             console.print(f"[bold]{name_of(one)}[/]")
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
-        if not one.findings:
+        if not one.trends:
             console.print(f"Where it fails: {nothing_found(one)}.")
-        for finding in one.findings[:MOST_SENTENCES]:
-            console.print(f"  - {finding.text}")
-        if len(one.findings) > MOST_SENTENCES:
-            console.print(f"  and {len(one.findings) - MOST_SENTENCES} weaker ones (--json and --html have all)")
+        for trend in one.trends[:MOST_SENTENCES]:
+            console.print(f"  - {trend.text}")
+        if len(one.trends) > MOST_SENTENCES:
+            console.print(f"  and {len(one.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
         rows = one.aligned.recording.row[one.outlier].tolist()
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")

@@ -39,16 +39,17 @@ def diagnose(
     """Learn which physical effect is missing: the verdict, then the evidence, then what to measure next."""
     from rich.console import Console
 
-    from compd.cli.compare import open_model, open_recording, write_page_to
+    from compd.cli.compare import write_page_to
     from compd.cli.progress import steps_shown
+    from compd.comparison.open import open_model, open_recording
     from compd.diagnosis.diagnose import diagnose as diagnosed
     from compd.diagnosis.holdout import evaluate_holdout
     from compd.model.library import library
 
     if html is not None:
         write_page_to(html)
-    sealed = [open_recording(path, machine)[0] for path in recordings[1:]]
-    aligned, _ = open_recording(recordings[0], machine)
+    sealed = [open_recording(path, machine) for path in recordings[1:]]
+    aligned = open_recording(recordings[0], machine)
     file = open_model(model, aligned)
     effects = [*library().values()]
     with steps_shown(quiet=as_json) as progress:

@@ -11,7 +11,6 @@ import typer
 
 if TYPE_CHECKING:
     from compd.comparison.aligned_recording import AlignedRecording
-    from compd.configuration import Configuration
     from compd.diagnosis.model_changes import Change
     from compd.model.effect import Effect
     from compd.model_file import Declaration, ModelFile
@@ -33,12 +32,12 @@ def add(
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
-    from compd.cli.compare import open_recording
+    from compd.comparison.open import open_recording
     from compd.diagnosis.model_changes import add as added
 
     declared, found = declaration_of(effect)
-    aligned, configuration = open_recording(recording, machine)
-    file = _opened(model, aligned, configuration) if model.exists() else _begun(aligned, configuration)
+    aligned = open_recording(recording, machine)
+    file = _opened(model, aligned) if model.exists() else _begun(aligned)
     _finish(model, added(file, declared, found, aligned, _now()), f"added {found.id}", dry_run)
 
 
@@ -50,24 +49,22 @@ def remove(
     dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
-    from compd.cli.compare import open_recording
+    from compd.comparison.open import open_recording
     from compd.diagnosis.model_changes import remove as removed
 
-    aligned, configuration = open_recording(recording, machine)
-    _finish(
-        model, removed(_opened(model, aligned, configuration), effect, aligned, _now()), f"removed {effect}", dry_run
-    )
+    aligned = open_recording(recording, machine)
+    _finish(model, removed(_opened(model, aligned), effect, aligned, _now()), f"removed {effect}", dry_run)
 
 
 def fit(
     recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
 ) -> None:
     """Fit all effects of a model again, on another recording."""
-    from compd.cli.compare import open_recording
+    from compd.comparison.open import open_recording
     from compd.diagnosis.model_changes import refit
 
-    aligned, configuration = open_recording(recording, machine)
-    _finish(model, refit(_opened(model, aligned, configuration), aligned, _now()), "fitted again", dry_run)
+    aligned = open_recording(recording, machine)
+    _finish(model, refit(_opened(model, aligned), aligned, _now()), "fitted again", dry_run)
 
 
 def undo(model: ModelOption) -> None:
@@ -96,22 +93,18 @@ def declaration_of(text: str) -> tuple[Declaration, Effect]:
     return text, find(text, "compd effect add")
 
 
-def _opened(path: Path, aligned: AlignedRecording, configuration: Configuration | None) -> ModelFile:
+def _opened(path: Path, aligned: AlignedRecording) -> ModelFile:
     """All its numbers are about to be fitted again, on this geometry."""
     from compd.model_file import read_model_file
 
     file = read_model_file(path, aligned.recording.machine, aligned.rows.links)
-    return replace(file, geometry=_geometry(configuration))
+    return replace(file, geometry=aligned.geometry_hash)
 
 
-def _begun(aligned: AlignedRecording, configuration: Configuration | None) -> ModelFile:
+def _begun(aligned: AlignedRecording) -> ModelFile:
     from compd.model_file import ModelFile
 
-    return ModelFile(aligned.recording.machine, geometry=_geometry(configuration))
-
-
-def _geometry(configuration: Configuration | None) -> str:
-    return "" if configuration is None else configuration.geometry_hash
+    return ModelFile(aligned.recording.machine, geometry=aligned.geometry_hash)
 
 
 def _now() -> str:

@@ -28,8 +28,8 @@ def plan(
     speed: Annotated[float | None, typer.Option(min=0, help="Fastest in mm/s; as in the recording.")] = None,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
-    from compd.cli.compare import open_model, open_recording
     from compd.comparison.compare import compare
+    from compd.comparison.open import open_model, open_recording
     from compd.comparison.shape_search import search_constants
     from compd.diagnosis.measurement_programmes import recorded_limits
     from compd.diagnosis.next_measurement import plan_measurement
@@ -48,7 +48,7 @@ def plan(
             )
         )
     effects = [find(name, "--rivals") for name in names]
-    aligned, _ = open_recording(recording, machine)
+    aligned = open_recording(recording, machine)
     file = open_model(model, aligned)
     present = [one.effect.id for one in file.fitted if one.effect.id in names]
     if present:

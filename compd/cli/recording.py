@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from compd.configuration import Configuration
-    from compd.errors import Problem
     from compd.recording.recording import Recording
 
 recording = typer.Typer(no_args_is_help=True, help="Recordings: readings of the machine beside a reference.")
@@ -30,61 +27,13 @@ def check(
     ] = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
+    from compd.comparison.open import read_with_machine
+
     found, _ = read_with_machine(path, machine, needs_reference=False)
     for warning in found.warnings:
         typer.echo(f"warning: {warning}")
     for line in _summary(found):
         typer.echo(line)
-
-
-def read_with_machine(
-    path: Path, machine: Path | None, needs_reference: bool = True
-) -> tuple[Recording, Configuration | None]:
-    """The recording, and the configuration of its machine: the one given, else the shipped one of its name.
-
-    None for an external model. Raises RecordingError with the problems of both files and of the machine together.
-    """
-    from compd.errors import RecordingError
-    from compd.recording.reader import read_recording
-
-    problems: list[Problem] = []
-    configuration = _configuration(path.with_suffix(".yaml"), machine, problems)
-    try:
-        found = read_recording(path, configuration, needs_reference)
-    except RecordingError as error:
-        raise RecordingError([*problems, *error.problems]) from error
-    if problems:
-        raise RecordingError(problems)
-    return found, configuration
-
-
-def _configuration(sidecar_path: Path, machine: Path | None, problems: list[Problem]) -> Configuration | None:
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
-    from compd.errors import CompdError, Problem
-    from compd.recording.sidecar import EXTERNAL, read_sidecar
-
-    if machine is not None:
-        return load(machine)
-    reported_by_the_reader: list[Problem] = []
-    sidecar = read_sidecar(sidecar_path, reported_by_the_reader)
-    if sidecar is None or sidecar.machine in ("", EXTERNAL):
-        return None
-    # a name, not a path: `..` or `/` would leave the place where configurations are
-    name = sidecar.machine if re.fullmatch(r"[\w-]+", sidecar.machine) else "-"
-    try:
-        shipped = shipped_configuration(f"{name}.yaml")
-    except CompdError:
-        problems.append(
-            Problem(
-                where=str(sidecar_path),
-                what="no configuration of this machine comes with compd",
-                value=repr(sidecar.machine),
-                next_step="give it with --machine PATH, or mend `machine:` in the sidecar",
-            )
-        )
-        return None
-    return load(shipped)
 
 
 def _summary(found: Recording) -> list[str]:

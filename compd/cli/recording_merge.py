@@ -19,7 +19,7 @@ def merge(
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
     """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
-    from compd.cli.recording import read_with_machine
+    from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording.merge import ASSUMED_GAP_S
     from compd.recording.merge import merge as put_together

@@ -1,4 +1,4 @@
-"""A recording on its machine: what was measured beside what the model makes of the gauges, coordinate by coordinate."""
+"""A recording aligned with its machine: the measured coordinates beside the model's prediction from the gauges."""
 
 from __future__ import annotations
 
@@ -29,9 +29,12 @@ class AlignedRecording:
     """N rows with m measured coordinates each: x, y, z of the tip, or lengths of links.
 
     model : None for `machine: external`.
-    rows : all N rows, also those that are not used: effects with memory need their history.
-    labels : (m,) "x", "y", "z" or "link 1" ...; axes : (m,) 0, 1, 2 = x, y, z; or the links, from 0.
-    measured_mm : (N, m), in {M}; registration : how it was taken there, None where it came in {M}.
+    rows : the observations of all N rows, also of those that are not used: effects with memory need their history.
+    labels : (m,) "x", "y", "z" or "link 1" ...
+    axes : (m,) 0, 1, 2 = x, y, z; or the links, from 0.
+    measured_mm : (N, m) in {M}, or changes of link lengths.
+    registration : how measured_mm came into {M}; None where it was measured there.
+    geometry_hash : of the configuration that the model was built from, "" for `machine: external`.
     """
 
     recording: Recording
@@ -41,6 +44,7 @@ class AlignedRecording:
     axes: tuple[int, ...]
     measured_mm: FloatArray
     registration: Registration | None
+    geometry_hash: str = ""
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property
@@ -55,10 +59,13 @@ class AlignedRecording:
         return reference is not None and reference.frame == "instrument" and not self.of_links
 
     def predicted_mm(self, added: Deltas, rows: Observations | None = None) -> FloatArray:
-        """(N, m) what a reference shows when the effects add `added` at their ports; nan where there is no pose."""
+        """(N, m) prediction of the reference when effects add `added` at their ports; nan where there is no pose.
+
+        rows : other observations than the recording's own, None for those.
+        """
         rows = self.rows if rows is None else rows
         if self.model is None:
-            predicted = np.asarray(_external(self.recording))
+            predicted = np.asarray(_external_prediction(self.recording))
             return predicted if "reference" not in added else predicted + added["reference"][:, list(self.axes)]
         prediction = predict(self.model, rows, added)
         if self.of_links:
@@ -73,16 +80,16 @@ class AlignedRecording:
         return self._by_port
 
     def columns(self, effect: Effect, shape: Shape) -> FloatArray:
-        """(N, m, P) by how many mm each fitted number of the effect moves the prediction."""
+        """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
         if self.model is None:
             return np.asarray(basis[:, list(self.axes)])
-        found = columns(effect, self.rows, basis, self.sensitivity(effect.ports))
-        return (found.link_length if self.of_links else found.tip)[:, list(self.axes)]
+        derivatives = columns(effect, self.rows, basis, self.sensitivity(effect.ports))
+        return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
 
     @cached_property
     def registration_columns(self) -> FloatArray:
-        """(N, m, 6 or fewer; 0 for a reference in {M}) columns of the instrument's frame."""
+        """(N, m, 6 or fewer) derivatives (mm) by a motion of the instrument's frame; none for a reference in {M}."""
         if not self.registered:
             return np.zeros((*self.measured_mm.shape, 0))
         return registration_columns(self.rows.tip_M_mm, self.axes)
@@ -126,43 +133,51 @@ def align_recording(recording: Recording, configuration: Configuration | None) -
     where = str(recording.path)
     if recording.reference is None:
         raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
-    model = None
+    starts = _session_starts(recording)
     if configuration is None:
-        rows = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, _starts(recording))
+        model, geometry_hash = None, ""
+        observations = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, starts)
     else:
         model = build_model(configuration.geometry, configuration.wiring)
-        rows = _rows(recording, model)
-    measured = recording.reference_link_mm if recording.reference_link_mm is not None else recording.reference_mm
-    if measured is None:
-        raise RecordingError(Problem(where=where, what="has no column of the reference"))
+        geometry_hash = configuration.geometry_hash
+        observations = _observations(recording, model, starts)
     if recording.reference_link_mm is not None:
-        links = recording.reference_links
+        labels = tuple(f"link {i}" for i in recording.reference_links)
+        links = tuple(i - 1 for i in recording.reference_links)
         return AlignedRecording(
-            recording, model, rows, tuple(f"link {i}" for i in links), tuple(i - 1 for i in links), measured, None
+            recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
         )
+    measured_mm = recording.reference_mm
+    if measured_mm is None:
+        raise RecordingError(Problem(where=where, what="has no column of the reference"))
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
     registration = None
     # with fewer than three axes a frame cannot be laid over another: it must lie near already
     if recording.reference.frame == "instrument" and len(axes) == 3:
-        registration = register(np.where(recording.excluded[:, None], np.nan, measured), rows.tip_M_mm)
-        measured = measured if registration is None else registration.into_M(measured)
-    return AlignedRecording(recording, model, rows, recording.reference_axes, axes, measured, registration)
+        registration = register(np.where(recording.excluded[:, None], np.nan, measured_mm), observations.tip_M_mm)
+        measured_mm = measured_mm if registration is None else registration.into_M(measured_mm)
+    return AlignedRecording(
+        recording, model, observations, recording.reference_axes, axes, measured_mm, registration, geometry_hash
+    )
 
 
 def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
-    """What each effect adds at its ports, by id, and all together.
+    """What each effect adds at its ports, by the effect's id; and the sum over all effects.
 
     Raises CompdError with everything that the effects need and the recording has not.
     """
-    problems = [problem for one in fitted for problem in missing(one.effect, rows.available, rows.links)]
+    problems = [problem for effect in fitted for problem in missing(effect.effect, rows.available, rows.links)]
     if problems:
         raise CompdError(problems)
-    each, _ = deltas(fitted, rows, {})
-    return each, sum_deltas(list(each.values()))
+    by_effect, _ = deltas(fitted, rows, {})
+    return by_effect, sum_deltas(list(by_effect.values()))
 
 
-def _rows(recording: Recording, model: MachineModel) -> Observations:
-    """Every row of the recording as effects see it; comparators that were not recorded count as unmoved."""
+def _observations(recording: Recording, model: MachineModel, starts: BoolArray) -> Observations:
+    """Every row of the recording, as effects take it; comparators that were not recorded count as unmoved.
+
+    starts : (N,) rows without a history.
+    """
     assert model.constants is not None
     count = recording.rows
     scale_mm = recording.scale_mm
@@ -180,7 +195,7 @@ def _rows(recording: Recording, model: MachineModel) -> Observations:
     frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
-    velocity = velocities(recording.time_s, _starts(recording), at_point, scale_mm, joint_mm)
+    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm)
     movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
     return observe(
         model,
@@ -190,12 +205,12 @@ def _rows(recording: Recording, model: MachineModel) -> Observations:
         frame_mm=frame_mm,
         quantities=recording.quantities,
         time_s=recording.time_s,
-        session_start=_starts(recording),
+        session_start=starts,
         movement=movement,
     )
 
 
-def _starts(recording: Recording) -> BoolArray:
+def _session_starts(recording: Recording) -> BoolArray:
     """(N,) rows without a history: the first of each session."""
     starts = np.zeros(recording.rows, dtype=bool)
     starts[:1] = True
@@ -204,8 +219,8 @@ def _starts(recording: Recording) -> BoolArray:
     return starts
 
 
-def _external(recording: Recording) -> FloatArray:
-    """(N, m) the user's own model's prediction of what was measured."""
+def _external_prediction(recording: Recording) -> FloatArray:
+    """(N, m) what the user's own model predicts for each measured coordinate."""
     predicted = recording.model_mm if recording.model_link_mm is None else recording.model_link_mm
     if predicted is None:
         raise RecordingError(

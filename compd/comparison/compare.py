@@ -9,9 +9,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.stats import f as f_distribution
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.fit import frame_motion_um
@@ -25,20 +26,26 @@ from compd.model.effect import FittedEffect
 from compd.model.prediction import pull_back
 from compd.units import UM_PER_MM
 
-# A ratio beyond what chance makes of a model at the floor in 97.5 of 100 recordings is above the floor.
+# Noise makes the floor ratio of a complete model larger than this quantile in 2.5 of 100 recordings.
 CONFIDENCE = 0.975
 FEWEST_ROWS = 5
+# Outliers bend the fitted frame a little, and the frame decides which rows are outliers: two rounds settle it.
+FRAME_ROUNDS = 3
+# More than this times the scatter of repeats cannot come from the gauges; a half is left to chance.
+MOST_GAUGE_SHARE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One recording against one model. N rows, m coordinates; um.
+    """One recording of N rows with m measured coordinates against one model.
 
-    fitted : the model's effects.  residual_um : (N, m) measured - modelled, nan where a row cannot be used.
-    used : (N,) the rows that count.  outlier : (N,) rows beyond all noise.  left_out : reason -> rows.
-    floor : the noise floor.  uncertainty : of the prediction.  gauges : their noise, None for an external model.
-    sources : what each source contributes.  findings : where the model fails.
-    link_residual_um : (N, n) the residual as errors of link lengths, None where there are no links to blame.
+    aligned : the recording on its machine.  fitted : the model's effects.
+    residual_um : (N, m) measured - modelled, nan where a row cannot be used.
+    used : (N,) the rows that count.  outlier : (N,) rows whose residual no noise explains, not used.
+    left_out : reason -> number of rows that cannot be used.
+    floor : the noise floor.  uncertainty : of the prediction.  gauges : the gauges' noise, None for an external model.
+    contributions : by source.  trends : what the residual follows.
+    link_residual_um : (N, n) the residual as errors of link lengths, None where no link length can be inferred.
     attitude_residual_urad : (N, 3), None where no attitude was measured.
     """
 
@@ -51,36 +58,39 @@ class Comparison:
     floor: NoiseFloor
     uncertainty: Uncertainty
     gauges: GaugeNoise | None
-    sources: Mapping[str, Contribution]
-    findings: tuple[Trend, ...]
+    contributions: Mapping[str, Contribution]
+    trends: tuple[Trend, ...]
     link_residual_um: FloatArray | None
     attitude_residual_urad: FloatArray | None
 
     @cached_property
     def rms_by_axis_um(self) -> FloatArray:
-        """(m,)."""
+        """(m,) root mean square of each coordinate over the rows used."""
         return np.asarray(np.sqrt(np.mean(self.residual_um[self.used] ** 2, axis=0)))
 
     @property
     def rms_um(self) -> float:
-        """Per coordinate, over rows and axes."""
-        return float(np.sqrt(np.mean(self.rms_by_axis_um**2)))
+        """Root mean square per coordinate, over rows and axes."""
+        return rms(self.rms_by_axis_um)
 
     @cached_property
     def distance_um(self) -> FloatArray:
-        """(N,) length of the residual over all coordinates; of links, the largest."""
+        """(N,) length of the residual vector; of link lengths, the largest absolute residual."""
         if self.aligned.of_links:
             return np.asarray(np.abs(self.residual_um).max(axis=1))
         return np.asarray(np.linalg.norm(self.residual_um, axis=1))
 
     @property
     def floor_ratio(self) -> float:
-        """(rms / floor)^2: 1 at the floor, inf where the floor is nothing."""
+        """(rms / floor)^2, which is the reduced chi-squared: 1 at the noise floor; inf where the floor is 0."""
         return (self.rms_um / self.floor.um) ** 2 if self.floor.um > 0 else math.inf
 
     @property
     def at_floor(self) -> bool:
-        """Whether chance alone could have made the ratio as large as it is."""
+        """Whether noise alone could have made the floor ratio as large as it is.
+
+        F test: a ratio of two variances with as many degrees of freedom as measured values and as the floor rests on.
+        """
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
         return self.floor_ratio <= float(f_distribution.ppf(CONFIDENCE, numbers, dof))
@@ -106,11 +116,11 @@ class Comparison:
         size = np.abs(self.residual_um[self.used])
         distance = self.distance_um[self.used]
         excluded = recording.rows - int(self.used.sum()) + sum(recording.left_out.values())
-        found: dict[str, Any] = {
+        report: dict[str, Any] = {
             "recording": str(recording.path),
             "sha256": recording.sha256,
             "machine": recording.machine,
-            "effects": [one.effect.id for one in self.fitted],
+            "effects": [effect.effect.id for effect in self.fitted],
             "axes": list(self.aligned.labels),
             "residual_rms_um": self.rms_um,
             "residual_rms_xyz_um": self._by_axis(self.rms_by_axis_um),
@@ -118,7 +128,7 @@ class Comparison:
             "residual_p95_xyz_um": self._by_axis(np.quantile(size, 0.95, axis=0)),
             "residual_max_xyz_um": self._by_axis(size.max(axis=0)),
             "residual_3d_um": {
-                "rms": float(np.sqrt(np.mean(distance**2))),
+                "rms": rms(distance),
                 "p95": float(np.quantile(distance, 0.95)),
                 "max": float(distance.max()),
             },
@@ -130,41 +140,41 @@ class Comparison:
             "at_floor": self.at_floor,
             "rows_used": int(self.used.sum()),
             "rows_excluded": excluded,
-            "excluded_by_reason": {**self.left_out, **self._outliers_counted()},
+            "excluded_by_reason": {**self.left_out, **self._outlier_count()},
             "outlier_rows": recording.row[self.outlier].tolist(),
-            "contributions": {name: one._asdict() for name, one in self.sources.items()},
+            "contributions": {source: part._asdict() for source, part in self.contributions.items()},
             "prediction_std_um": {
-                "total": _typical(self.uncertainty.total_um[self.used]),
-                "gauges": _typical(self.uncertainty.gauges_um[self.used]),
-                "parameters": _typical(self.uncertainty.parameters_um[self.used]),
+                "total": rms(self.uncertainty.total_um[self.used]),
+                "gauges": rms(self.uncertainty.gauges_um[self.used]),
+                "parameters": rms(self.uncertainty.parameters_um[self.used]),
                 "how": "no gauges of its own" if self.gauges is None else self.gauges.how,
             },
-            "where_it_fails": [finding.as_json() for finding in self.findings],
+            "where_it_fails": [trend.as_json() for trend in self.trends],
             "verdict": self.verdict,
         }
         if self.aligned.registered:
-            found["registration"] = self._registration()
+            report["registration"] = self._registration()
         if self.attitude_residual_urad is not None:
-            turned = self.attitude_residual_urad[self.used]
-            found["attitude_rms_urad"] = float(np.sqrt(np.nanmean(turned**2)))
-        finite: dict[str, Any] = nan_to_null(found)
+            attitude_urad = self.attitude_residual_urad[self.used]
+            report["attitude_rms_urad"] = float(np.sqrt(np.nanmean(attitude_urad**2)))
+        finite: dict[str, Any] = nan_to_null(report)
         return finite
 
     def _by_axis(self, values: FloatArray) -> dict[str, float]:
         return {label: float(value) for label, value in zip(self.aligned.labels, values, strict=True)}
 
-    def _outliers_counted(self) -> dict[str, int]:
+    def _outlier_count(self) -> dict[str, int]:
         count = int(self.outlier.sum())
         return {"beyond all noise": count} if count else {}
 
     def _registration(self) -> dict[str, Any]:
-        laid = self.aligned.registration
-        if laid is None:
+        registration = self.aligned.registration
+        if registration is None:
             return {"how": "displacements and small rotations fitted along"}
         return {
             "how": "laid over the prediction, six parameters fitted along",
-            "translation_mm": laid.translation_mm.tolist(),
-            "rotation": laid.rotation.tolist(),
+            "translation_mm": registration.translation_mm.tolist(),
+            "rotation": registration.rotation.tolist(),
         }
 
 
@@ -173,29 +183,15 @@ def compare(
 ) -> Comparison:
     """Compare a recording with the model and its effects; nothing of the model is fitted here.
 
-    covariance : (P, P) of the effects' numbers jointly; where None, from each effect's own.
+    covariance : (P, P) of the effects' parameters jointly; where None, from each effect's own.
     Raises CompdError where an effect needs what the recording has not, RecordingError where too few rows are usable.
     """
-    by_effect, added = effect_deltas(fitted, aligned.rows)
-    usable, left = aligned.usable
-    predicted_mm = aligned.predicted_mm(added)
-    known = usable & np.isfinite(predicted_mm).all(axis=1)
-    left_out = dict(left)
-    if (usable & ~known).any():
-        left_out["a quantity that an effect needs is empty"] = int((usable & ~known).sum())
-    if known.sum() < FEWEST_ROWS:
-        raise RecordingError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="too few rows can be compared",
-                value=str(int(known.sum())),
-                allowed=f"{FEWEST_ROWS} or more",
-                next_step="; ".join(f"{n} rows: {why}" for why, n in left_out.items()),
-            )
-        )
+    by_effect, total = effect_deltas(fitted, aligned.rows)
+    predicted_mm = aligned.predicted_mm(total)
+    known, left_out = _known_rows(aligned, predicted_mm)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
     residual_um[~known] = np.nan
-    residual_um, outlier = _without_frame(aligned, residual_um, known)
+    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known)
     used = known & ~outlier
     gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance)
     floor = noise_floor(
@@ -210,37 +206,56 @@ def compare(
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
         links_um = pull_back(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
         links_um[~known] = np.nan
-    turned = aligned.attitude_residual_urad(added)
     return Comparison(
-        aligned,
-        tuple(fitted),
-        residual_um,
-        used,
-        outlier,
-        left_out,
-        floor,
-        uncertainty,
-        gauges,
-        contributions(aligned, by_effect, used),
-        find_trends(aligned, residual_um, links_um, used, floor),
-        links_um,
-        turned,
+        aligned=aligned,
+        fitted=tuple(fitted),
+        residual_um=residual_um,
+        used=used,
+        outlier=outlier,
+        left_out=left_out,
+        floor=floor,
+        uncertainty=uncertainty,
+        gauges=gauges,
+        contributions=contributions(aligned, by_effect, used),
+        trends=find_trends(aligned, residual_um, links_um, used, floor),
+        link_residual_um=links_um,
+        attitude_residual_urad=aligned.attitude_residual_urad(total),
     )
 
 
-def _without_frame(
+def _known_rows(aligned: AlignedRecording, predicted_mm: FloatArray) -> tuple[BoolArray, dict[str, int]]:
+    """(N,) rows with a measured and a predicted value; and reason -> number of the other rows."""
+    usable, left_out = aligned.usable
+    known = usable & np.isfinite(predicted_mm).all(axis=1)
+    left_out = dict(left_out)
+    if (usable & ~known).any():
+        left_out["a quantity that an effect needs is empty"] = int((usable & ~known).sum())
+    if known.sum() < FEWEST_ROWS:
+        raise RecordingError(
+            Problem(
+                where=str(aligned.recording.path),
+                what="too few rows can be compared",
+                value=str(int(known.sum())),
+                allowed=f"{FEWEST_ROWS} or more",
+                next_step="; ".join(f"{count} rows: {reason}" for reason, count in left_out.items()),
+            )
+        )
+    return known, left_out
+
+
+def _remove_frame_motion(
     aligned: AlignedRecording, residual_um: FloatArray, known: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """The residual without what the instrument's frame explains, and the rows beyond all noise."""
+    """The residual (N, m) without what a motion of the instrument's frame explains, and the outliers (N,)."""
     outlier = np.zeros(len(known), dtype=bool)
-    left_um = residual_um
-    for _ in range(3):  # a gross row bends the frame a little, and the frame decides which row is gross
-        left_um = residual_um - frame_motion_um(aligned, residual_um, known & ~outlier)
-        found = outlier_rows(left_um, known, aligned.recording.visit)
-        if (found == outlier).all():
+    rest_um = residual_um
+    for _ in range(FRAME_ROUNDS):
+        rest_um = residual_um - frame_motion_um(aligned, residual_um, known & ~outlier)
+        new_outlier = outlier_rows(rest_um, known, aligned.recording.visit)
+        if (new_outlier == outlier).all():
             break
-        outlier = found
-    return left_um, outlier
+        outlier = new_outlier
+    return rest_um, outlier
 
 
 def _uncertainty(
@@ -250,36 +265,24 @@ def _uncertainty(
     fitted: Sequence[FittedEffect],
     covariance: FloatArray | None,
 ) -> tuple[GaugeNoise | None, Uncertainty]:
-    """The gauges' noise and the prediction's uncertainty."""
-    joint = _blocks([one.covariance for one in fitted]) if covariance is None else covariance
+    """The gauges' noise, None for an external model, and the prediction's uncertainty."""
+    if covariance is None:
+        covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
-        return None, first_order(aligned, None, fitted, joint)
+        return None, first_order(aligned, None, fitted, covariance)
     gauges = gauge_noise(aligned)
-    found = first_order(aligned, gauges, fitted, joint)
+    uncertainty = first_order(aligned, gauges, fitted, covariance)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
-    # what the gauges' scatter alone would do to the residual cannot be more than the residual's own scatter
-    if repeats is not None and (np.sqrt(np.mean(found.gauges_um[used] ** 2, axis=0)) > 1.5 * repeats.by_axis_um).any():
-        gauges = gauge_noise(aligned, from_repeats=False)
-        found = first_order(aligned, gauges, fitted, joint)
-    return gauges, found
+    if repeats is not None:
+        gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
+        # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter
+        if (gauges_um > MOST_GAUGE_SHARE * repeats.by_axis_um).any():
+            gauges = gauge_noise(aligned, from_repeats=False)
+            uncertainty = first_order(aligned, gauges, fitted, covariance)
+    return gauges, uncertainty
 
 
 def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:
-    """What rows can be neighbours in: time, place, everything measured."""
-    place = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
-    return (aligned.recording.time_s, *place, *aligned.recording.quantities.values())
-
-
-def _blocks(parts: Sequence[FloatArray]) -> FloatArray:
-    """Block-diagonal."""
-    size = sum(len(part) for part in parts)
-    found = np.zeros((size, size))
-    begin = 0
-    for part in parts:
-        found[begin : begin + len(part), begin : begin + len(part)] = part
-        begin += len(part)
-    return found
-
-
-def _typical(values_um: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values_um**2)))
+    """Quantities (N,) in whose order rows are neighbours: time, place, everything measured."""
+    places = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
+    return (aligned.recording.time_s, *places, *aligned.recording.quantities.values())

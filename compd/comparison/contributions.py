@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import BoolArray
+from compd.arrays import BoolArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import frame_motion_um
 from compd.model.effect import Deltas, sum_deltas
@@ -15,7 +15,7 @@ from compd.units import UM_PER_MM
 
 
 class Contribution(NamedTuple):
-    """Per coordinate, rms in um: what the source moves the prediction by, and the residual without it."""
+    """Per coordinate, rms in um: by how much the source moves the prediction, and the residual without the source."""
 
     share_rms_um: float
     without_rms_um: float
@@ -24,29 +24,26 @@ class Contribution(NamedTuple):
 def contributions(
     aligned: AlignedRecording, by_effect: Mapping[str, Deltas], used: BoolArray
 ) -> dict[str, Contribution]:
-    """By source: "joints" and "frame" where they were recorded, then each effect by its id.
+    """The contribution of each source: "joints" and "frame" where they were recorded, then each effect by its id.
 
     by_effect : what each effect adds at its ports.  used : (N,) the rows that count.
-    Where the instrument's frame is fitted, it is fitted anew without each source.
+    A source is switched off by predicting again without it: comparators as if unmoved, the effect left out of the sum.
+    Where the instrument's frame is fitted, it is fitted anew without each source, as a user without it would have done.
     """
-    whole = sum_deltas(list(by_effect.values()))
-    predicted_mm = aligned.predicted_mm(whole)
-    off: dict[str, Deltas] = {}
+    total = sum_deltas(list(by_effect.values()))
+    predicted_mm = aligned.predicted_mm(total)
+    without_source: dict[str, Deltas] = {}
     if aligned.model is not None and aligned.recording.joint_mm is not None:
-        off["joints"] = {**whole, "joint": -aligned.rows.joint_mm}
+        without_source["joints"] = {**total, "joint": -aligned.rows.joint_mm}
     if aligned.model is not None and aligned.recording.frame_mm is not None:
-        off["frame"] = {**whole, "frame": -aligned.rows.frame_mm}
+        without_source["frame"] = {**total, "frame": -aligned.rows.frame_mm}
     for name in by_effect:
-        off[name] = sum_deltas([added for other, added in by_effect.items() if other != name])
-    found: dict[str, Contribution] = {}
-    for name, added in off.items():
+        without_source[name] = sum_deltas([added for other, added in by_effect.items() if other != name])
+    result: dict[str, Contribution] = {}
+    for name, added in without_source.items():
         without_mm = aligned.predicted_mm(added)
-        good = used & np.isfinite(without_mm).all(axis=1)
+        rows = used & np.isfinite(without_mm).all(axis=1)
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
-        residual_um = residual_um - frame_motion_um(aligned, residual_um, good)
-        found[name] = Contribution(_rms(((predicted_mm - without_mm) * UM_PER_MM)[good]), _rms(residual_um[good]))
-    return found
-
-
-def _rms(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+        residual_um = residual_um - frame_motion_um(aligned, residual_um, rows)
+        result[name] = Contribution(rms(((predicted_mm - without_mm) * UM_PER_MM)[rows]), rms(residual_um[rows]))
+    return result

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.cluster_covariance import cluster_covariance, neighbour_blocks
 from compd.comparison.least_squares import solve_least_squares
@@ -69,7 +69,7 @@ class FitResult:
     @property
     def rms_um(self) -> float:
         """Root mean square residual per coordinate, over the rows used."""
-        return float(np.sqrt(np.mean(self.residual_um[self.used] ** 2)))
+        return rms(self.residual_um[self.used])
 
 
 def initial_effect(effect: Effect, shape: Shape, links: int) -> FittedEffect:
@@ -185,11 +185,7 @@ def _gauss_newton(
         weights = np.repeat(huber_weights(whitened), len(sigma_um))
         step = solve_least_squares(G, whitened.ravel(), weights)
         theta, registration = theta + step[:P], registration + step[P:]
-        change_um = _rms(G_um[use] @ step)
-        if change_um <= CONVERGED * max(_rms(residual_um[use]), LEAST_RMS_UM):
+        change_um = rms(G_um[use] @ step)
+        if change_um <= CONVERGED * max(rms(residual_um[use]), LEAST_RMS_UM):
             break
     return theta, registration, residual_um
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

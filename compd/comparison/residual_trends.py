@@ -1,31 +1,45 @@
-"""Where the model fails, in words with numbers: what the residual follows, and in which part of the workspace."""
+"""Trends: what each coordinate of a residual follows, in words with numbers, and where it is largest.
+
+For every coordinate y and covariate x a straight line y - mean(y) = b (x - mean(x)) is fitted by least squares. The t
+statistic b / std(b) has the cluster-robust standard error of `cluster_std` (neighbouring rows are not independent) and
+Student's t distribution with one degree of freedom less than there are blocks. Its two-sided p-value times the number
+of tests (coordinates times covariates; Bonferroni) is the trend's p-value. Per coordinate the covariate that explains
+most is taken first, its line is subtracted, and the rest is searched once more (forward selection). A first look at
+straight lines only: proof is the task of a diagnosis.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as t_distribution
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.cluster_covariance import neighbour_blocks
+from compd.comparison.cluster_covariance import cluster_std, neighbour_blocks
+from compd.comparison.covariates import Covariate, covariates
 from compd.comparison.noise_floor import NoiseFloor
-from compd.units import unit_of
 
-# Below this share of a coordinate's variation, or this chance after correction for the number of looks, say nothing.
+# A trend that explains less of a coordinate's variation than this is not worth a sentence.
 LEAST_EXPLAINED = 0.05
-CHANCE = 0.01
-# A coordinate whose mean square is within this factor of the floor has nothing to explain.
+# Significance: the largest p-value of a trend, after correction for the number of tests.
+SIGNIFICANCE = 0.01
+# A coordinate whose mean square is within this factor of the floor's has nothing to explain.
 QUIET = 1.2
-# Two covariates this much alike cannot be told apart: both are named.
-ALIKE = 0.95
-# A part of the workspace in which the error is this much larger is worth naming.
+# Covariates whose correlation is above this cannot be told apart: all of them are named.
+COLLINEAR = 0.95
+# A part of the workspace in which the error is this many times larger than at the other end is worth naming.
 MUCH_LARGER = 1.4
+# Trends per coordinate, and collinear covariates per trend: more are noise in a report.
 PER_COORDINATE = 2
+MOST_COLLINEAR = 4
+# More rows would not change what the sentences say.
 ROWS = 10_000
+# A line through fewer rows, and a comparison of the workspace's ends with fewer, says nothing.
+FEWEST_ROWS = 10
+FEWEST_ROWS_OF_ENDS = 30
 ENDS = {
     "x": ("towards -x", "towards +x"),
     "y": ("towards -y", "towards +y"),
@@ -34,25 +48,17 @@ ENDS = {
 }
 
 
-class Covariate(NamedTuple):
-    """Something that the residual may follow: values (N,), nan where unknown; a direction is -1 or +1.
-
-    link : the link it belongs to, counted from 1, 0 for none.
-    """
-
-    name: str
-    unit: str
-    values: FloatArray
-    link: int = 0
-
-
 @dataclass(frozen=True)
 class Trend:
     """One thing that one coordinate of the residual follows.
 
-    coordinate : "x" or "link 2".  covariate : what it follows; None for a constant offset.
-    slope : um per unit; of a direction, the jump in um; of an offset, um.  explained : share of the variation, 0 to 1.
-    alike : other covariates that say the same on these rows.  largest : where the error is largest, "" for everywhere.
+    coordinate : "x" or "link 2".
+    covariate : what it follows; None for a constant offset.  unit : the covariate's.
+    slope : um per unit; of a direction, the jump in um; of an offset, um.
+    explained : share of the coordinate's variation, 0 to 1 (R^2; of an offset, of its mean square).
+    p_value : probability of so strong a trend by noise alone, corrected for the number of tests.
+    collinear : other covariates that changed in the same way on these rows.
+    largest_at : where the error is largest, "" where it is about the same everywhere.
     """
 
     coordinate: str
@@ -60,24 +66,24 @@ class Trend:
     unit: str
     slope: float
     explained: float
-    p_adjusted: float
-    alike: tuple[str, ...] = ()
-    largest: str = ""
+    p_value: float
+    collinear: tuple[str, ...] = ()
+    largest_at: str = ""
 
     @property
     def text(self) -> str:
         """A sentence for a person."""
         if self.covariate is None:
-            said = f"{self.coordinate} is off by {self.slope:+.2g} um everywhere"
+            sentence = f"{self.coordinate} is off by {self.slope:+.2g} um everywhere"
         elif self.covariate.startswith("direction"):
-            said = f"{self.coordinate} error jumps by {self.slope:+.2g} um with the {self.covariate}"
+            sentence = f"{self.coordinate} error jumps by {self.slope:+.2g} um with the {self.covariate}"
         else:
-            said = f"{self.coordinate} error follows {self.covariate}, {self.slope:+.2g} um/{self.unit}"
+            sentence = f"{self.coordinate} error follows {self.covariate}, {self.slope:+.2g} um/{self.unit}"
         if self.covariate is not None:
-            said += f" ({100 * self.explained:.0f} % of its variation)"
-        if self.alike:
-            said += f"; {', '.join(self.alike)} went the same way"
-        return said + (f", and is largest {self.largest}" if self.largest else "")
+            sentence += f" ({100 * self.explained:.0f} % of its variation)"
+        if self.collinear:
+            sentence += f"; {', '.join(self.collinear)} went the same way"
+        return sentence + (f", and is largest {self.largest_at}" if self.largest_at else "")
 
     def as_json(self) -> dict[str, Any]:
         """Numbers beside the sentence."""
@@ -87,203 +93,167 @@ class Trend:
             "slope_um_per_unit": self.slope,
             "unit": self.unit,
             "explained_fraction": self.explained,
-            "p_adjusted": self.p_adjusted,
-            "alike": list(self.alike),
-            "largest": self.largest,
+            "p_adjusted": self.p_value,
+            "alike": list(self.collinear),
+            "largest": self.largest_at,
             "text": self.text,
         }
-
-
-def covariates(aligned: AlignedRecording) -> list[Covariate]:
-    """Time, place, every measured quantity, and each link's length and direction."""
-    recording = aligned.recording
-    found = [Covariate("time", "h", recording.time_s / 3600.0)]
-    for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
-        if np.isfinite(column).any():
-            found.append(Covariate(axis, "mm", column))
-    for name, column in recording.quantities.items():
-        unit = unit_of(name)
-        found.append(Covariate(name.removesuffix(f"_{unit}"), _shown(unit), column, _link_of(name)))
-    for top in [name for name in recording.quantities if name.endswith("_top_degC")]:
-        bottom = top.replace("_top_", "_bottom_")
-        if bottom in recording.quantities:
-            name = f"{top.removesuffix('_degC')} - {bottom.removesuffix('_degC')}"
-            found.append(Covariate(name, "K", recording.quantities[top] - recording.quantities[bottom]))
-    for i, length in enumerate(aligned.rows.link_mm.T, start=1):
-        found.append(Covariate(f"length of link {i}", "mm", length, i))
-    if recording.approach is not None:
-        for i, direction in enumerate(recording.approach.T, start=1):
-            found.append(Covariate(f"direction of link {i}", "1", direction, i))
-    return found
 
 
 def find_trends(
     aligned: AlignedRecording, residual_um: FloatArray, links_um: FloatArray | None, used: BoolArray, floor: NoiseFloor
 ) -> tuple[Trend, ...]:
-    """What each coordinate of the residual follows, the strongest first; nothing where it is at the floor.
+    """The trends of all coordinates, the one that explains most (in um^2) first.
 
-    residual_um : (N, m).  links_um : (N, n), the same as errors of link lengths, or None.
-    One coordinate at a time, straight lines only, tested on blocks of neighbouring rows: a first look, not a proof.
+    residual_um : (N, m).  links_um : (N, n) the same as errors of link lengths, or None.  used : (N,) rows that count.
+    A coordinate at the noise floor has none. A link is named only for what it shows more clearly than the tip does.
     """
     used = _thinned(used)
     coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(aligned.labels)]
     if links_um is not None:
-        # noise at the tip, seen through the same Jacobian as the residual, is as much smaller at the links
-        share = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(
-            float(np.sqrt(np.mean(residual_um[used] ** 2))), 1e-12
-        )
-        coordinates += [(f"link {i + 1}", column, float(share[i] * floor.um)) for i, column in enumerate(links_um.T)]
+        # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
+        ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used]), 1e-12)
+        coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
     all_covariates = covariates(aligned)
-    group = neighbour_blocks(aligned.recording)
-    looks = len(coordinates) * len(all_covariates)
-    found: list[tuple[float, Trend]] = []
+    block = neighbour_blocks(aligned.recording)
+    tests = len(coordinates) * len(all_covariates)
+    trends: list[tuple[float, Trend]] = []
     for label, values, floor_um in coordinates:
         if np.mean(values[used] ** 2) <= QUIET * floor_um**2:
             continue
-        own = int(label.removeprefix("link ")) if label.startswith("link") else 0
-        candidates = [one for one in all_covariates if not own or one.link in (0, own)]
-        found += _follow(label, values, used, candidates, group, looks, _largest(aligned, values, used))
-    found.sort(key=lambda pair: -pair[0])
-    return _clearest([finding for _, finding in found])
+        link = int(label.removeprefix("link ")) if label.startswith("link") else 0
+        candidates = [covariate for covariate in all_covariates if not link or covariate.link in (0, link)]
+        largest_at = _largest_at(aligned, values, used)
+        trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at)
+    trends.sort(key=lambda pair: -pair[0])
+    return _without_weaker_links([trend for _, trend in trends])
 
 
 def _thinned(used: BoolArray) -> BoolArray:
-    """At most ROWS of the rows, evenly spread: more would not change what is said."""
+    """At most ROWS of the rows, evenly spread."""
     rows = np.flatnonzero(used)
     chosen = np.zeros_like(used)
     chosen[rows[np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(np.int64)]] = True
     return chosen
 
 
-def _clearest(found: list[Trend]) -> tuple[Trend, ...]:
-    """A link is named only for what it shows more clearly than the tip does."""
+def _without_weaker_links(trends: list[Trend]) -> tuple[Trend, ...]:
+    """The trends without those of links that follow what a coordinate of the tip follows more clearly."""
     at_tip: dict[str | None, float] = {}
-    for one in found:
-        if not one.coordinate.startswith("link"):
-            at_tip[one.covariate] = max(one.explained, at_tip.get(one.covariate, 0.0))
+    for trend in trends:
+        if not trend.coordinate.startswith("link"):
+            at_tip[trend.covariate] = max(trend.explained, at_tip.get(trend.covariate, 0.0))
     return tuple(
-        one for one in found if not one.coordinate.startswith("link") or one.explained > at_tip.get(one.covariate, 0.0)
+        trend
+        for trend in trends
+        if not trend.coordinate.startswith("link") or trend.explained > at_tip.get(trend.covariate, 0.0)
     )
 
 
-def _follow(
+def _coordinate_trends(
     label: str,
     values: FloatArray,
     used: BoolArray,
     candidates: list[Covariate],
-    group: IntArray,
-    looks: int,
-    largest: str,
+    block: IntArray,
+    tests: int,
+    largest_at: str,
 ) -> list[tuple[float, Trend]]:
-    """One coordinate: what it follows, then what the rest follows; each with the squares (um^2) that it explains."""
-    found: list[tuple[float, Trend]] = []
-    mean = float(values[used].mean())
+    """One coordinate's offset and trends, each with the squares (um^2) that it explains.
+
+    values : (N,) um.  block : (N,).  tests : how many lines are tried in all.
+    """
+    trends: list[tuple[float, Trend]] = []
+    mean, mean_square = float(values[used].mean()), float(np.mean(values[used] ** 2))
     rest = values - mean
-    std = _mean_std(rest[used], group[used])
-    p = _chance(mean / std, len(np.unique(group[used])), looks) if std > 0 else 1.0
-    if p < CHANCE and mean**2 > LEAST_EXPLAINED * float(np.mean(values[used] ** 2)):
-        explained = mean**2 / float(np.mean(values[used] ** 2))
-        found.append((mean**2, Trend(label, None, "", mean, explained, p)))
+    count = int(used.sum())
+    std = cluster_std(np.ones(count), rest[used], block[used], dof=count)
+    p = _p_value(mean / std, len(np.unique(block[used])), tests) if std > 0 else 1.0
+    if p < SIGNIFICANCE and mean**2 > LEAST_EXPLAINED * mean_square:
+        trends.append((mean**2, Trend(label, None, "", mean, mean**2 / mean_square, p)))
     total = float(np.mean(rest[used] ** 2))
     for _ in range(PER_COORDINATE):
-        best = max((_line(one, rest, used, group) for one in candidates), key=lambda line: line.explained, default=None)
-        if best is None or best.explained * float(np.mean(rest[used] ** 2)) < LEAST_EXPLAINED * total:
+        lines = [_fit_line(covariate, rest, used, block) for covariate in candidates]
+        best = max(lines, key=lambda line: line.explained, default=None)
+        left = float(np.mean(rest[used] ** 2))
+        if best is None or best.explained * left < LEAST_EXPLAINED * total:
             break
-        p = _chance(best.t, best.blocks, looks)
-        if p >= CHANCE:
+        p = _p_value(best.t, best.clusters, tests)
+        if p >= SIGNIFICANCE:
             break
-        of_all = best.explained * float(np.mean(rest[used] ** 2)) / total
-        one = best.covariate
-        slope = 2 * best.slope if one.name.startswith("direction") else best.slope
-        alike = tuple(other.name for other in candidates if other is not one and _likeness(one, other, used) > ALIKE)
-        found.append((of_all * total, Trend(label, one.name, one.unit, slope, of_all, p, alike[:4], largest)))
-        largest = ""  # once per coordinate is enough
-        rest = rest - best.slope * (np.nan_to_num(one.values - np.nanmean(one.values[used])))
-    return found
+        explained = best.explained * left / total
+        covariate = best.covariate
+        slope = 2 * best.slope if covariate.name.startswith("direction") else best.slope
+        collinear = tuple(
+            other.name
+            for other in candidates
+            if other is not covariate and _correlation(covariate, other, used) > COLLINEAR
+        )[:MOST_COLLINEAR]
+        trend = Trend(label, covariate.name, covariate.unit, slope, explained, p, collinear, largest_at)
+        trends.append((explained * total, trend))
+        largest_at = ""  # once per coordinate is enough
+        rest = rest - best.slope * np.nan_to_num(covariate.values - np.nanmean(covariate.values[used]))
+    return trends
 
 
-class _Line(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A straight line through a residual: slope in um per unit, R^2, t statistic, blocks that it rests on."""
+
     covariate: Covariate
-    slope: float
-    explained: float
-    t: float
-    blocks: int
+    slope: float = 0.0
+    explained: float = 0.0
+    t: float = 0.0
+    clusters: int = 0
 
 
-def _line(one: Covariate, values: FloatArray, used: BoolArray, group: IntArray) -> _Line:
-    """Straight line through the rows that have the covariate; t from sums over blocks of neighbouring rows."""
-    rows = used & np.isfinite(one.values)
-    nothing = _Line(one, 0.0, 0.0, 0.0, 0)
-    if rows.sum() < 10:
-        return nothing
-    x = one.values[rows] - one.values[rows].mean()
+def _fit_line(covariate: Covariate, values: FloatArray, used: BoolArray, block: IntArray) -> _Line:
+    """The line through the used rows that have the covariate; slope 0 where it hardly changes or few rows have it."""
+    rows = used & np.isfinite(covariate.values)
+    if rows.sum() < FEWEST_ROWS:
+        return _Line(covariate)
+    x = covariate.values[rows] - covariate.values[rows].mean()
     y = values[rows] - values[rows].mean()
     squares = float(x @ x)
     spread = float(np.sqrt(squares / len(x)))
-    if spread < 1e-9 * max(1.0, float(np.abs(one.values[rows]).max())):
-        return nothing
+    if spread < 1e-9 * max(1.0, float(np.abs(covariate.values[rows]).max())):
+        return _Line(covariate)
     slope = float(x @ y) / squares
-    left = y - slope * x
-    explained = 1.0 - float(left @ left) / max(float(y @ y), 1e-300)
-    sums = np.bincount(group[rows], x * left)
-    blocks = len(np.unique(group[rows]))
-    naive = float(left @ left) / max(len(x) - 2, 1) / squares
-    clustered = float(sums @ sums) / squares**2 * blocks / max(blocks - 1, 1)
-    std = np.sqrt(max(naive, clustered))
-    return _Line(one, slope, explained, slope / std if std > 0 else np.inf, blocks)
+    residual = y - slope * x
+    explained = 1.0 - float(residual @ residual) / max(float(y @ y), 1e-300)
+    std = cluster_std(x, residual, block[rows], dof=max(len(x) - 2, 1))
+    t = slope / std if std > 0 else np.inf
+    return _Line(covariate, slope, explained, t, len(np.unique(block[rows])))
 
 
-def _mean_std(rest: FloatArray, group: IntArray) -> float:
-    """Standard error of the mean, from sums over blocks."""
-    sums = np.bincount(group, rest)
-    blocks = max(len(np.unique(group)), 2)
-    naive = float(np.mean(rest**2)) / len(rest)
-    clustered = float(sums @ sums) / len(rest) ** 2 * blocks / (blocks - 1)
-    return float(np.sqrt(max(naive, clustered)))
+def _p_value(t: float, clusters: int, tests: int) -> float:
+    """Two-sided p-value of a t statistic on so many blocks, times the number of tests (Bonferroni), at most 1."""
+    return float(min(1.0, 2.0 * t_distribution.sf(abs(t), max(clusters - 1, 1)) * tests))
 
 
-def _chance(t: float, blocks: int, looks: int) -> float:
-    """Chance of so large a t by noise alone, in so many looks (Bonferroni)."""
-    return float(min(1.0, 2.0 * t_distribution.sf(abs(t), max(blocks - 1, 1)) * looks))
-
-
-def _likeness(one: Covariate, other: Covariate, used: BoolArray) -> float:
-    """Correlation of two covariates, 0 to 1."""
-    rows = used & np.isfinite(one.values) & np.isfinite(other.values)
-    a, b = one.values[rows], other.values[rows]
-    if len(a) < 10 or np.ptp(a) == 0 or np.ptp(b) == 0:
+def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> float:
+    """Absolute correlation of two covariates, 0 to 1; 0 where one of them does not change."""
+    rows = used & np.isfinite(covariate.values) & np.isfinite(other.values)
+    a, b = covariate.values[rows], other.values[rows]
+    if len(a) < FEWEST_ROWS or np.ptp(a) == 0 or np.ptp(b) == 0:
         return 0.0
     return float(abs(np.corrcoef(a, b)[0, 1]))
 
 
-def _largest(aligned: AlignedRecording, values: FloatArray, used: BoolArray) -> str:
-    """The end of the workspace, or of the recording, at which the error is much larger than at the other end."""
-    best, said = MUCH_LARGER, ""
+def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray) -> str:
+    """The third of the workspace, or of the recording, in which the error is much larger than in the opposite third."""
+    largest, text = MUCH_LARGER, ""
     places = {"time": aligned.recording.time_s}
     places |= dict(zip("xyz", aligned.rows.tip_M_mm.T, strict=True))
     for name, place in places.items():
         rows = used & np.isfinite(place)
-        if rows.sum() < 30 or np.ptp(place[rows]) == 0:
+        if rows.sum() < FEWEST_ROWS_OF_ENDS or np.ptp(place[rows]) == 0:
             continue
         low, high = np.quantile(place[rows], [1 / 3, 2 / 3])
-        ends = [rows & (place <= low), rows & (place >= high)]
-        size = [float(np.sqrt(np.mean(values[end] ** 2))) for end in ends]
-        for k in range(2):
-            if size[k] > best * max(size[1 - k], 1e-12):
-                best = size[k] / max(size[1 - k], 1e-12)
-                said = f"{ENDS[name][k]} ({size[k]:.2g} um rms, {size[1 - k]:.2g} um at the other end)"
-    return said
-
-
-def _link_of(name: str) -> int:
-    """The link that a quantity belongs to, by its name; 0 for none."""
-    parts = name.split("_")
-    for before, number in pairwise(parts):
-        if before == "link" and number.isdigit():
-            return int(number)
-    return 0
-
-
-def _shown(unit: str) -> str:
-    """A difference of temperatures is in kelvins."""
-    return {"degC": "K", "pct": "%", "": "1"}.get(unit, unit)
+        rms_um = [rms(values[rows & (place <= low)]), rms(values[rows & (place >= high)])]
+        for end, other in ((0, 1), (1, 0)):
+            ratio = rms_um[end] / max(rms_um[other], 1e-12)
+            if ratio > largest:
+                largest = ratio
+                text = f"{ENDS[name][end]} ({rms_um[end]:.2g} um rms, {rms_um[other]:.2g} um at the other end)"
+    return text

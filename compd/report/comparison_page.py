@@ -9,7 +9,7 @@ import numpy as np
 from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import covariates
+from compd.comparison.covariates import covariates
 from compd.model_file import ModelFile, Stored, numbers_of
 from compd.report.figures import against, arrows, at_links, falling, histogram, switched_off, workspace
 from compd.report.page import PageTable, Panel, write_page
@@ -28,7 +28,7 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
     labels = list(dict.fromkeys(label for one in comparisons for label in one.aligned.labels))
     rows += [[f"{label}: rms / 95 % / largest", *(_axis(one, label) for one in comparisons)] for label in labels]
     rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(one) for one in comparisons)])
-    sources = list(dict.fromkeys(name for one in comparisons for name in one.sources))
+    sources = list(dict.fromkeys(name for one in comparisons for name in one.contributions))
     rows += [[f"rms without {name}", *(_without(one, name) for one in comparisons)] for name in sources]
     rows += [
         ["prediction's own uncertainty", *(_uncertainty(one) for one in comparisons)],
@@ -128,7 +128,7 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in found if name not in placed]
     vectors, enlarged = arrows(one)
-    said = [finding.text for finding in one.findings] or [nothing_found(one)]
+    said = [finding.text for finding in one.trends] or [nothing_found(one)]
     sentences = PageTable(("",), [[text] for text in said])
     panels = [
         Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
@@ -193,7 +193,7 @@ def _distance(one: Comparison) -> str:
 
 
 def _without(one: Comparison, name: str) -> str:
-    return f"{one.sources[name].without_rms_um:.3g} um" if name in one.sources else "-"
+    return f"{one.contributions[name].without_rms_um:.3g} um" if name in one.contributions else "-"
 
 
 def _uncertainty(one: Comparison) -> str:

@@ -10,7 +10,7 @@ import yaml
 from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import Covariate, covariates
+from compd.comparison.covariates import Covariate, covariates
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, in_um
 from compd.model.effect import Effect, quantities

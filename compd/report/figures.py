@@ -10,7 +10,7 @@ from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.compare import Comparison
-from compd.comparison.residual_trends import Covariate
+from compd.comparison.covariates import Covariate
 from compd.report.page import COLOURS, PageTable, styled
 
 # More dots than this hide each other; means are always over all rows.
@@ -296,10 +296,10 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 
 def switched_off(comparison: Comparison) -> Figure | PageTable:
     """The error that is left with each source switched off, beside the whole model and the noise floor."""
-    if not comparison.sources:
+    if not comparison.contributions:
         return NOT_RECORDED
-    names = ["whole model", *(f"without {name}" for name in comparison.sources)]
-    left = [comparison.rms_um, *(one.without_rms_um for one in comparison.sources.values())]
+    names = ["whole model", *(f"without {name}" for name in comparison.contributions)]
+    left = [comparison.rms_um, *(one.without_rms_um for one in comparison.contributions.values())]
     colours = [COLOURS["best"], *[COLOURS["plain"]] * (len(names) - 1)]
     figure = Figure(
         Bar(

@@ -35,7 +35,7 @@ def test_with_nothing_missing_the_residual_is_the_noise(name: str) -> None:
     assert found.at_floor
     assert found.floor.source == "repeats"
     assert found.floor.um == pytest.approx(SIGMA_UM, rel=0.08)
-    assert not found.findings
+    assert not found.trends
     assert not found.outlier.any()
 
 
@@ -44,7 +44,7 @@ def test_a_missing_cause_is_seen(case: str) -> None:
     found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
     assert found.floor_ratio > 5
     assert not found.at_floor
-    assert found.findings
+    assert found.trends
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_missing_cause_is_seen(case: str) -> None:
 )
 def test_words_name_what_the_error_follows(case: str, coordinate: str, covariate: str) -> None:
     found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
-    first = found.findings[0]
+    first = found.trends[0]
     assert (first.coordinate, first.covariate) == (coordinate, covariate)
     assert first.text.startswith(f"{coordinate} error follows {covariate}, ")
     assert first.explained > 0.9
@@ -76,7 +76,7 @@ def test_a_real_machine_with_a_model_of_its_own() -> None:
     assert found.aligned.labels == ("z",)
     assert found.floor.um == pytest.approx(1.2, abs=0.2)  # repeats scatter less than the declared motor step
     assert found.rms_um > 50
-    assert any(one.covariate == "temperature_frame" for one in found.findings)
+    assert any(one.covariate == "temperature_frame" for one in found.trends)
     assert found.as_json()["prediction_std_um"]["gauges"] is None
 
 
@@ -142,7 +142,7 @@ def test_links_measured_by_interferometer(tmp_path: Path) -> None:
     assert found.aligned.labels == ("link 1", "link 3")
     assert found.rms_um == pytest.approx(0.1, rel=0.1)
     assert found.floor_ratio < AT_FLOOR
-    assert found.sources["joints"].without_rms_um > 5
+    assert found.contributions["joints"].without_rms_um > 5
 
 
 def test_a_ball_plate(tmp_path: Path) -> None:
@@ -233,7 +233,7 @@ def test_switching_the_joints_off_is_what_unmoved_joints_predict(tmp_path: Path)
         unmoved[f"reference_{axis}_mm"] = one.recording.columns[f"reference_{axis}_mm"]
     write_recording(tmp_path / "still.csv", unmoved, {"machine": "tripod-cmm", "reference": _plain()})
     still = compare(aligned(tmp_path / "still.csv"))
-    assert compare(one).sources["joints"].without_rms_um == pytest.approx(still.rms_um, rel=1e-3)
+    assert compare(one).contributions["joints"].without_rms_um == pytest.approx(still.rms_um, rel=1e-3)
 
 
 def test_an_effect_that_lacks_its_quantity_is_refused_in_words(tmp_path: Path) -> None:

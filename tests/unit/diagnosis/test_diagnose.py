@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.cli.recording import read_with_machine
 from compd.comparison.aligned_recording import align_recording
+from compd.comparison.open import read_with_machine
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.holdout import evaluate_holdout
 from compd.diagnosis.verdict import Diagnosis

@@ -1,0 +1,64 @@
+"""Covariates: everything recorded or modelled that the residual of a comparison may depend on."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.units import unit_of
+
+
+class Covariate(NamedTuple):
+    """Something that the residual may follow.
+
+    name : as people read it, without the unit.  unit : "1" for a pure number.
+    values : (N,), nan where unknown; a direction is -1 or +1.
+    link : the link it belongs to, counted from 1; 0 for none.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    link: int = 0
+
+
+def covariates(aligned: AlignedRecording) -> list[Covariate]:
+    """Time, the tip's place, every measured quantity, gradients of temperature, each link's length and direction."""
+    recording = aligned.recording
+    result = [Covariate("time", "h", recording.time_s / 3600.0)]
+    result += [
+        Covariate(axis, "mm", column)
+        for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True)
+        if np.isfinite(column).any()
+    ]
+    for name, column in recording.quantities.items():
+        unit = unit_of(name)
+        result.append(Covariate(name.removesuffix(f"_{unit}"), _difference_unit(unit), column, _link_of(name)))
+    for top in [name for name in recording.quantities if name.endswith("_top_degC")]:
+        bottom = top.replace("_top_", "_bottom_")
+        if bottom in recording.quantities:
+            gradient = f"{top.removesuffix('_degC')} - {bottom.removesuffix('_degC')}"
+            result.append(Covariate(gradient, "K", recording.quantities[top] - recording.quantities[bottom]))
+    for i, length in enumerate(aligned.rows.link_mm.T, start=1):
+        result.append(Covariate(f"length of link {i}", "mm", length, i))
+    if recording.approach is not None:
+        for i, direction in enumerate(recording.approach.T, start=1):
+            result.append(Covariate(f"direction of link {i}", "1", direction, i))
+    return result
+
+
+def _link_of(name: str) -> int:
+    """The link that a quantity such as `temperature_link_2_degC` belongs to; 0 for none."""
+    for word, number in pairwise(name.split("_")):
+        if word == "link" and number.isdigit():
+            return int(number)
+    return 0
+
+
+def _difference_unit(unit: str) -> str:
+    """The unit of a change of the quantity: of temperatures it is the kelvin."""
+    return {"degC": "K", "pct": "%", "": "1"}.get(unit, unit)

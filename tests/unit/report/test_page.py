@@ -1,0 +1,66 @@
+"""The page: one template for all, texts escaped, nothing loaded from a network."""
+
+from __future__ import annotations
+
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from plotly.graph_objects import Figure
+
+from compd.report.page import PageTable, Panel, write_page
+
+NASTY = '<script>alert("1 & 2")</script>'
+VOID = {"meta", "br", "!doctype"}
+
+
+class Outline(HTMLParser):
+    """Elements that are open, texts by element, and addresses that a browser would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.texts: dict[str, list[str]] = {}
+        self.loaded: list[str] = []
+        self.numeric: list[str] = []
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        values = dict(attributes)
+        self.loaded += [value for name, value in values.items() if name in ("src", "href") and value]
+        if values.get("class") == "number":
+            self.numeric.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and data.strip():
+            self.texts.setdefault(self.open[-1], []).append(data)
+
+
+@pytest.fixture
+def outline(tmp_path: Path) -> Outline:
+    table = PageTable((NASTY, "rms", "seen"), [("x", "0.31 um", "-"), ("y", "-0.2 um", "yes")], NASTY)
+    panels = [Panel(NASTY, NASTY, table), Panel("Figure", "A line.", Figure().add_scatter(x=[1, 2], y=[3, 4]))]
+    path = tmp_path / "page.html"
+    write_page(path, NASTY, NASTY, panels, NASTY)
+    outline = Outline()
+    outline.feed(path.read_text(encoding="utf-8"))
+    return outline
+
+
+@pytest.mark.parametrize("element", ["title", "h1", "h2", "p", "caption", "th", "footer"])
+def test_every_text_is_escaped(outline: Outline, element: str) -> None:
+    assert NASTY in "".join(outline.texts[element])
+
+
+def test_elements_are_closed_and_nothing_is_loaded(outline: Outline) -> None:
+    assert outline.open == []
+    assert outline.loaded == []
+    assert sum("Plotly.newPlot" in script for script in outline.texts["script"]) == 1
+
+
+def test_only_columns_of_numbers_are_aligned_on_the_right(outline: Outline) -> None:
+    assert outline.numeric == ["th", "td", "td"]
