@@ -49,10 +49,10 @@ def compare(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
-        from compd.report.comparison_page import write_report
+        from compd.report.comparison_page import write_comparison_page
 
         write_page_to(html)
-        write_report(html, found, file)
+        write_comparison_page(html, found, file)
     if as_json:
         each = [one.as_json() for one in found]
         typer.echo(json.dumps(each[0] if len(each) == 1 else {"recordings": each}, indent=1, allow_nan=False))

@@ -10,9 +10,16 @@ from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import covariates
-from compd.model_file import ModelFile, Stored, numbers_of
-from compd.report.figures import against, arrows, at_links, falling, histogram, switched_off, workspace
+from compd.model_file import ModelFile, numbers_of
+from compd.report.figures import (
+    plot_contributions,
+    plot_histogram,
+    plot_link_residuals,
+    plot_residual_vectors,
+    plot_workspace_map,
+)
 from compd.report.page import PageTable, Panel, write_page
+from compd.report.small_multiples import plot_residual_against
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
 
@@ -52,7 +59,7 @@ def nothing_found(one: Comparison) -> str:
     return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
 
 
-def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
+def write_comparison_page(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
     """Write the page for one recording or more."""
     machine = comparisons[0].aligned.recording.machine
     effects = ", ".join(one.effect.id for one in comparisons[0].fitted) or "none"
@@ -67,47 +74,6 @@ def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile
         panels += _panels(one, f"{name_of(one)}: " if len(comparisons) > 1 else "")
     hashes = "; ".join(f"{name_of(one)} sha256 {one.aligned.recording.sha256}" for one in comparisons)
     write_page(path, f"Model and measurement: {machine}", verdict, panels, f"Effects in the model: {effects}. {hashes}")
-
-
-def write_ledger(path: Path, model: Stored) -> None:
-    """The picture of the falling error, and every step."""
-    steps = model.steps
-    labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
-    rms = [steps[0].rms_before_um, *(step.rms_after_um for step in steps)]
-    floors = [steps[0].noise_floor_um, *(step.noise_floor_um for step in steps)]
-    table = PageTable(LEDGER_HEAD, ledger_rows(model))
-    verdict = (
-        f"After {len(steps)} steps the residual is {rms[-1]:.3g} um; it was {rms[0]:.3g} um. "
-        f"Noise alone would be {floors[-1]:.3g} um."
-    )
-    panels = [
-        Panel(
-            "The falling error",
-            "Residual after each step, on the recording it was fitted on.",
-            falling(labels, rms, floors),
-        ),
-        Panel("Every step", "Each can be taken back with `compd effect undo`.", table),
-    ]
-    write_page(path, f"Ledger: {model.machine}", verdict, panels, "")
-
-
-LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
-
-
-def ledger_rows(model: Stored) -> list[list[str]]:
-    """One line per step."""
-    return [
-        [
-            str(k),
-            f"{step.kind} {step.effect}".rstrip() + (" (undone)" if step.undone else ""),
-            step.recording,
-            f"{step.rms_before_um:.3g}",
-            f"{step.rms_after_um:.3g}",
-            f"{step.noise_floor_um:.3g}",
-            step.date[:10],
-        ]
-        for k, step in enumerate(model.steps, start=1)
-    ]
 
 
 def _panels(one: Comparison, prefix: str) -> list[Panel]:
@@ -127,12 +93,12 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
     }
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in found if name not in placed]
-    vectors, enlarged = arrows(one)
+    vectors, enlarged = plot_residual_vectors(one)
     said = [finding.text for finding in one.trends] or [nothing_found(one)]
     sentences = PageTable(("",), [[text] for text in said])
     panels = [
         Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
-        Panel("What each part does", "The error that is left with one part switched off.", switched_off(one)),
+        Panel("What each part does", "The error that is left with one part switched off.", plot_contributions(one)),
         Panel(
             "Residual vectors",
             "Measured minus modelled at the tip"
@@ -140,20 +106,22 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
             vectors,
         ),
         *(
-            Panel(f"Residual against {group}", HOW_TO_READ, against(one, [found[name] for name in names]))
+            Panel(f"Residual against {group}", HOW_TO_READ, plot_residual_against(one, [found[name] for name in names]))
             for group, names in groups.items()
         ),
         Panel(
             "Residual pulled back to the links",
             "The errors of link lengths that would explain the residual at "
             "the tip: where one link stands out, look there.",
-            at_links(one),
+            plot_link_residuals(one),
         ),
-        Panel("Histogram against the noise floor", f"{one.floor.how[0].upper()}{one.floor.how[1:]}.", histogram(one)),
+        Panel(
+            "Histogram against the noise floor", f"{one.floor.how[0].upper()}{one.floor.how[1:]}.", plot_histogram(one)
+        ),
         Panel(
             "Map over the workspace",
             "Rms residual in cells of the workspace; white where nothing was measured.",
-            workspace(one),
+            plot_workspace_map(one),
         ),
         Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(one)),
     ]

@@ -20,12 +20,12 @@ from compd.report.effect_signature import (
     Signature,
     signature,
 )
-from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
+from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 
 AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain"]}
 
 
-def write_signature(path: Path, effect: Effect, configuration: Configuration) -> None:
+def write_effect_page(path: Path, effect: Effect, configuration: Configuration) -> None:
     """Write the page. Raises CompdError where the machine lacks a setting that the effect needs."""
     model = build_model(configuration.geometry, configuration.wiring)
     found = signature(effect, model, details(configuration.geometry))
@@ -87,7 +87,7 @@ def _arrows(found: Signature) -> Figure:
             colorbar={"title": "um"},
         )
     )
-    styled(figure, "", "", 560)
+    style_figure(figure, "", "", 560)
     figure.update_layout(scene={f"{axis}axis_title": f"{axis} in {{M}}, mm" for axis in "xyz"} | {"aspectmode": "data"})
     return figure
 
@@ -96,7 +96,7 @@ def _curve(curve: Curve) -> Figure:
     figure = Figure()
     for axis, values in zip("xyz", curve.tip_um.T, strict=True):
         figure.add_trace(Scatter(x=curve.driven_by, y=values, name=axis, line={"color": AXIS_COLOURS[axis]}))
-    return styled(figure, curve.label, "error of the tip, um")
+    return style_figure(figure, curve.label, "error of the tip, um")
 
 
 def _card(effect: Effect) -> PageTable:
