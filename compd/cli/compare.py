@@ -77,7 +77,7 @@ def print_comparisons(found: list[Comparison]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.report.comparison_page import name_of, nothing_found, summary
+    from compd.report.comparison_page import name_of, no_trend_text, summary
 
     console = Console(highlight=False)
     numbers = summary(found)
@@ -94,7 +94,7 @@ def print_comparisons(found: list[Comparison]) -> None:
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
         if not one.trends:
-            console.print(f"Where it fails: {nothing_found(one)}.")
+            console.print(f"Where it fails: {no_trend_text(one)}.")
         for trend in one.trends[:MOST_SENTENCES]:
             console.print(f"  - {trend.text}")
         if len(one.trends) > MOST_SENTENCES:

@@ -6,12 +6,15 @@ import numpy as np
 from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, rms
 from compd.comparison.compare import Comparison
 from compd.report.page import COLOURS, PageTable, style_figure
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
+from compd.units import UM_PER_MM
 
+# More arrows than this hide each other.
 ARROWS = 400
+# Cells of the map along each axis.
 CELLS = 9
 # The typical arrow is drawn as long as this share of the workspace.
 ARROW_SHARE = 0.12
@@ -44,11 +47,11 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
     tip = aligned.rows.tip_M_mm[chosen]
     vector_um = np.zeros((len(chosen), 3))
     vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
-    typical_mm = max(float(np.sqrt(np.mean((vector_um**2).sum(axis=1)))) / 1e3, 1e-9)
+    typical_mm = max(rms(np.linalg.norm(vector_um, axis=1)) / UM_PER_MM, 1e-9)
     reach_mm = float(np.ptp(tip, axis=0).max()) or 1.0
     enlarged = 10.0 ** np.floor(np.log10(ARROW_SHARE * reach_mm / typical_mm))
     enlarged *= max(step for step in (1, 2, 5) if step * enlarged <= ARROW_SHARE * reach_mm / typical_mm)
-    end = tip + vector_um / 1e3 * enlarged
+    end = tip + vector_um / UM_PER_MM * enlarged
     gap = np.full_like(tip, np.nan)
     path = np.stack([tip, end, gap], axis=1).reshape(-1, 3)
     size_um = np.linalg.norm(vector_um, axis=1)
@@ -147,27 +150,27 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
     used = comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1)
     if not used.any():
         return NOT_RECORDED
-    tip = aligned.rows.tip_M_mm[used]
-    square = (comparison.residual_um[used] ** 2).mean(axis=1)
+    tip_mm = aligned.rows.tip_M_mm[used]
+    square_um2 = (comparison.residual_um[used] ** 2).mean(axis=1)
     views = [("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2)]
     figure = make_subplots(1, 3, subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
-    maps = []
+    maps: list[tuple[list[FloatArray], FloatArray]] = []
     for _, a, b in views:
-        edges = [np.linspace(*_ends(tip[:, axis]), CELLS + 1) for axis in (a, b)]
-        total, _, _ = np.histogram2d(tip[:, a], tip[:, b], bins=edges, weights=square)
-        count, _, _ = np.histogram2d(tip[:, a], tip[:, b], bins=edges)
+        edges = [np.linspace(*_ends(tip_mm[:, axis]), CELLS + 1) for axis in (a, b)]
+        total_um2, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges, weights=square_um2)
+        count, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges)
         with np.errstate(invalid="ignore"):
-            maps.append((edges, np.sqrt(total / np.where(count > 0, count, np.nan))))
-    highest = max(float(np.nanmax(rms)) for _, rms in maps)
-    for k, ((name, a, b), (edges, rms)) in enumerate(zip(views, maps, strict=True), start=1):
+            maps.append((edges, np.sqrt(total_um2 / np.where(count > 0, count, np.nan))))
+    highest_um = max(float(np.nanmax(cells_um)) for _, cells_um in maps)
+    for k, ((name, a, b), (edges, cells_um)) in enumerate(zip(views, maps, strict=True), start=1):
         middle = [(edge[1:] + edge[:-1]) / 2 for edge in edges]
         figure.add_trace(
             Heatmap(
                 x=middle[0],
                 y=middle[1],
-                z=rms.T,
+                z=cells_um.T,
                 zmin=0.0,
-                zmax=highest,
+                zmax=highest_um,
                 colorscale="Viridis",
                 showscale=k == 3,
                 colorbar={"title": "um rms", "thickness": 14},
@@ -192,7 +195,7 @@ def plot_contributions(comparison: Comparison) -> Figure | PageTable:
     if not comparison.contributions:
         return NOT_RECORDED
     names = ["whole model", *(f"without {name}" for name in comparison.contributions)]
-    left = [comparison.rms_um, *(one.without_rms_um for one in comparison.contributions.values())]
+    left = [comparison.rms_um, *(part.without_rms_um for part in comparison.contributions.values())]
     colours = [COLOURS["best"], *[COLOURS["plain"]] * (len(names) - 1)]
     figure = Figure(
         Bar(
