@@ -12,9 +12,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from compd.diagnosis.empirical_search import EmpiricalFinding
     from compd.diagnosis.holdout import Holdout
-    from compd.diagnosis.verdict import Diagnosis, DiagnosisStep
+    from compd.diagnosis.verdict import Diagnosis, DiagnosisStep, EmpiricalFinding
 
 # Covariates that are listed; --json has them all.
 SHOWN = 8
@@ -44,7 +43,7 @@ def diagnose(
     from compd.cli.progress import steps_shown
     from compd.comparison.open import open_model, open_recording
     from compd.diagnosis.diagnose import diagnose as diagnosed
-    from compd.diagnosis.holdout import opened
+    from compd.diagnosis.holdout import evaluate_holdout
     from compd.model.library import library
 
     if html is not None:
@@ -55,7 +54,7 @@ def diagnose(
     effects = [*library().values()]
     with steps_shown(quiet=as_json) as progress:
         found = diagnosed(aligned, file.fitted, file.covariance, effects, progress)
-    checked = [opened(found, one) for one in sealed]
+    checked = [evaluate_holdout(found, one) for one in sealed]
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis_page
 
@@ -71,11 +70,11 @@ def diagnose(
 
 def _print(console: Console, found: Diagnosis, checked: list[Holdout]) -> None:
     """Verdict first."""
-    console.print(f"[bold]{found.verdict}[/]: {found.said}")
+    console.print(f"[bold]{found.verdict}[/]: {found.summary}")
     for number, step in enumerate(found.steps, start=1):
         _print_step(console, number, step)
     for one in checked:
-        console.print(f"\n{one.said}")
+        console.print(f"\n{one.summary}")
     if found.depends_on:
         console.print("\n[bold]What the rest follows[/] (a description, not a cause):")
         for dependence in found.depends_on[:SHOWN]:
@@ -97,14 +96,14 @@ def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
     effect = step.effect
     console.print(f"\n[bold]{number}. {effect.id}[/]: {effect.physics}")
     console.print(f"    {effect.equation}", markup=False)
-    for one in step.numbers:
+    for one in step.parameters:
         said = "" if one.plausible else " (implausible)"
         console.print(f"    {one.name} = {one.value:.4g} +- {one.std:.2g} {one.unit}{said}", markup=False)
     for name, value in step.fitted.shape.items():
         console.print(f"    {name} = {value:.4g}, searched")
     console.print(
         f"    explains {100 * step.explained_fraction:.3g} % of what was above the noise; error on rows left out "
-        f"{step.heldout_rms_um:.3g} um; chance {step.p_adjusted:.3g}"
+        f"{step.heldout_rms_um:.3g} um; chance {step.p_value:.3g}"
     )
     for rival in step.rivals:
         console.print(f"    rival: {rival.name}, {100 * rival.cosine:.1f} % alike on these rows")
@@ -115,7 +114,7 @@ def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
 def _print_dependence(console: Console, one: EmpiricalFinding) -> None:
     console.print(
         f"    {one.covariate}, {one.form}, at the {one.port}: {100 * one.explained_fraction:.3g} % on rows left out "
-        f"({one.heldout_rms_um:.3g} um left), chance {one.p_adjusted:.3g}"
+        f"({one.heldout_rms_um:.3g} um left), chance {one.p_value:.3g}"
         + (f", together with {', '.join(one.beside)}" if one.beside else "")
     )
 
@@ -124,7 +123,7 @@ def _print_formulas(console: Console, one: EmpiricalFinding) -> None:
     import yaml
 
     console.print("    To use it until the cause is known, each in a file of its own for `compd effect add`:")
-    for effect, numbers in zip(one.formula_effects, one.numbers, strict=True):
+    for effect, numbers in zip(one.formula_effects, one.parameters, strict=True):
         text = yaml.safe_dump(effect, sort_keys=False, default_flow_style=None, width=110)
         console.print("\n".join(f"      {line}" for line in text.splitlines()), markup=False, soft_wrap=True)
         fitted = ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())

@@ -31,8 +31,8 @@ def plan(
     from compd.comparison.compare import compare
     from compd.comparison.open import open_model, open_recording
     from compd.comparison.shape_search import search_constants
-    from compd.diagnosis.measurement_programmes import limits_of
-    from compd.diagnosis.next_measurement import plan as planned
+    from compd.diagnosis.measurement_programmes import recorded_limits
+    from compd.diagnosis.next_measurement import plan_measurement
     from compd.errors import CompdError, Problem
     from compd.model.library import find
 
@@ -61,7 +61,7 @@ def plan(
                 next_step="`compd effect remove` takes it out",
             )
         )
-    limits = limits_of(aligned)
+    limits = recorded_limits(aligned)
     if workspace is not None:
         x0, x1, y0, y1, z0, z1 = _numbers("--workspace", workspace, 6)
         low, high = limits.tip_low_M_mm.copy(), limits.tip_high_M_mm.copy()
@@ -76,7 +76,7 @@ def plan(
         limits = limits._replace(speed_mm_per_s=speed)
     sigma_um = compare(aligned, file.fitted, file.covariance).floor.by_axis_um
     first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
-    found = planned(aligned, file.fitted, (first, second), sigma_um, limits, rows)
+    found = plan_measurement(aligned, file.fitted, (first, second), sigma_um, limits, rows)
     if out is None:
         found.write_to(sys.stdout)
     else:

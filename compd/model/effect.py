@@ -139,6 +139,7 @@ class Effect:
     needs : quantities by name (`{link}` stands for each link), or "force", "direction", "motion", "time",
         "order" (of the rows), "revolute_axes", "plate_thickness_mm".
     remembers : a row's value depends on earlier rows; memory goes in and comes out.
+    contradicts_declared_frame : it says that the reference does not show {M}, which the recording's sidecar declares.
     """
 
     id: str
@@ -154,6 +155,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    contradicts_declared_frame: bool = False
 
     @property
     def port(self) -> str:

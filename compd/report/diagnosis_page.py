@@ -11,9 +11,8 @@ from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import Covariate, covariates
-from compd.diagnosis.empirical_search import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, in_um
+from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, in_um
 from compd.model.effect import Effect, quantities
 from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 from compd.report.small_multiples import small_multiples
@@ -35,7 +34,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, sealed: Sequence[Holdout]
         f"{recording.path}, sha256 {recording.sha256[:16]}; {int(found.after.used.sum())} rows used; "
         f"noise floor: {found.before.floor.how}."
     )
-    write_page(path, f"{recording.machine}: what is missing? {found.verdict}", found.said, panels, footer)
+    write_page(path, f"{recording.machine}: what is missing? {found.verdict}", found.summary, panels, footer)
 
 
 def _falling(found: Diagnosis, sealed: Sequence[Holdout]) -> Panel:
@@ -68,13 +67,13 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
     rows = [["equation", effect.equation], ["physics", effect.physics]]
     rows += [
         [one.name, f"{one.value:.4g} +- {one.std:.2g} {one.unit}" + ("" if one.plausible else ", implausible")]
-        for one in step.numbers
+        for one in step.parameters
     ]
     rows += [[name, f"{value:.4g}, searched"] for name, value in step.fitted.shape.items()]
     rows += [
         ["explains", f"{100 * step.explained_fraction:.0f} % of what was left above the noise"],
         ["error on rows left out", f"{step.heldout_rms_um:.3g} um"],
-        ["by chance", f"{step.p_adjusted:.3g}, corrected for every effect that was tried"],
+        ["by chance", f"{step.p_value:.3g}, corrected for every effect that was tried"],
         ["rivals", ", ".join(f"{one.name} ({100 * one.cosine:.1f} % alike)" for one in step.rivals) or "none"],
         ["told apart by", effect.separated_by],
     ]
@@ -113,7 +112,7 @@ def _depends(found: Diagnosis) -> Panel:
     rows = []
     for one in found.depends_on:
         share = f"{100 * one.explained_fraction:.3g} %"
-        rows.append([_follows(one), one.form, one.port, share, f"{one.heldout_rms_um:.3g}", f"{one.p_adjusted:.3g}"])
+        rows.append([_follows(one), one.form, one.port, share, f"{one.heldout_rms_um:.3g}", f"{one.p_value:.3g}"])
     head = ("follows", "form", "port", "explains on rows left out", "left, um", "chance")
     return Panel(
         "What the rest follows",

@@ -130,5 +130,6 @@ EFFECTS = (
         mistaken_for=(),
         separated_by="three reference marks on the surface plate",
         basis=memoryless(_registration),
+        contradicts_declared_frame=True,
     ),
 )

@@ -12,7 +12,7 @@ import pytest
 from compd.comparison.aligned_recording import align_recording
 from compd.comparison.open import read_with_machine
 from compd.diagnosis.diagnose import diagnose
-from compd.diagnosis.holdout import opened
+from compd.diagnosis.holdout import evaluate_holdout
 from compd.diagnosis.verdict import Diagnosis
 from tests.support.diagnosed import LIBRARY, recorded
 from tests.support.paths import SHARED
@@ -46,7 +46,7 @@ def test_one_hidden_effect_is_named_first(tmp_path: Path, effect: str, theta: tu
     assert names(found) == [effect]
     assert found.verdict in ("identified", "ambiguous")
     assert found.after.floor_ratio < 1.2 < found.before.floor_ratio
-    for number, true in zip(found.steps[0].numbers, theta, strict=True):
+    for number, true in zip(found.steps[0].parameters, theta, strict=True):
         shown = 1 / true if effect == "link_elasticity" else true
         assert abs(number.value - shown) < 4 * number.std
         assert number.plausible
@@ -95,7 +95,7 @@ def test_outliers_are_listed_and_change_nothing(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, {"link_expansion": (1.5,)}, outliers=3)
     assert names(found) == ["link_expansion"]
     assert found.as_json()["outlier_rows"] == [14, 34, 54]  # the header is row 1
-    number, before = found.steps[0].numbers[0], clean.steps[0].numbers[0]
+    number, before = found.steps[0].parameters[0], clean.steps[0].parameters[0]
     assert abs(number.value - before.value) < before.std
     assert found.after.floor_ratio < 1.2
 
@@ -170,7 +170,7 @@ def test_json_has_the_keys_of_the_verdict_and_no_nan(tmp_path: Path) -> None:
 
 def test_a_sealed_recording_is_looked_at_with_what_was_learned_elsewhere(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, {"link_expansion": (1.5,)})
-    sealed = opened(found, recorded(tmp_path / "other.csv", 9, {"link_expansion": (1.5,)}))
+    sealed = evaluate_holdout(found, recorded(tmp_path / "other.csv", 9, {"link_expansion": (1.5,)}))
     assert sealed.after.floor_ratio < 1.2 < sealed.before.floor_ratio
     assert np.array_equal(sealed.after.fitted[0].theta, found.after.fitted[0].theta)
 
@@ -189,4 +189,4 @@ def test_the_examples(folder: Path | None) -> None:
         assert [one.covariate for one in found.depends_on][:1] == ["humidity_pct"]
         return
     recording, configuration = read_with_machine(folder / "valid.csv", None)
-    assert opened(found, align_recording(recording, configuration)).after.floor_ratio <= 1.1
+    assert evaluate_holdout(found, align_recording(recording, configuration)).after.floor_ratio <= 1.1

@@ -15,8 +15,8 @@ from compd.cli.diagnose import diagnose as diagnose_command
 from compd.cli.plan import plan as plan_command
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.shape_search import search_constants
-from compd.diagnosis.measurement_programmes import ProgrammeLimits, limits_of
-from compd.diagnosis.next_measurement import MeasurementPlan, plan
+from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
+from compd.diagnosis.next_measurement import MeasurementPlan, plan_measurement
 from compd.errors import CompdError, RecordingError
 from compd.model.effect import FittedEffect
 from tests.support.diagnosed import LIBRARY, NOISE_UM, recorded
@@ -39,12 +39,12 @@ def rivals(aligned: AlignedRecording, *names: str) -> tuple[FittedEffect, Fitted
 def planned(
     aligned: AlignedRecording, names: tuple[str, str], rows: int = 30, limits: ProgrammeLimits | None = None
 ) -> MeasurementPlan:
-    return plan(aligned, (), rivals(aligned, *names), SIGMA_UM, limits or limits_of(aligned), rows)
+    return plan_measurement(aligned, (), rivals(aligned, *names), SIGMA_UM, limits or recorded_limits(aligned), rows)
 
 
 def test_a_plan_separates_spring_and_contact_by_loads(tmp_path: Path) -> None:
     aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
-    limits = limits_of(aligned)._replace(force_N=120.0)
+    limits = recorded_limits(aligned)._replace(force_N=120.0)
     found = planned(aligned, ("link_elasticity", "joint_contact"), 30, limits)
     assert found.separation > 1.5 * found.before
     assert len(found.rows) <= 30
@@ -82,7 +82,7 @@ def test_a_plan_stays_within_its_limits(tmp_path: Path) -> None:
 
 def test_a_place_out_of_reach_is_said(tmp_path: Path) -> None:
     aligned = recorded(tmp_path / "run.csv", 1, {})
-    far = limits_of(aligned)._replace(tip_high_M_mm=np.array([5000.0, 5000.0, 5000.0]))
+    far = recorded_limits(aligned)._replace(tip_high_M_mm=np.array([5000.0, 5000.0, 5000.0]))
     with pytest.raises(RecordingError, match="out of reach"):
         planned(aligned, ("tool_offset", "link_zero"), 10, far)
 
