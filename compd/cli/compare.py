@@ -49,10 +49,10 @@ def compare(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
-        from compd.report.comparison_page import write_report
+        from compd.report.comparison_page import write_comparison_page
 
         write_page_to(html)
-        write_report(html, found, file)
+        write_comparison_page(html, found, file)
     if as_json:
         each = [one.as_json() for one in found]
         typer.echo(json.dumps(each[0] if len(each) == 1 else {"recordings": each}, indent=1, allow_nan=False))
@@ -77,7 +77,7 @@ def print_comparisons(found: list[Comparison]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.report.comparison_page import name_of, nothing_found, summary
+    from compd.report.comparison_page import name_of, no_trend_text, summary
 
     console = Console(highlight=False)
     numbers = summary(found)
@@ -94,7 +94,7 @@ def print_comparisons(found: list[Comparison]) -> None:
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
         if not one.trends:
-            console.print(f"Where it fails: {nothing_found(one)}.")
+            console.print(f"Where it fails: {no_trend_text(one)}.")
         for trend in one.trends[:MOST_SENTENCES]:
             console.print(f"  - {trend.text}")
         if len(one.trends) > MOST_SENTENCES:

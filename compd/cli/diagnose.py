@@ -56,9 +56,9 @@ def diagnose(
         found = diagnosed(aligned, file.fitted, file.covariance, effects, progress)
     checked = [evaluate_holdout(found, one) for one in sealed]
     if html is not None:
-        from compd.report.diagnosis_page import write_diagnosis
+        from compd.report.diagnosis_page import write_diagnosis_page
 
-        write_diagnosis(html, found, checked)
+        write_diagnosis_page(html, found, checked)
     if as_json:
         data: dict[str, Any] = {**found.as_json(), "sealed": [one.as_json() for one in checked]}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))

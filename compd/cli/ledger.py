@@ -18,7 +18,7 @@ def ledger(
 
     from compd.cli.compare import write_page_to
     from compd.model_file import read_stored
-    from compd.report.comparison_page import LEDGER_HEAD, ledger_rows, write_ledger
+    from compd.report.ledger_page import LEDGER_HEAD, ledger_rows, write_ledger_page
 
     stored = read_stored(model)
     steps = stored.steps
@@ -33,5 +33,5 @@ def ledger(
     console.print(table)
     if html is not None:
         write_page_to(html)
-        write_ledger(html, stored)
+        write_ledger_page(html, stored)
         typer.echo(f"The falling error as a picture: {html}")

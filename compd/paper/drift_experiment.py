@@ -10,7 +10,7 @@ from plotly.graph_objects import Figure
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.paper.reduction import Readings, Reduction
-from compd.report.page import COLOURS, Panel, styled
+from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
 from compd.simulation.truth.touch import touch
 from compd.simulation.truth.world import World
@@ -78,7 +78,7 @@ def panels(found: Drift) -> list[Panel]:
                     marker={"size": 4},
                     line={"color": COLOURS[KIND_COLOURS[kind]], "dash": dash},
                 )
-        return styled(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
+        return style_figure(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
 
     warm = Figure()
     warm.add_scatter(x=found.time_h, y=found.frame_degC, mode="lines", line={"color": COLOURS["plain"]})
@@ -89,5 +89,9 @@ def panels(found: Drift) -> list[Panel]:
             "An axisymmetric frame would leave both at zero; here a cabinet stands beside one column.",
             change("xy"),
         ),
-        Panel("Temperature of the frame", "Mean of the columns.", styled(warm, "time since switch-on, h", "degC", 240)),
+        Panel(
+            "Temperature of the frame",
+            "Mean of the columns.",
+            style_figure(warm, "time since switch-on, h", "degC", 240),
+        ),
     ]

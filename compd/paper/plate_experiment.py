@@ -11,7 +11,7 @@ from plotly.graph_objects import Figure
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.paper.reduction import Readings, Reduction, rms
-from compd.report.page import COLOURS, Panel, styled
+from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, ball_plate_mm, noisy
 from compd.simulation.truth.touch import touch
 from compd.simulation.truth.world import World
@@ -91,7 +91,7 @@ def panels(found: Distances) -> list[Panel]:
             "Each dot is one of the 136 pairs of balls, measured less certified. "
             "How much is gained depends on how much of the error is the joints'; of the paper's machine it is not "
             "known.",
-            styled(figure, "distance between balls, mm", "deflection, um", 440),
+            style_figure(figure, "distance between balls, mm", "deflection, um", 440),
         ),
     ]
 

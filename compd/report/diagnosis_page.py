@@ -14,12 +14,12 @@ from compd.comparison.covariates import Covariate, covariates
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, in_um
 from compd.model.effect import Effect, quantities
-from compd.report.figures import small_multiples
-from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
+from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
+from compd.report.small_multiples import small_multiples
 from compd.units import unit_of
 
 
-def write_diagnosis(path: Path, found: Diagnosis, sealed: Sequence[Holdout]) -> None:
+def write_diagnosis_page(path: Path, found: Diagnosis, sealed: Sequence[Holdout]) -> None:
     """Write the page; it works offline."""
     recording = found.before.aligned.recording
     panels = [_falling(found, sealed)]
@@ -59,7 +59,7 @@ def _falling(found: Diagnosis, sealed: Sequence[Holdout]) -> Panel:
         "Error per coordinate, rms. With an effect or a description: on rows that were left out when its numbers were "
         "fitted."
     )
-    return Panel("The falling error", caption, styled(figure, "", "error, um", 300))
+    return Panel("The falling error", caption, style_figure(figure, "", "error, um", 300))
 
 
 def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:

@@ -66,7 +66,7 @@ def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], fo
     path.write_text(page, encoding="utf-8")
 
 
-def styled(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
+def style_figure(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
     """The figure with the look that all have: axis titles with units, quiet grid, legend on top."""
     figure.update_layout(
         template="plotly_white",
