@@ -139,6 +139,7 @@ class Effect:
     needs : quantities by name (`{link}` stands for each link), or "force", "direction", "motion", "time",
         "order" (of the rows), "revolute_axes", "plate_thickness_mm".
     remembers : a row's value depends on earlier rows; memory goes in and comes out.
+    follows_reading : what it adds depends on its comparators' own readings.
     contradicts_declared_frame : it says that the reference does not show {M}, which the recording's sidecar declares.
     """
 
@@ -155,6 +156,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    follows_reading: bool = False
     contradicts_declared_frame: bool = False
 
     @property
