@@ -14,7 +14,7 @@ from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import find
-from tests.support.diagnosed import LIBRARY, recorded
+from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
 
 EFFECTS = list(LIBRARY.values())
@@ -46,8 +46,8 @@ def drag_at_one_side(aligned: AlignedRecording) -> FloatArray:
 
 def diagnose_with_cause(path: Path, cause: Cause, effects: dict[str, tuple[float, ...]], seed: int = 1) -> Diagnosis:
     """The diagnosis of a recording on which a cause outside the library acts beside the effects."""
-    still = recorded(path / "still.csv", seed, {})
-    aligned = recorded(path / "run.csv", seed, effects, extra_um=cause(still))
+    still = record_with_effects(path / "still.csv", seed, {})
+    aligned = record_with_effects(path / "run.csv", seed, effects, extra_um=cause(still))
     return diagnose(aligned, (), None, EFFECTS)
 
 
