@@ -26,7 +26,7 @@ def plan_file(path: Path, rows: Sequence[Mapping[str, object]], quantities: Sequ
 
 
 def thin(path: Path, out: Path, keep: Callable[[Mapping[str, str]], bool]) -> None:
-    """Copy a recording with about UNLOADED of its rows without a load, and the rows with a load for which `keep` is true."""
+    """Copy about UNLOADED of a recording's rows without a load, and the rows with a load for which `keep` is true."""
     with path.open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     is_loaded = [any(float(row[f"force_{axis}_N"]) for axis in "xyz") for row in rows]
