@@ -27,13 +27,6 @@ class ComparisonCriteria:
         meaning="a row with a coordinate farther from the median is an outlier and left out",
         reason="a normal error is as large once in two million: in no recording by chance",
     )
-    huber_sigmas: float = threshold(
-        2.5,
-        unit="robust standard deviations",
-        meaning="in a robust fit a residual up to this size counts in full, a larger one less (Huber 1964)",
-        reason="a choice: far above 1.345, which is 95 % efficient, because only what lies between noise and outliers "
-        "is to be held back",
-    )
     declared_dof: float = threshold(
         200.0,
         unit="degrees of freedom",
@@ -59,7 +52,7 @@ class ComparisonCriteria:
         meaning="fewer rows are not compared",
         reason="a choice: with fewer, neither a median nor a quantile says anything",
     )
-    most_gauge_scatter: float = threshold(
+    most_gauge_share: float = threshold(
         1.5,
         unit="scatter of the residual within visits",
         meaning="where the gauges' scatter within visits, seen at the tip, is larger, the machine moved within visits "

@@ -21,14 +21,10 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.outliers import find_replicates
 from compd.comparison.robust import robust_sigma
 
-# A declared uncertainty is taken to be right within 5 %, which counts as so many measurements (GUM, G.4.2:
-# 1 / (2 x 0.05^2)). Repeats that contradict it overrule it: a hundred of them do where it is wrong by a fifth.
-DECLARED_DOF = 200.0
-# Two-sided p-value below which repeats contradict a declaration.
-CONTRADICTION = 0.001
 # Variance of the estimate from N differences of neighbours, as a share of that of N independent values' (von
 # Neumann).
 DIFFERENCE_VARIANCE = 1.5
@@ -63,7 +59,12 @@ class Scatter(NamedTuple):
     outlier_visits: int
 
 
-def repeat_scatter(residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> Scatter | None:
+def repeat_scatter(
+    residual_um: FloatArray,
+    use: BoolArray,
+    visit: IntArray | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> Scatter | None:
     """Pooled scatter of residual_um (N, m) within visits; None where no visit of the rows `use` (N,) is repeated.
 
     visit : (N,) number of the visit, negative for none.
@@ -72,7 +73,7 @@ def repeat_scatter(residual_um: FloatArray, use: BoolArray, visit: IntArray | No
     replicates = None if visit is None else find_replicates(residual_um, use, visit)
     if replicates is None:
         return None
-    outlier_visits = np.unique(replicates.visit[replicates.outlier])
+    outlier_visits = np.unique(replicates.visit[replicates.outlier(criteria)])
     kept = ~np.isin(replicates.visit, outlier_visits)
     if not kept.any():
         return None
@@ -90,6 +91,7 @@ def noise_floor(
     declared_um: FloatArray,
     gauges_um: FloatArray,
     orders: tuple[FloatArray, ...],
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> NoiseFloor:
     """The noise floor from repeats; else from what is declared; else an estimate.
 
@@ -100,9 +102,9 @@ def noise_floor(
     """
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
     is_declared = bool(np.isfinite(declared_um).all())
-    scatter = repeat_scatter(residual_um, use, visit)
+    scatter = repeat_scatter(residual_um, use, visit, criteria)
     if scatter is not None and (scatter.by_axis_um > 0).all():
-        return _from_repeats(scatter, expected_um if is_declared else None)
+        return _from_repeats(scatter, expected_um if is_declared else None, criteria)
     if is_declared:
         gauges = "" if np.isnan(gauges_um).any() else f" with the gauges' {rms(gauges_um):.3g} um at the tip"
         how = f"declared: the reference's {rms(declared_um):.3g} um{gauges}; no visit is repeated, so nothing tests it"
@@ -110,10 +112,10 @@ def noise_floor(
     return _from_differences(residual_um[use], tuple(order[use] for order in orders))
 
 
-def _from_repeats(scatter: Scatter, expected_um: FloatArray | None) -> NoiseFloor:
+def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria) -> NoiseFloor:
     """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom.
 
-    F test of the ratio of both variances, averaged over the coordinates, with DECLARED_DOF for the declaration.
+    F test of the ratio of both variances, averaged over the coordinates, with `declared_dof` for the declaration.
     """
     axes = len(scatter.by_axis_um)
     dof = float(scatter.dof * axes)
@@ -124,11 +126,11 @@ def _from_repeats(scatter: Scatter, expected_um: FloatArray | None) -> NoiseFloo
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
     declared = f"declared noise of {rms(expected_um):.3g} um"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
-    below = float(f_distribution.cdf(ratio, dof, DECLARED_DOF * axes))
-    if min(below, 1 - below) < CONTRADICTION / 2:
+    below = float(f_distribution.cdf(ratio, dof, criteria.declared_dof * axes))
+    if min(below, 1 - below) < criteria.contradiction_p_value / 2:
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof)
-    pooled_dof = scatter.dof + DECLARED_DOF
-    variance = (scatter.dof * scatter.by_axis_um**2 + DECLARED_DOF * expected_um**2) / pooled_dof
+    pooled_dof = scatter.dof + criteria.declared_dof
+    variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof
     return NoiseFloor(
         np.sqrt(variance), "repeats", f"{how}, which agrees with the {declared}; both count", pooled_dof * axes
     )

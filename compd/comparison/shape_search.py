@@ -18,8 +18,8 @@ from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import FitResult, fit, initial_effect
-from compd.comparison.outliers import OUTLIER_SIGMAS
 from compd.model.effect import ConstantValues, Effect, FittedEffect
 
 # A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
@@ -35,7 +35,11 @@ class _Trial(NamedTuple):
 
 
 def search_constants(
-    aligned: AlignedRecording, model: Sequence[FittedEffect], effect: Effect, sigma_um: FloatArray
+    aligned: AlignedRecording,
+    model: Sequence[FittedEffect],
+    effect: Effect,
+    sigma_um: FloatArray,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> FitResult:
     """Fit `effect` jointly with the effects of the model, and search its nonlinear constants.
 
@@ -48,11 +52,11 @@ def search_constants(
     links = aligned.rows.links
     shapes = effect.constant_grid(aligned.rows)
     if len(shapes) == 1:
-        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um)
-    limit_um2 = (OUTLIER_SIGMAS * fit(aligned, model, sigma_um).rms_um) ** 2
+        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um, criteria)
+    limit_um2 = (criteria.outlier_sigmas * fit(aligned, model, sigma_um, criteria).rms_um) ** 2
 
     def trial(shape: ConstantValues) -> _Trial:
-        result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um)
+        result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um, criteria)
         known = np.isfinite(result.residual_um).all(axis=1)
         return _Trial(shape, float(np.mean(np.minimum(result.residual_um[known] ** 2, limit_um2))), result)
 

@@ -10,11 +10,9 @@ from typing import Any, Literal
 from compd.configuration.document import Document, Location
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
-from compd.configuration.operation import JointWire, Wiring
+from compd.configuration.operation import FRAME_DISTANCES, JointWire, Wiring
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
-
-DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ def _channels(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
 def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
     where = parts.document.where
     counts: Counter[str] = Counter(wire.distance for wire in wiring.frame)
-    for distance in DISTANCES:
+    for distance in FRAME_DISTANCES:
         if counts[distance] != 1:
             yield Problem(
                 where=where(("wiring", "frame")),

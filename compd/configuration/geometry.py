@@ -5,21 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+
+from compd.configuration.section import Number, Positive, Section
 
 # Coordinates in a drawing are given to 1 nm at best; a frame that misses its convention by more was
 # measured or typed wrongly.
 CONVENTION_TOLERANCE_MM = 1e-6
 
 
-class Section(BaseModel):
-    """A part of the configuration: unknown keys are refused, values cannot change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector = tuple[Number, Number, Number]
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from compd.configuration.geometry import Positive, Section
+from compd.configuration.section import Positive, Section
 
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ipaddress
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator
 
-from compd.configuration.geometry import Positive, Section
+from compd.configuration.section import Positive, Section
 
+# The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
+FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
+FRAME_DISTANCES: tuple[FrameDistance, ...] = get_args(FrameDistance)
 GaugeChannel = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$")]
 Sign = Literal[1, -1]
 
@@ -36,7 +39,7 @@ class JointWire(Section):
 class FrameWire(Section):
     """Which gauge measures which of the nine frame distances."""
 
-    distance: Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
+    distance: FrameDistance
     gauge: GaugeChannel
     sign: Sign = 1
 

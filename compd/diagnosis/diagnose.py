@@ -43,7 +43,7 @@ def diagnose(
     covariance: FloatArray | None,
     effects: Sequence[Effect],
     progress: Progress = lambda status: None,
-    criteria: Criteria | None = None,
+    criteria: Criteria = Criteria(),
 ) -> Diagnosis:
     """Learn which effects the model lacks on this recording.
 
@@ -54,7 +54,7 @@ def diagnose(
         are refitted along.
     effects : the library.
     progress : called with a text when a stage begins.
-    criteria : thresholds of the verdict; `Criteria()` if None.
+    criteria : thresholds of the verdict.
 
     Raises CompdError as `compare` does.
 
@@ -64,9 +64,8 @@ def diagnose(
         diagnosis.verdict  # "identified"
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
-    criteria = Criteria() if criteria is None else criteria
     progress("comparing the model with the recording")
-    before = compare(aligned, fitted, covariance)
+    before = compare(aligned, fitted, covariance, criteria.comparison)
     progress("what each effect would do")
     pool = library_pool(aligned, effects, [effect.effect.id for effect in fitted], criteria)
     problem = build_problem(before, pool, criteria)
@@ -88,11 +87,11 @@ def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: 
     p_value_by_effect = _p_values(search, effects)
     fitted, joint_covariance = before.fitted, covariance
     for number, k in enumerate(effects, start=1):
-        result = search_constants(aligned, fitted, search.candidates[k].effect, problem.sigma_um)
+        result = search_constants(aligned, fitted, search.candidates[k].effect, problem.sigma_um, criteria.comparison)
         if number == len(effects):
             result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
         fitted, joint_covariance = result.fitted, result.covariance
-    after = compare(aligned, fitted, joint_covariance) if effects else before
+    after = compare(aligned, fitted, joint_covariance, criteria.comparison) if effects else before
     explained = search.baseline - 1.0 if effects else 0.0
     at_floor = not explanation.is_empirical and is_at_floor(after.floor_ratio, criteria, explained)
     new = fitted[len(before.fitted) :]
@@ -202,12 +201,12 @@ def _p_values(search: SubsetSearch, effects: tuple[int, ...]) -> dict[str, float
 
 def _next_measurement(problem: DiagnosisProblem, diagnosis: Diagnosis) -> list[dict[str, object]]:
     """Rows that tell the first rivals apart; where nothing explains the residual, what to vary."""
-    aligned, model = problem.aligned, problem.comparison.fitted
+    aligned, model, criteria = problem.aligned, problem.comparison.fitted, problem.criteria.comparison
     for step in diagnosis.steps:
         if step.rivals and aligned.model is not None:
             rival = problem.pool.candidates[step.rivals[0].member]
             try:
-                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um).fitted[-1]
+                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um, criteria).fitted[-1]
                 pair = (step.fitted, fitted_rival)
                 limits = recorded_limits(aligned)
                 return list(plan_measurement(aligned, model, pair, problem.sigma_um, limits, NEXT_ROWS).rows)

@@ -46,4 +46,8 @@ def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout
 
     Raises CompdError where the recording lacks what an effect needs.
     """
-    return Holdout(compare(aligned, diagnosis.before.fitted), compare(aligned, diagnosis.after.fitted))
+    before, after = (
+        compare(aligned, comparison.fitted, criteria=comparison.criteria)
+        for comparison in (diagnosis.before, diagnosis.after)
+    )
+    return Holdout(before, after)

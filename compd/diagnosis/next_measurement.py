@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,6 +19,7 @@ from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
 from compd.model.sensitivity import effect_sensitivity, sensitivities
+from compd.recording.plan_file import plan_row, plan_text, write_plan_file
 from compd.units import UM_PER_MM
 
 # Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
@@ -42,17 +42,11 @@ class MeasurementPlan:
 
     def write_to(self, stream: TextIO) -> None:
         """Write the rows as CSV."""
-        writer = csv.DictWriter(stream, list(self.rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
+        stream.write(plan_text(self.rows))
 
     def write(self, path: Path) -> None:
         """Write the rows as CSV. Raises RecordingError where the file cannot be written."""
-        try:
-            with path.open("w", newline="", encoding="utf-8") as stream:
-                self.write_to(stream)
-        except OSError as error:
-            raise RecordingError(Problem(where=str(path), what=f"cannot be written: {error.strerror}")) from error
+        write_plan_file(path, self.rows)
 
 
 class _ProgrammeSums(NamedTuple):
@@ -239,18 +233,18 @@ def _choose(
 def _rows_to_set(
     programme: Programme, observations: Observations, begin: int, names: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """What a person sets in each row of a programme; columns are named as in a recording where there are such.
+    """What a person sets in each row of a programme, by column of the plan's file.
 
     begin : the programme's first row among the observations.  names : quantities to be set.
     """
-    rows = []
-    for k in range(len(programme)):
-        index = begin + k
-        row: dict[str, Any] = {"purpose": programme.purpose, "time_s": round(float(programme.time_s[k]), 1)}
-        tip = zip("xyz", programme.tip_M_mm[k], strict=True)
-        row |= {f"tip_{axis}_mm": round(float(value), 3) for axis, value in tip}
-        row |= {name: round(float(observations.quantities[name][index]), 3) for name in names}
-        row |= {f"approach_{i + 1}": int(sign) for i, sign in enumerate(observations.direction[index])}
-        row["speed_mm_per_s"] = round(float(np.abs(observations.velocity_mm_per_s[index]).max()), 2)
-        rows.append(row)
-    return rows
+    return [
+        plan_row(
+            programme.purpose,
+            programme.time_s[k],
+            programme.tip_M_mm[k],
+            {name: observations.quantities[name][begin + k] for name in names},
+            observations.direction[begin + k],
+            np.abs(observations.velocity_mm_per_s[begin + k]).max(),
+        )
+        for k in range(len(programme))
+    ]

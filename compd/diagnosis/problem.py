@@ -11,6 +11,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import Comparison
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.robust import robust_regression
 from compd.diagnosis.candidates import Candidate, CandidatePool
@@ -84,7 +85,7 @@ def build_problem(
     residual = np.where(known[:, None], comparison.residual_um, 0.0) / sigma_um
     if outlier is None:
         everything = [nuisance, *_everything(aligned, pool, sigma_um, known)]
-        outlier = _outliers_beside(everything, residual, known, aligned.recording.visit)
+        outlier = _outliers_beside(everything, residual, known, aligned.recording.visit, criteria.comparison)
     rows = known & ~outlier
     data = RegressionData(
         residual[rows],
@@ -100,11 +101,16 @@ def screen_outliers(problem: DiagnosisProblem, candidates: Sequence[Candidate]) 
     """(N,) outliers beside some candidates alone."""
     columns = [candidate.columns_um / problem.sigma_um[:, None] for candidate in candidates]
     visit = problem.aligned.recording.visit
-    return _outliers_beside([problem.nuisance, *columns], problem.residual, problem.known, visit)
+    criteria = problem.criteria.comparison
+    return _outliers_beside([problem.nuisance, *columns], problem.residual, problem.known, visit, criteria)
 
 
 def _outliers_beside(
-    columns: Sequence[FloatArray], residual: FloatArray, known: BoolArray, visit: IntArray | None
+    columns: Sequence[FloatArray],
+    residual: FloatArray,
+    known: BoolArray,
+    visit: IntArray | None,
+    criteria: ComparisonCriteria,
 ) -> BoolArray:
     """(N,) outliers of what a robust fit of all columns (N, m, P) at once and a constant leaves of residual (N, m)."""
     constant = np.broadcast_to(np.eye(residual.shape[1]), (*residual.shape, residual.shape[1]))
@@ -114,7 +120,7 @@ def _outliers_beside(
     )
     left = np.full(residual.shape, np.nan)
     left[known] = residual[known] - G @ theta
-    return outlier_rows(left, known, visit)
+    return outlier_rows(left, known, visit, criteria)
 
 
 def _everything(

@@ -1,4 +1,4 @@
-"""The columns of a recording: what a name says, and how a wrong name is mended."""
+"""The columns of a recording: their names, units and decimals, and what was meant by a name that is none of them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from compd.configuration.operation import FRAME_DISTANCES
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
 from compd.units import KNOWN, conversion, unit_of
 
-FRAME_DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
 FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
 ID_COLUMNS = ("session", "visit", "point", "ball")
+POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
+ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
+# Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
+# that the conversion from mm to um leaves no digits of its own behind. Other units are written in full.
+DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
 
 # A stem (the name without its unit) and the one unit that the format gives it; "" = no unit.
 _STEMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
@@ -50,6 +55,37 @@ class Name(NamedTuple):
 
     stem: str
     unit: str
+
+
+def scale_columns(links: int) -> tuple[str, ...]:
+    """scale_1_mm ... of a machine with so many links."""
+    return tuple(f"scale_{i}_mm" for i in range(1, links + 1))
+
+
+def joint_columns(comparators: int) -> tuple[str, ...]:
+    """joint_1_um ... for so many joint comparators."""
+    return tuple(f"joint_{k}_um" for k in range(1, comparators + 1))
+
+
+def approach_columns(links: int) -> tuple[str, ...]:
+    """approach_1 ... of a machine with so many links."""
+    return tuple(f"approach_{i}" for i in range(1, links + 1))
+
+
+def link_reference_column(link: int) -> str:
+    """The column of the change of link `link` (1-based) by interferometer."""
+    return f"reference_link_{link}_mm"
+
+
+def decimals(name: str) -> int | None:
+    """How many decimals the column `name` is rounded to when it is written; None: written in full."""
+    column = known(name)
+    return DECIMALS.get(column.unit if column else unit_of(name))
+
+
+def number_text(value: float) -> str:
+    """A number as a cell holds it: the shortest text that reads back as the same float, without a needless ".0"."""
+    return repr(value).removesuffix(".0")
 
 
 def known(name: str) -> Name | None:

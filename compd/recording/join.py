@@ -12,9 +12,10 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.recording.clock_offset import Offset, agreement_at, estimate_offset
+from compd.recording.columns import link_reference_column
 from compd.recording.instrument_export import LENGTH, Track
 from compd.recording.recording import Recording
-from compd.recording.sidecar import Frame
+from compd.recording.sidecar import Frame, sidecar_contents
 from compd.recording.writer import write_recording
 
 # The machine stands still where the instrument sees less than this, or less than its own noise can feign.
@@ -84,7 +85,8 @@ def join(
             )
         )
     names = [
-        f"reference_link_{instrument.link}_mm" if axis == LENGTH else f"reference_{axis}_mm" for axis in track.axes
+        f"reference_{axis}_mm" if instrument.link is None else link_reference_column(instrument.link)
+        for axis in track.axes
     ]
     columns = {**recording.columns, **dict(zip(names, reference_mm.T, strict=True))}
     write_recording(out, columns, _sidecar(recording, track, instrument, offset, matched))
@@ -166,10 +168,6 @@ def _sidecar(
         reference["frame"] = instrument.frame
     if instrument.sigma_um is not None:
         reference["sigma_um"] = instrument.sigma_um
-    excluded = [
-        {"row": i + 2, "reason": recording.sidecar.excluded[int(recording.row[i])]}
-        for i in np.flatnonzero(recording.excluded).tolist()
-    ]
     joined: dict[str, Any] = {
         "gauges": recording.path.name,
         "gauges_sha256": recording.sha256,
@@ -180,11 +178,11 @@ def _sidecar(
     }
     known = {"agreement": offset.agreement, "offset_std_s": offset.std_s}
     joined |= {name: round(value, 6) for name, value in known.items() if not np.isnan(value)}
-    sidecar: dict[str, Any] = {"machine": recording.machine, "reference": reference}
-    if excluded:
-        sidecar["excluded_rows"] = excluded
-    sidecar["provenance"] = {**recording.sidecar.provenance, "join": joined}
-    return sidecar | ({"notes": recording.sidecar.notes} if recording.sidecar.notes else {})
+    excluded = {
+        int(i) + 2: recording.sidecar.excluded[int(recording.row[i])] for i in np.flatnonzero(recording.excluded)
+    }
+    provenance = {**recording.sidecar.provenance, "join": joined}
+    return sidecar_contents(recording.machine, reference, excluded, provenance, recording.sidecar.notes)
 
 
 def _told(left_out: Mapping[str, int]) -> str:

@@ -2,48 +2,193 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from compd.configuration.document import Document, Location, read
-from compd.errors import ConfigurationError, Problem
+import yaml
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from compd.configuration.document import Document, read
+from compd.configuration.section import Section, refusal, unknown_key, validate
+from compd.errors import ConfigurationError, Problem, RecordingError
+
+# What this release writes. Format 1, of release 0.1, has the same keys but no `format:`.
+FORMAT = 2
 EXTERNAL = "external"
-QUANTITIES = ("tool_position", "tool_pose", "link_length", "ball_plate")
-FRAMES = ("machine", "instrument")
 Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
 Frame = Literal["machine", "instrument"]
 
-_KEYS = ("machine", "reference", "excluded_rows", "provenance", "notes")
-_REFERENCE_KEYS = ("quantity", "frame", "sigma_um", "balls")
-_EXCLUSION_KEYS = ("row", "rows", "reason")
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
 _EXAMPLE = "machine: tripod-cmm, and under it reference: {quantity: tool_position, frame: machine}"
+# Row 1 is the header.
+_FIRST_ROW = 2
 
 
-@dataclass(frozen=True)
-class Reference:
+class Reference(Section):
     """What the reference instrument measured.
 
     Attributes
     ----------
     quantity : which columns hold it.
     frame : `machine`: in {M}; `instrument`: in the instrument's own frame, so that six registration
-        parameters are always fitted. A ball plate's coordinates are its own: `instrument` unless said.
+        parameters are always fitted. A ball plate's coordinates are its own: `instrument` unless it is written.
         A link's length has no frame: `machine`.
-    sigma_um : standard uncertainty: one for every axis, or one for each; nan where nobody gave it.
-    balls : the ball plate's file (ball_plate only).
+    sigma_um : standard uncertainty: one for every axis, or one for each; nan where it is not known.
+    balls : the ball plate's file (ball_plate only), relative to the sidecar's directory.
     """
 
     quantity: Quantity
-    frame: Frame
+    frame: Frame = Field(default="machine", validate_default=True)
     sigma_um: tuple[float, ...] = (math.nan,)
-    balls: Path | None = None
+    balls: Path | None = Field(default=None, validate_default=True)
+
+    @field_validator("quantity", mode="before")
+    @classmethod
+    def _known_quantity(cls, quantity: Any) -> Any:
+        return _one_of(quantity, get_args(Quantity), "say what the instrument measured")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mapping(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            raise refusal("must hold `quantity:` and what belongs to it", next_step="see the format")
+        # a key without a value is a missing key; the frame's default depends on the quantity
+        return {"quantity": None, "frame": None, **{key: value for key, value in data.items() if value is not None}}
+
+    @field_validator("frame", mode="before")
+    @classmethod
+    def _frame_of_the_quantity(cls, frame: Any, info: ValidationInfo) -> Any:
+        quantity = info.data.get("quantity")
+        if frame is None and quantity in ("link_length", "ball_plate"):
+            return "instrument" if quantity == "ball_plate" else "machine"
+        if quantity == "link_length" and frame == "instrument":
+            raise refusal("a link's length has no frame", "machine, or nothing", "delete it")
+        return _one_of(frame, get_args(Frame), "say in which frame the reference columns are")
+
+    @field_validator("sigma_um", mode="before")
+    @classmethod
+    def _standard_uncertainties(cls, sigma: Any) -> Any:
+        sigmas = sigma if isinstance(sigma, list) else [sigma]
+        numbers = [value for value in sigmas if isinstance(value, int | float) and not isinstance(value, bool)]
+        if not sigmas or len(numbers) != len(sigmas) or not all(0 < number < math.inf for number in numbers):
+            raise refusal(
+                "is no standard uncertainty",
+                "a number greater than 0 in micrometres, or one for each axis: [0.1, 0.1, 0.3]",
+                "leave it out where it is not known",
+            )
+        return tuple(numbers)
+
+    @field_validator("balls", mode="before")
+    @classmethod
+    def _balls_of_a_ball_plate(cls, balls: Any, info: ValidationInfo) -> Any:
+        quantity = info.data.get("quantity")
+        if quantity == "ball_plate" and (not isinstance(balls, str) or not balls):
+            raise refusal(
+                "is missing" if balls is None else "is no file name",
+                "a CSV file: ball, x_mm, y_mm, z_mm",
+                "name the plate's file, beside the sidecar",
+            )
+        if quantity not in (None, "ball_plate") and balls is not None:
+            raise refusal(f"belongs to ball_plate, not to {quantity}", next_step="delete it")
+        return balls
+
+
+def _one_of(value: Any, names: tuple[str, ...], next_step: str) -> Any:
+    if value not in names:
+        raise refusal("is missing" if value is None else "is unknown", ", ".join(names), next_step)
+    return value
+
+
+def _row_numbers(value: Any) -> tuple[int, ...]:
+    """17 -> (17,); [17, 20] -> both; "17-20" -> four rows."""
+    rows: list[Any] = value if isinstance(value, list) else [value]
+    if isinstance(value, str) and (match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", value)):
+        rows = list(range(int(match[1]), int(match[2]) + 1))
+    numbers = [row for row in rows if isinstance(row, int) and not isinstance(row, bool) and row >= _FIRST_ROW]
+    if not rows or len(numbers) != len(rows):
+        raise refusal(
+            "names no row",
+            f"rows as a spreadsheet shows them (header = row 1): {_EXCLUSION}",
+            "give the row's number",
+        )
+    return tuple(numbers)
+
+
+RowNumbers = Annotated[tuple[int, ...], BeforeValidator(_row_numbers)]
+
+
+class Exclusion(Section):
+    """Rows that a person left out, and why: `{row: 17, reason: ...}`, `{rows: [17, 20], ...}`, `{rows: 17-20, ...}`."""
+
+    row: RowNumbers = ()
+    rows: RowNumbers = ()
+    reason: str = Field(default="", validate_default=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mapping_with_rows(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            raise refusal("has no reason", _EXCLUSION, "say why the row is left out")
+        # neither key: the row that is missing is reported as a wrong one is
+        return data if "row" in data or "rows" in data else {**data, "row": None}
+
+    @field_validator("reason", mode="before")
+    @classmethod
+    def _stated_reason(cls, reason: Any) -> str:
+        text = str(reason or "").strip()
+        if not text:
+            raise refusal("is missing", _EXCLUSION, "say why the row is left out")
+        return str(reason)
+
+
+def _checked_format(value: Any) -> int:
+    if value is None:
+        return 1
+    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        raise refusal("is no format number", f"1 to {FORMAT}", f"write `format: {FORMAT}`, or leave it out")
+    return value
+
+
+def _checked_machine(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise refusal(
+            "names no machine",
+            "the name of a machine configuration, or `external`",
+            "write `machine: tripod-cmm`",
+        )
+    return value
+
+
+def _checked_exclusions(value: Any) -> Any:
+    if value is not None and not isinstance(value, list):
+        raise refusal("must be a list", _EXCLUSION, "write one entry per reason")
+    return value or []
+
+
+def _mapping_or_nothing(value: Any) -> Any:
+    if value is not None and not isinstance(value, dict):
+        raise refusal("is of the wrong kind", "`key: value` lines")
+    return value or {}
+
+
+def _text_or_nothing(value: Any) -> Any:
+    if value is not None and not isinstance(value, str):
+        raise refusal("is of the wrong kind", "text")
+    return value or ""
+
+
+_SECTIONS: Mapping[str, Any] = {
+    "format": Annotated[int, BeforeValidator(_checked_format)],
+    "machine": Annotated[str, BeforeValidator(_checked_machine)],
+    "reference": Reference | None,
+    "excluded_rows": Annotated[tuple[Exclusion, ...], BeforeValidator(_checked_exclusions)],
+    "provenance": Annotated[dict[Any, Any], BeforeValidator(_mapping_or_nothing)],
+    "notes": Annotated[str, BeforeValidator(_text_or_nothing)],
+}
 
 
 @dataclass(frozen=True)
@@ -56,6 +201,7 @@ class Sidecar:
     reference : None in a recording of gauges alone, to which `compd join` adds one.
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.
+    format : number of the format that the file was written in.
     """
 
     path: Path
@@ -64,6 +210,7 @@ class Sidecar:
     excluded: Mapping[int, str] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: str = ""
+    format: int = FORMAT
 
     @property
     def external(self) -> bool:
@@ -72,7 +219,11 @@ class Sidecar:
 
 
 def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
-    """Read a sidecar; what is wrong goes to `problems`. None where there is none that can be read."""
+    """Read a sidecar; what is wrong goes to `problems`. None where there is none that can be read.
+
+    With problems the Sidecar has what could be read, so that the columns can be checked against it all the same.
+    Raises RecordingError for a file of a newer format, in which nothing else can be judged.
+    """
     if not path.is_file():
         problems.append(Problem(where=str(path), what="the sidecar is missing", next_step=f"write it: {_EXAMPLE}"))
         return None
@@ -81,164 +232,69 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
     except ConfigurationError as error:
         problems += error.problems
         return None
-    return _SidecarReader(document, problems).sidecar()
+    _refuse_newer_format(document)
+    problems += [unknown_key(document, (key,), list(_SECTIONS)) for key in document.data if key not in _SECTIONS]
+    sections = {key: validate(kind, document, (key,), problems) for key, kind in _SECTIONS.items()}
+    reference = sections["reference"]
+    if reference is None:
+        reference = _quantity_alone(document)
+    elif reference.balls is not None:
+        reference = reference.model_copy(update={"balls": path.parent / reference.balls})
+    exclusions: tuple[Exclusion, ...] = sections["excluded_rows"] or ()
+    return Sidecar(
+        path,
+        sections["machine"] or "",
+        reference,
+        {row: exclusion.reason for exclusion in exclusions for row in (*exclusion.row, *exclusion.rows)},
+        sections["provenance"] or {},
+        sections["notes"] or "",
+        sections["format"] or FORMAT,
+    )
 
 
-class _SidecarReader:
-    """One pass over one document; every finding with its line."""
+def sidecar_contents(
+    machine: str,
+    reference: Mapping[str, Any] | None = None,
+    excluded: Mapping[int, str] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    notes: str = "",
+) -> dict[str, Any]:
+    """What a sidecar is to hold, as plain data; keys without a value are left out.
 
-    def __init__(self, document: Document, problems: list[Problem]) -> None:
-        self.document = document
-        self.problems = problems
+    excluded : spreadsheet row -> reason, as `Sidecar.excluded`.
+    """
+    contents = {
+        "machine": machine,
+        "reference": reference,
+        "excluded_rows": [{"row": row, "reason": reason} for row, reason in (excluded or {}).items()],
+        "provenance": provenance,
+        "notes": notes,
+    }
+    return {key: value for key, value in contents.items() if value}
 
-    def sidecar(self) -> Sidecar | None:
-        data = self.document.data
-        self._unknown((), data, _KEYS)
-        machine = data.get("machine")
-        if not isinstance(machine, str) or not machine:
-            self._fault(
-                ("machine",),
-                "names no machine",
-                "the name of a machine configuration, or `external`",
-                "write `machine: tripod-cmm`",
+
+def sidecar_text(contents: Mapping[str, Any]) -> str:
+    """The file's text, with the format's number first."""
+    return yaml.safe_dump({"format": FORMAT, **contents}, sort_keys=False, allow_unicode=True)
+
+
+def _refuse_newer_format(document: Document) -> None:
+    value = document.value(("format",))
+    if isinstance(value, int) and value > FORMAT:
+        raise RecordingError(
+            Problem(
+                where=document.where(("format",)),
+                what="was written by a newer release of compd",
+                value=str(value),
+                allowed=f"1 to {FORMAT}",
+                next_step="update compd on this computer, or export the recording with the older release",
             )
-            machine = ""
-        return Sidecar(
-            self.document.path,
-            machine,
-            self._reference(data.get("reference")),
-            self._excluded(data.get("excluded_rows")),
-            self._typed("provenance", dict, {}, "`key: value` lines"),
-            self._typed("notes", str, "", "text"),
-        )
-
-    def _reference(self, data: Any) -> Reference | None:
-        if data is None:
-            return None
-        if not isinstance(data, dict):
-            self._fault(("reference",), "must hold `quantity:` and what belongs to it", "", "see the format")
-            return None
-        self._unknown(("reference",), data, _REFERENCE_KEYS)
-        quantity = data.get("quantity")
-        if quantity not in QUANTITIES:
-            self._fault(
-                ("reference", "quantity"),
-                "is missing" if quantity is None else "is unknown",
-                ", ".join(QUANTITIES),
-                "say what the instrument measured",
-            )
-            return None
-        return Reference(quantity, self._frame(data, quantity), self._sigma(data), self._balls(data, quantity))
-
-    def _frame(self, data: dict[str, Any], quantity: Quantity) -> Frame:
-        frame = data.get("frame")
-        if frame is None and quantity in ("link_length", "ball_plate"):
-            return "instrument" if quantity == "ball_plate" else "machine"
-        if frame not in FRAMES:
-            self._fault(
-                ("reference", "frame"),
-                "is missing" if frame is None else "is unknown",
-                ", ".join(FRAMES),
-                "say in which frame the reference columns are",
-            )
-        elif quantity == "link_length" and frame == "instrument":
-            self._fault(("reference", "frame"), "a link's length has no frame", "machine, or nothing", "delete it")
-        return "instrument" if frame == "instrument" else "machine"
-
-    def _sigma(self, data: dict[str, Any]) -> tuple[float, ...]:
-        sigma = data.get("sigma_um")
-        if sigma is None:
-            return (math.nan,)
-        each = sigma if isinstance(sigma, list) else [sigma]
-        numbers = [
-            float(s) for s in each if isinstance(s, int | float) and not isinstance(s, bool) and 0 < s < math.inf
-        ]
-        if not each or len(numbers) != len(each):
-            self._fault(
-                ("reference", "sigma_um"),
-                "is no standard uncertainty",
-                "a number greater than 0 in micrometres, or one for each axis: [0.1, 0.1, 0.3]",
-                "leave it out where it is not known",
-            )
-            return (math.nan,)
-        return tuple(numbers)
-
-    def _balls(self, data: dict[str, Any], quantity: Quantity) -> Path | None:
-        balls = data.get("balls")
-        if quantity != "ball_plate":
-            if balls is not None:
-                self._fault(("reference", "balls"), f"belongs to ball_plate, not to {quantity}", "", "delete it")
-            return None
-        if not isinstance(balls, str) or not balls:
-            self._fault(
-                ("reference", "balls"),
-                "is missing" if balls is None else "is no file name",
-                "a CSV file: ball, x_mm, y_mm, z_mm",
-                "name the plate's file, beside the sidecar",
-            )
-            return None
-        return self.document.path.parent / balls
-
-    def _excluded(self, data: Any) -> dict[int, str]:
-        """Row -> reason from `{row: 17, reason: ...}`, `{rows: [17, 20], ...}` or `{rows: 17-20, ...}`."""
-        excluded: dict[int, str] = {}
-        if data is not None and not isinstance(data, list):
-            self._fault(("excluded_rows",), "must be a list", _EXCLUSION, "write one entry per reason")
-            return excluded
-        for i, entry in enumerate(data or []):
-            here: Location = ("excluded_rows", i)
-            if not isinstance(entry, dict):
-                self._fault(here, "has no reason", _EXCLUSION, "say why the row is left out")
-                rows = _row_numbers(entry)
-            else:
-                self._unknown(here, entry, _EXCLUSION_KEYS)
-                rows = _row_numbers(entry.get("rows", entry.get("row")))
-                if not str(entry.get("reason") or "").strip():
-                    self._fault((*here, "reason"), "is missing", _EXCLUSION, "say why the row is left out")
-            if not rows or min(rows) < 2:
-                self._fault(
-                    here,
-                    "names no row",
-                    f"rows as a spreadsheet shows them (header = row 1): {_EXCLUSION}",
-                    "give the row's number",
-                )
-            reason = entry.get("reason") if isinstance(entry, dict) else None
-            excluded |= dict.fromkeys(rows, str(reason or "no reason given"))
-        return excluded
-
-    def _typed(self, key: str, kind: type[Any], default: Any, allowed: str) -> Any:
-        value = self.document.data.get(key)
-        if value is not None and not isinstance(value, kind):
-            self._fault((key,), "is of the wrong kind", allowed)
-            return default
-        return default if value is None else value
-
-    def _unknown(self, location: Location, data: dict[str, Any], allowed: tuple[str, ...]) -> None:
-        for key in data:
-            if key not in allowed:
-                close = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.6)
-                self._fault(
-                    (*location, key),
-                    "unknown key",
-                    ", ".join(allowed),
-                    f"did you mean `{close[0]}`?" if close else "remove it",
-                )
-
-    def _fault(self, location: Location, what: str, allowed: str = "", next_step: str = "") -> None:
-        value = self.document.value(location)
-        long = isinstance(value, dict | list) and len(str(value)) > 80
-        shown = "" if value is None or long else repr(value)
-        self.problems.append(
-            Problem(where=self.document.where(location), what=what, value=shown, allowed=allowed, next_step=next_step)
         )
 
 
-def _row_numbers(value: Any) -> list[int]:
-    """17 -> [17]; [17, 20] -> both; "17-20" -> four rows; anything else -> []."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return [value]
-    if isinstance(value, list) and all(isinstance(row, int) and not isinstance(row, bool) for row in value):
-        return value
-    if isinstance(value, str) and (match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", value)):
-        return list(range(int(match[1]), int(match[2]) + 1))
-    return []
+def _quantity_alone(document: Document) -> Reference | None:
+    """A faulty reference reduced to its quantity, which says what columns there must be; None where that is faulty."""
+    quantity = document.value(("reference", "quantity"))
+    if quantity not in get_args(Quantity):
+        return None
+    return Reference.model_construct(quantity=quantity, frame="machine", sigma_um=(math.nan,), balls=None)

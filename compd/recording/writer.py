@@ -8,32 +8,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.files import write_files
-from compd.recording.columns import is_covariate, known
-from compd.units import unit_of
-
-# Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
-# that a conversion from mm to um leaves no digits of its own behind. Other units are written in full.
-DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
+from compd.recording.columns import decimals, is_covariate, known, number_text
+from compd.recording.sidecar import sidecar_text
 
 
 def write_recording(
     path: Path, columns: Mapping[str, ArrayLike], sidecar: Mapping[str, Any], overwrite: bool = False
 ) -> None:
-    """Write NAME.csv (`path`) and NAME.yaml beside it.
+    """Write NAME.csv (`path`) and NAME.yaml beside it, both whole or neither.
 
+    Parameters
+    ----------
     columns : name with unit -> (N,) numbers in that unit, nan (an empty cell) where nothing was measured.
-    sidecar : what the YAML file is to hold.
+    sidecar : what the YAML file is to hold, as `sidecar_contents` returns it.
+    overwrite : whether existing files are replaced.
 
-    Both are written beside their place, flushed to the disk and then renamed, the sidecar first: a reader never
-    sees half a file, and a failure leaves what was there. Raises RecordingError for names that are not the
-    format's, unequal lengths, infinite numbers, a time_s that is missing or does not rise, an existing file
-    without `overwrite`, and a disk that does not take the files.
+    Raises
+    ------
+    RecordingError
+        For names that are not the format's, unequal lengths, infinite numbers, a time_s that is missing or does not
+        rise, an existing file without `overwrite`, and a disk that does not take the files.
     """
     arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
     if problems := _problems(path, arrays, overwrite):
@@ -41,10 +40,9 @@ def write_recording(
     cells = [_cells(name, values) for name, values in arrays.items()]
     lines = [",".join(arrays), *map(",".join, zip(*cells, strict=True))]
     csv_text = "\n".join(lines) + "\n"
-    yaml_text = yaml.safe_dump(dict(sidecar), sort_keys=False, allow_unicode=True)
     try:
         # whoever works on the recording must be able to read it
-        write_files({path.with_suffix(".yaml"): yaml_text, path: csv_text}, mode=0o644)
+        write_files({path.with_suffix(".yaml"): sidecar_text(sidecar), path: csv_text}, mode=0o644)
     except OSError as error:
         raise RecordingError(Problem(where=str(path.parent), what=f"cannot be written to: {error.strerror}")) from error
 
@@ -80,12 +78,11 @@ def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> 
 
 
 def _rounded(name: str, values: FloatArray) -> FloatArray:
-    """Values with the decimals of their unit."""
-    column = known(name)
-    unit = column.unit if column else unit_of(name)
-    return np.round(values, DECIMALS[unit]) if unit in DECIMALS else values
+    """Values with the decimals of their column."""
+    places = decimals(name)
+    return values if places is None else np.round(values, places)
 
 
 def _cells(name: str, values: FloatArray) -> list[str]:
-    """A column as it is written: the shortest text that reads back as the same number, without a needless ".0"."""
-    return ["" if math.isnan(value) else repr(value).removesuffix(".0") for value in _rounded(name, values).tolist()]
+    """The column's cells; empty for nan."""
+    return ["" if math.isnan(value) else number_text(value) for value in _rounded(name, values).tolist()]

@@ -226,7 +226,7 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
     elif effect.needs == ("time",):
         hours = spread(0, 10)
         drives.append(("time, h", hours, Drive(here, time_s=hours * HOUR_S)))
-    if not effect.needs and effect.ports in (("joint",), ("frame",)):
+    if effect.follows_reading:
         reading = spread(-0.02, 0.02)
         changed = Drive(here, joint_mm=reading) if effect.ports == ("joint",) else Drive(here, frame_mm=reading)
         drives.append(("reading of all comparators, mm", reading, changed))

@@ -9,8 +9,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues
 from compd.configuration import Configuration
-from compd.configuration.crosscheck import DISTANCES
-from compd.configuration.operation import FrameWire
+from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.model.apply_effects import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
@@ -26,7 +25,7 @@ def declared_noise(configuration: Configuration) -> GaugeNoise | None:
     scale = sorted(wiring.scale, key=lambda wire: wire.link)
     scale_mm, joint_mm, frame_mm = (
         np.array([gauges[wire.gauge.split(".")[0]].noise_um or math.nan for wire in wires]) / UM_PER_MM
-        for wires in (scale, wiring.joint, [frame[distance] for distance in DISTANCES])
+        for wires in (scale, wiring.joint, [frame[distance] for distance in FRAME_DISTANCES])
     )
     if not all(np.isfinite(sigma_mm).all() for sigma_mm in (scale_mm, joint_mm, frame_mm)):
         return None

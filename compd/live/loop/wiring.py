@@ -10,8 +10,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.configuration.crosscheck import DISTANCES, resolve
-from compd.configuration.operation import FrameWire
+from compd.configuration.crosscheck import resolve
+from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
 from compd.readings import Latest, Snapshot
@@ -107,7 +107,7 @@ class MachineWires:
         self.comparators = Wires(
             [
                 *(wire(w.gauge, f"joint {k}", w.sign) for k, w in enumerate(wiring.joint, start=1)),
-                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in DISTANCES),
+                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in FRAME_DISTANCES),
             ]
         )
         self.joints = len(wiring.joint)

@@ -9,20 +9,16 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from compd.files import sync_directory, write_new_file
 from compd.json_text import encode_compact
+from compd.recording.columns import approach_columns, decimals, number_text
+from compd.recording.sidecar import sidecar_contents, sidecar_text
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]
 
 CYCLES_SUFFIX = ".cycles.jsonl"
 MODEL_MARK = ".model-"
-# A picometre and a microsecond, as the format's other writers do: no gauge is finer, and no conversion from
-# mm to um leaves digits of its own.
-_DECIMALS = {"mm": 9, "um": 6}
-_DECIMALS_S = 6
 
 
 class RecordingPart:
@@ -43,12 +39,13 @@ class RecordingPart:
         self.start_s: float = first["time_s"]
         self.rows = 0
         self._columns: Sequence[Message] = watch["columns"]
+        names = ["time_s", *(column["column"] for column in self._columns)]
+        self._decimals = {name: decimals(name) for name in names}
         self._origin_s = origin_s
-        sidecar = yaml.safe_dump(self._sidecar(version, watch, started_at), sort_keys=False).encode()
+        sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
         opened = b"".join(encode_compact(message).encode() + b"\n" for message in opening)
         self._links = len(first.get("approach", ()))
-        approach = [f"approach_{i + 1}" for i in range(self._links)]
-        header = ",".join(["time_s", *(column["column"] for column in self._columns), *approach]).encode() + b"\n"
+        header = ",".join([*names, *approach_columns(self._links)]).encode() + b"\n"
         self._stem = stem
         self._models: dict[str, Path] = {}
         self._whole_size = 0
@@ -110,7 +107,7 @@ class RecordingPart:
 
     def _row(self, message: Message) -> str:
         now_s, readings = message["time_s"], message["readings"]
-        cells = [_number(now_s - self._origin_s, _DECIMALS_S)]
+        cells = [self._number("time_s", now_s - self._origin_s)]
         cells += [self._cell(column, readings[column["channel"]], now_s) for column in self._columns]
         # empty until a link has moved
         cells += [str(way) if way else "" for way in message.get("approach", ())[: self._links]]
@@ -124,14 +121,17 @@ class RecordingPart:
         if "sign" not in column:
             return repr(value)
         change_mm = column["sign"] * (value - self.zero["readings_mm"][column["channel"]])
-        if name.endswith("_um"):
-            return _number(change_mm * UM_PER_MM, _DECIMALS["um"])
-        return _number(change_mm, _DECIMALS["mm"])
+        return self._number(name, change_mm * UM_PER_MM if name.endswith("_um") else change_mm)
+
+    def _number(self, column: str, value: float) -> str:
+        """`value` with the decimals of its column; -0 is written as 0."""
+        places = self._decimals[column]
+        return number_text((value if places is None else round(value, places)) + 0.0)
 
     def _sidecar(self, version: Message, watch: Message, started_at: str) -> dict[str, Any]:
-        return {
-            "machine": version["machine"],
-            "provenance": {
+        return sidecar_contents(
+            version["machine"],
+            provenance={
                 "recorded_by": f"compd record {version['release']}",
                 "config_hash": version["config_hash"],
                 "started_at": started_at,
@@ -149,8 +149,8 @@ class RecordingPart:
                     if "sign" in column
                 },
             },
-            "notes": "Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
-        }
+            notes="Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
+        )
 
 
 class LinesFile:
@@ -183,8 +183,3 @@ class LinesFile:
 
     def close(self) -> None:
         self._file.close()
-
-
-def _number(value: float, decimals: int) -> str:
-    """The shortest text that reads back as the same number, without a needless ".0"."""
-    return repr(round(value, decimals) + 0.0).removesuffix(".0")

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from compd.configuration.crosscheck import DISTANCES
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading
 from compd.live.loop.commands import Target
@@ -23,6 +22,7 @@ from compd.live.loop.wiring import MachineWires
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
 from compd.readings import Snapshot
+from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
 
 
 class RecordedCycle(NamedTuple):
@@ -74,12 +74,7 @@ def columns(wires: MachineWires) -> list[dict[str, Any]]:
     A length's column is sign * (reading - machine zero), in the unit at the end of its name; a quantity, which has
     no sign here, is recorded as it is read.
     """
-    joints = wires.joints
-    names = [
-        *(f"scale_{i}_mm" for i, _ in enumerate(wires.scale.wires, start=1)),
-        *(f"joint_{k}_um" for k in range(1, joints + 1)),
-        *(f"frame_{distance}_um" for distance in DISTANCES),
-    ]
+    names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints), *FRAME_COLUMNS]
     found: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)

@@ -1,13 +1,7 @@
-"""The file of a planned measurement, as `compd plan` writes it: read, and checked against the machine.
-
-One row per measurement, a header, `.` decimal, UTF-8: where the tool's tip is to be in {M}, what is held meanwhile,
-from which side each link comes, how fast it passes. A time that does not rise begins a new programme.
-"""
+"""A planned measurement for the simulated machine: its file read, and checked against what the machine can do."""
 
 from __future__ import annotations
 
-import csv
-import difflib
 import math
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -16,19 +10,17 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, KinematicsError, Problem
+from compd.recording.columns import approach_columns
+from compd.recording.plan_file import SPEED_COLUMN, TIP_COLUMNS, PlanFile, PlanLine, read_plan_file
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.tour import STROKE_SHARE
 from compd.simulation.truth.warm_up import PARTS
 
-TIP = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
-NEEDED = ("time_s", *TIP)
-SPEED = "speed_mm_per_s"
 # What can be held by heaters and coolers in a laboratory, by a climate chamber and by a loading device; pressure: the
 # lowest and highest at sea level on record (WMO).
-_RANGES = {"degC": (0.0, 60.0), "hPa": (870.0, 1085.0), "pct": (0.0, 100.0), "N": (-1000.0, 1000.0)}
-_AGAIN = "`compd plan` writes such a file"
+_LIMITS_BY_UNIT = {"degC": (0.0, 60.0), "hPa": (870.0, 1085.0), "pct": (0.0, 100.0), "N": (-1000.0, 1000.0)}
 
 
 def quantities(links: int) -> tuple[str, ...]:
@@ -49,189 +41,126 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
 
     Raises CompdError with everything that is wrong with the file.
     """
-    return _PlanReader(path, mechanism, measured).rows()
-
-
-class _PlanReader:
-    """One pass over one file; every finding with line and column."""
-
-    def __init__(self, path: Path, mechanism: Mechanism, measured: Collection[str] | None) -> None:
-        self._path, self._mechanism = path, mechanism
-        self._problems: list[Problem] = []
-        self._approaches = tuple(f"approach_{i}" for i in range(1, mechanism.links + 1))
-        self._held = quantities(mechanism.links)
-        self._measured = self._held if measured is None else measured
-
-    def rows(self) -> tuple[PlannedRow, ...]:
-        header, lines = self._lines()
-        self._check_header(header)
-        places: dict[tuple[float, ...], int] = {}
-        found: list[PlannedRow] = []
-        before_s = math.inf
-        for line, cells in lines:
-            values = self._numbers(line, header, cells)
-            place = tuple(values.get(name, math.nan) for name in TIP)
-            scale_mm = self._scale_mm(line, place)
-            time_s = values.get("time_s", math.nan)
-            row = PlannedRow(
-                len(found) + 1,
-                dict(zip(header, cells, strict=False)).get("purpose", ""),
-                places.setdefault(place, len(places) + 1),
-                not time_s > before_s,
-                time_s,
-                scale_mm,
-                np.array([values.get(name, 0.0) for name in self._approaches]),
-                values.get(SPEED, 0.0),
-                {name: values[name] for name in self._held if name in values},
+    if mechanism.tip_frame != "M":
+        raise CompdError(
+            Problem(
+                where=str(path),
+                what="is for a tool on the platform; this one stands on the plate",
+                value="plate",
+                allowed="tool on: platform",
+                next_step="plan by hand, and drive there",
             )
-            self._check_way(line, row)
-            found.append(row)
-            before_s = time_s
-        if header and not lines:
-            self._fault("", "has no row", allowed="a header and at least one row", next_step=_AGAIN)
-        if self._problems:
-            raise CompdError(self._problems)
-        return tuple(found)
-
-    # --- the file -------------------------------------------------------------------------------------
-
-    def _lines(self) -> tuple[list[str], list[tuple[int, list[str]]]]:
-        """The header, and every other row that is not empty with its line."""
-        try:
-            with self._path.open(encoding="utf-8-sig", newline="") as stream:
-                reader = csv.reader(stream)
-                lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            why = error.strerror if isinstance(error, OSError) else str(error)
-            raise CompdError(Problem(where=str(self._path), what=f"cannot be read: {why}", next_step=_AGAIN)) from error
-        if self._mechanism.tip_frame != "M":
-            raise CompdError(
-                Problem(
-                    where=str(self._path),
-                    what="is for a tool on the platform; this one stands on the plate",
-                    value="plate",
-                    allowed="tool on: platform",
-                    next_step="plan by hand, and drive there",
-                )
-            )
-        if not lines:
-            raise CompdError(
-                Problem(where=str(self._path), what="is empty", allowed="a header and rows", next_step=_AGAIN)
-            )
-        return lines[0][1], lines[1:]
-
-    def _check_header(self, header: Sequence[str]) -> None:
-        known = ("row", "purpose", *NEEDED, *self._held, *self._approaches, SPEED)
-        for name in dict.fromkeys(header):
-            if header.count(name) > 1:
-                self._fault(f":1 column {name}", "is there twice", next_step="delete one")
-            if name in self._held and name not in self._measured:
-                self._fault(
-                    f":1 column {name}",
-                    "no gauge of this machine measures it: no recording will tell",
-                    name,
-                    ", ".join(self._measured) or "nothing beside lengths",
-                    "wire one to it in the configuration, or delete the column",
-                )
-            if name in known:
-                continue
-            close = difflib.get_close_matches(name, known, n=1)
-            step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
-            self._fault(f":1 column {name}", "is nothing that this machine can be told", name, ", ".join(known), step)
-        for name in NEEDED:
-            if name not in header:
-                self._fault(f":1 column {name}", "is missing", allowed=", ".join(NEEDED), next_step=_AGAIN)
-
-    def _numbers(self, line: int, header: Sequence[str], cells: Sequence[str]) -> dict[str, float]:
-        """Values by column, nan where a cell is wrong."""
-        if len(cells) != len(header):
-            self._fault(
-                f":{line}",
-                "has not as many cells as the header",
-                str(len(cells)),
-                str(len(header)),
-                "write a number with `.`, and no comma in a purpose without quotes",
-            )
-        values = {}
-        for name, cell in zip(header, cells, strict=False):
-            if name in (*NEEDED, *self._held, *self._approaches, SPEED):
-                values[name] = self._number(f":{line} column {name}", name, cell)
-        return values
-
-    def _number(self, place: str, name: str, cell: str) -> float:
-        low, high = self._range(name)
-        allowed = f"{low:g} to {high:g}" if math.isfinite(high) else "a number" if low < 0 else "0 or more"
-        allowed = "-1, 0 or 1" if name in self._approaches else allowed
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            self._fault(place, "is no number" if cell else "is empty", cell, allowed, "write a number")
-            return math.nan
-        if not low <= value <= high or (name in self._approaches and value not in (-1, 0, 1)):
-            what = "is faster than this machine's drives" if name == SPEED and value > high else "is out of range"
-            self._fault(place, what, cell, allowed, "change the row, or give `compd plan` the limit")
-            return math.nan
-        return value
-
-    def _range(self, name: str) -> tuple[float, float]:
-        if name in self._approaches:
-            return -1.0, 1.0
-        if name in ("time_s", SPEED):
-            return 0.0, math.inf if name == "time_s" else SPEED_MM_PER_S
-        return _RANGES.get(name.rpartition("_")[2], (-math.inf, math.inf))
-
-    # --- the machine ----------------------------------------------------------------------------------
-
-    def _scale_mm(self, line: int, tip: Sequence[float]) -> FloatArray:
-        """(n,) for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where that is not known."""
-        nowhere = np.full(self._mechanism.links, math.nan)
-        if not all(map(math.isfinite, tip)):
-            return nowhere
-        try:
-            posture = self._mechanism.posture_at(np.array(tip), np.zeros(3))
-        except KinematicsError:
-            posture = None
-        scale_mm = nowhere if posture is None else self._mechanism.lengths(posture) - self._mechanism.lengths0_mm
-        if not self._within_stroke(scale_mm):
-            self._fault(
-                f":{line} column {', '.join(TIP)}",
-                "this machine cannot reach the place",
-                ", ".join(f"{value:g}" for value in tip),
-                self._stroke(),
-                "plan with a narrower --workspace",
-            )
-            return nowhere
-        return scale_mm
-
-    def _check_way(self, line: int, row: PlannedRow) -> None:
-        if row.on_the_move and not row.approach.any():
-            self._fault(
-                f":{line} column approach_1 ...",
-                "a row on the move needs a direction",
-                "0",
-                "-1 or 1 for the links that move",
-                "write it, or speed_mm_per_s 0",
-            )
-        ways = [row.turning_mm, row.end_mm]
-        if all(np.isfinite(one).all() for one in ways) and not all(map(self._within_stroke, ways)):
-            self._fault(
-                f":{line} column approach_1 ...",
-                "there is no room to come from this side",
-                ", ".join(f"{value:g}" for value in row.approach),
-                self._stroke(),
-                "plan with a narrower --workspace",
-            )
-
-    def _within_stroke(self, scale_mm: FloatArray) -> bool:
-        return bool(np.all(np.abs(scale_mm) <= STROKE_SHARE * self._mechanism.lengths0_mm))
-
-    def _stroke(self) -> str:
-        stroke_mm = STROKE_SHARE * float(self._mechanism.lengths0_mm.min())
-        return f"links within {stroke_mm:.0f} mm of machine zero"
-
-    def _fault(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        self._problems.append(
-            Problem(where=f"{self._path}{place}", what=what, value=value, allowed=allowed, next_step=next_step)
         )
+    names = quantities(mechanism.links)
+    limits = {name: _LIMITS_BY_UNIT[name.rpartition("_")[2]] for name in names}
+    problems: list[Problem] = []
+    file = read_plan_file(path, mechanism.links, {**limits, SPEED_COLUMN: (0.0, SPEED_MM_PER_S)}, problems)
+    problems += _unmeasured(file, names, names if measured is None else measured)
+    rows = _planned_rows(file, mechanism, names, problems)
+    if problems:
+        raise CompdError(problems)
+    return rows
+
+
+def _unmeasured(file: PlanFile, names: Collection[str], measured: Collection[str]) -> list[Problem]:
+    """A problem for every quantity that is to be held but that no gauge measures."""
+    return [
+        Problem(
+            where=f"{file.path}:1 column {name}",
+            what="no gauge of this machine measures it: no recording will tell",
+            value=name,
+            allowed=", ".join(measured) or "nothing beside lengths",
+            next_step="wire one to it in the configuration, or delete the column",
+        )
+        for name in file.header
+        if name in names and name not in measured
+    ]
+
+
+def _planned_rows(
+    file: PlanFile, mechanism: Mechanism, names: Collection[str], problems: list[Problem]
+) -> tuple[PlannedRow, ...]:
+    """The rows; a place out of reach, or with no room to come from its side, goes to `problems`."""
+    rows: list[PlannedRow] = []
+    points: dict[tuple[float, ...], int] = {}
+    previous_s = math.inf
+    for line in file.lines:
+        tip_M_mm = tuple(line.values.get(name, math.nan) for name in TIP_COLUMNS)
+        time_s = line.values.get("time_s", math.nan)
+        row = PlannedRow(
+            len(rows) + 1,
+            line.purpose,
+            points.setdefault(tip_M_mm, len(points) + 1),
+            not time_s > previous_s,
+            time_s,
+            _scale_mm(file, line, tip_M_mm, mechanism, problems),
+            np.array([line.values.get(name, 0.0) for name in approach_columns(mechanism.links)]),
+            line.values.get(SPEED_COLUMN, 0.0),
+            {name: line.values[name] for name in names if name in line.values},
+        )
+        problems += _approach_problems(file, line, row, mechanism)
+        rows.append(row)
+        previous_s = time_s
+    return tuple(rows)
+
+
+def _scale_mm(
+    file: PlanFile, line: PlanLine, tip_M_mm: Sequence[float], mechanism: Mechanism, problems: list[Problem]
+) -> FloatArray:
+    """(n,) for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where that is not known."""
+    unknown = np.full(mechanism.links, math.nan)
+    if not all(map(math.isfinite, tip_M_mm)):
+        return unknown
+    try:
+        posture = mechanism.posture_at(np.array(tip_M_mm), np.zeros(3))
+    except KinematicsError:
+        posture = None
+    scale_mm = unknown if posture is None else mechanism.lengths(posture) - mechanism.lengths0_mm
+    if _within_stroke(scale_mm, mechanism):
+        return scale_mm
+    problems.append(
+        Problem(
+            where=f"{file.path}:{line.line} column {', '.join(TIP_COLUMNS)}",
+            what="this machine cannot reach the place",
+            value=", ".join(f"{value:g}" for value in tip_M_mm),
+            allowed=_stroke_text(mechanism),
+            next_step="plan with a narrower --workspace",
+        )
+    )
+    return unknown
+
+
+def _approach_problems(file: PlanFile, line: PlanLine, row: PlannedRow, mechanism: Mechanism) -> list[Problem]:
+    problems: list[Problem] = []
+    where = f"{file.path}:{line.line} column approach_1 ..."
+    if row.on_the_move and not row.approach.any():
+        problems.append(
+            Problem(
+                where=where,
+                what="a row on the move needs a direction",
+                value="0",
+                allowed="-1 or 1 for the links that move",
+                next_step=f"write it, or {SPEED_COLUMN} 0",
+            )
+        )
+    ends = (row.turning_mm, row.end_mm)
+    known = all(np.isfinite(end_mm).all() for end_mm in ends)
+    if known and not all(_within_stroke(end_mm, mechanism) for end_mm in ends):
+        problems.append(
+            Problem(
+                where=where,
+                what="there is no room to come from this side",
+                value=", ".join(f"{value:g}" for value in row.approach),
+                allowed=_stroke_text(mechanism),
+                next_step="plan with a narrower --workspace",
+            )
+        )
+    return problems
+
+
+def _within_stroke(scale_mm: FloatArray, mechanism: Mechanism) -> bool:
+    return bool(np.all(np.abs(scale_mm) <= STROKE_SHARE * mechanism.lengths0_mm))
+
+
+def _stroke_text(mechanism: Mechanism) -> str:
+    return f"links within {STROKE_SHARE * float(mechanism.lengths0_mm.min()):.0f} mm of machine zero"

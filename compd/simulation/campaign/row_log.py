@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import Wiring
+from compd.recording.columns import POSITION_COLUMNS, approach_columns, link_reference_column, scale_columns
 from compd.simulation.truth.apparent import Apparent
 from compd.simulation.truth.instruments import Kind, noisy
 from compd.simulation.truth.world import World
@@ -56,7 +57,7 @@ class RowLog:
         """A row. direction : (n,) in which each link moved last. Not measured: the gauges alone are read."""
         world = self._world
         shown = {name: world.sense(name) for name in world.names}
-        links = range(1, world.mechanism.links + 1)
+        links = world.mechanism.links
         joints = [name for name in shown if name.startswith("joint_")]
         frames = [name for name in shown if name.startswith("frame_")]
         others = [name for name in shown if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
@@ -66,10 +67,10 @@ class RowLog:
                 "session": session,
                 "point": np.nan if point is None else point,
                 "visit": visit,
-                **{f"scale_{i}_mm": shown[f"scale_{i}"] for i in links},
+                **{column: shown[f"scale_{i}"] for i, column in enumerate(scale_columns(links), 1)},
                 **{f"{name}_um": shown[name] / UM for name in (*joints, *frames)},
                 **{name: round(shown[name], 3) for name in others},
-                **{f"approach_{i}": direction[i - 1] for i in links},
+                **dict(zip(approach_columns(links), direction, strict=True)),
                 **(self._measured(point) if measured else dict.fromkeys(self._names(), np.nan)),
             }
         )
@@ -82,8 +83,8 @@ class RowLog:
         if self._reference == "ball_plate":
             return ["ball"]
         if self._reference == "interferometer":
-            return [f"reference_link_{i}_mm" for i in range(1, self._world.mechanism.links + 1)]
-        return [f"reference_{axis}_mm" for axis in "xyz"]
+            return [link_reference_column(i) for i in range(1, self._world.mechanism.links + 1)]
+        return list(POSITION_COLUMNS)
 
     def _measured(self, point: int | None) -> dict[str, float]:
         if self._reference == "ball_plate":

@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
+from compd.recording.sidecar import sidecar_contents
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, plan
 from compd.simulation.campaign.planned_campaign import PlannedCampaign
@@ -98,9 +99,7 @@ def record(
         says["frame"] = "machine"
     if balls_M is not None:
         says["balls"] = plate_file
-    return Recorded(
-        campaign.run().columns, {"machine": configuration.machine, "reference": says}, balls_M, sized, tuple(weak)
-    )
+    return Recorded(campaign.run().columns, sidecar_contents(configuration.machine, says), balls_M, sized, tuple(weak))
 
 
 def _days(mechanism: Mechanism, reference: Kind, seed: int, number: int) -> tuple[FloatArray | None, CampaignPlan]:

@@ -16,6 +16,7 @@ from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording
 from compd.recording.recording import last_direction
+from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from tests.support.paths import ROOT, SHARED
 from tests.support.recordings import HEADER, SIDECAR, Edit, cell, column, csv_text, header, put, without
@@ -308,3 +309,11 @@ def test_failed_second_file_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be written to"):
         write_recording(path, {"time_s": [0, 1]}, {"machine": "x"}, overwrite=True)
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.csv"]
+
+
+def test_a_sidecar_without_a_format_is_format_1_and_what_is_written_is_format_2(tmp_path: Path) -> None:
+    first = read_recording(put(tmp_path, csv_text()))
+    assert first.sidecar.format == 1
+    write_recording(tmp_path / "again.csv", first.columns, sidecar_contents("tripod-cmm", {"quantity": "link_length"}))
+    text = (tmp_path / "again.yaml").read_text()
+    assert text == "format: 2\nmachine: tripod-cmm\nreference:\n  quantity: link_length\n"

@@ -132,6 +132,11 @@ SIDECARS: dict[str, tuple[str, list[str]]] = {
     "no such row": (SIDECAR + "excluded_rows: [{row: 99, reason: door}]\n", ["row 99", "no such row", "rows 2 to 21"]),
     "all rows": (SIDECAR + "excluded_rows: [{rows: 2-21, reason: door}]\n", ["no row of 20", "20 excluded"]),
     "external": (SIDECAR.replace("tripod-cmm", "external"), ["missing: model_x_mm, model_y_mm, model_z_mm"]),
+    "format 0": ("format: 0\n" + SIDECAR, ["run.yaml:1 format: is no format number", "1 to 2"]),
+    "row 1": (
+        SIDECAR + "excluded_rows: [{row: 1, reason: door}]\n",
+        ["run.yaml:6 excluded_rows[1].row", "names no row"],
+    ),
     "not YAML": ("machine: [\n", ["not YAML"]),
 }
 
@@ -142,6 +147,28 @@ def test_sidecar_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
     message = "\n".join(problems_of(put(tmp_path, csv_text(), sidecar)))
     for part in wanted:
         assert part in message
+
+
+def test_every_mistake_of_a_sidecar_comes_at_once_with_its_line(tmp_path: Path) -> None:
+    sidecar = "format: two\nreference:\n  quantity: tip\n  frame: tracker\n  sigma_um: -1\n"
+    sidecar += "excluded_rows:\n- {row: 5}\nnotes: 3\n"
+    problems = [problem.split(": ")[0] for problem in problems_of(put(tmp_path, csv_text(), sidecar))]
+    path = tmp_path / "run.yaml"
+    assert problems == [
+        f"{path}:1 format",
+        f"{path}:1 machine",
+        f"{path}:3 reference.quantity",
+        f"{path}:4 reference.frame",
+        f"{path}:5 reference.sigma_um",
+        f"{path}:7 excluded_rows[1].reason",
+        f"{path}:8 notes",
+    ]
+
+
+def test_a_newer_format_is_refused_and_nothing_else_judged(tmp_path: Path) -> None:
+    (problem,) = problems_of(put(tmp_path, "no table\n", "format: 3\nsomething_new: 5\n"))
+    assert "run.yaml:1 format: was written by a newer release" in problem
+    assert "update compd" in problem
 
 
 def test_missing_sidecar_does_not_hide_the_rows_mistakes(tmp_path: Path) -> None:

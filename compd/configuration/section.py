@@ -1,0 +1,135 @@
+"""Sections of a YAML document as pydantic models, and pydantic's errors as Problems with line and next step."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from typing import Annotated, Any, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from compd.configuration.document import Document, Location
+from compd.errors import Problem
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+_REFUSAL = "refusal"
+# A list or mapping longer than this is not repeated in a message: the line is enough to find it.
+_LONGEST_VALUE = 80
+
+
+class Section(BaseModel):
+    """A part of a document that a person writes: unknown keys are refused, values cannot change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def refusal(what: str, allowed: str = "", next_step: str = "") -> PydanticCustomError:
+    """An error for a validator to raise that becomes a Problem in exactly these words."""
+    return PydanticCustomError(_REFUSAL, "{what}", {"what": what, "allowed": allowed, "next_step": next_step})
+
+
+def validate(kind: Any, document: Document, location: Location, problems: list[Problem]) -> Any:
+    """The value at `location` of the document as `kind`; None where it is wrong, and `problems` then says why.
+
+    kind : a pydantic model or any type that pydantic's TypeAdapter takes. A location that the document does not have
+        is validated as None.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(document.value(location))
+    except ValidationError as error:
+        problems += validation_problems(error, document, location, kind)
+        return None
+
+
+def validation_problems(error: ValidationError, document: Document, location: Location, kind: Any) -> list[Problem]:
+    """Every error that pydantic found in the value at `location`, in the words of the person who wrote the file.
+
+    kind : the type that was validated; its models name the keys that are allowed beside an unknown one.
+    """
+    return [_problem(detail, document, location, kind) for detail in error.errors(include_url=False)]
+
+
+def unknown_key(document: Document, location: Location, allowed: Sequence[str]) -> Problem:
+    """The problem of a key that nothing reads, with the allowed key that resembles it most."""
+    close = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
+    return Problem(
+        where=document.where(location),
+        what="unknown key",
+        value=_value_text(document.value(location)),
+        allowed=", ".join(allowed),
+        next_step=f"did you mean `{close[0]}`?" if close else "remove it",
+    )
+
+
+def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any) -> Problem:
+    location = _location_in_file(document, root, detail["loc"])
+    where, value = document.where(location), document.value(location)
+    context = detail.get("ctx", {})
+    if detail["type"] == _REFUSAL:
+        value_text = "" if value is None else _value_text(value)
+        return Problem(
+            where=where,
+            what=context["what"],
+            value=value_text,
+            allowed=context["allowed"],
+            next_step=context["next_step"],
+        )
+    if detail["type"] == "extra_forbidden":
+        return unknown_key(document, location, _keys_beside(kind, detail["loc"]))
+    if detail["type"] == "missing":
+        return Problem(where=where, what="is missing", next_step=f"add `{location[-1]}:`")
+    allowed = {
+        "literal_error": str(context.get("expected", "")),
+        "union_tag_invalid": str(context.get("expected_tags", "")),
+        "union_tag_not_found": f"a key {context.get('discriminator', '')}",
+        "greater_than": f"greater than {context.get('gt')}",
+        "greater_than_equal": f"{context.get('ge')} or more",
+        "less_than_equal": f"{context.get('le')} or less",
+        "string_pattern_mismatch": f"the pattern {context.get('pattern')}",
+        "finite_number": "a finite number",
+    }.get(detail["type"], "")
+    message = detail["msg"].removeprefix("Value error, ")
+    return Problem(where=where, what=message, value=_value_text(value), allowed=allowed)
+
+
+def _value_text(value: Any) -> str:
+    return "" if isinstance(value, dict | list) and len(str(value)) > _LONGEST_VALUE else repr(value)
+
+
+def _location_in_file(document: Document, root: Location, loc: Location) -> Location:
+    """pydantic's location below `root`, without the union tags in it, which are no keys of the file."""
+    location = root
+    for i, part in enumerate(loc):
+        here = document.value(location)
+        in_mapping = isinstance(here, dict) and (part in here or i == len(loc) - 1)
+        if in_mapping or (isinstance(here, list) and isinstance(part, int)):
+            location = (*location, part)
+    return location
+
+
+def _keys_beside(kind: Any, loc: Location) -> list[str]:
+    """The keys that the section around `loc` allows, by descending from `kind` along the location."""
+    for part in loc[:-1]:
+        kind = _kind_below(kind, part)
+    models = _models(kind)
+    return [field.alias or name for name, field in models[0].model_fields.items()] if models else []
+
+
+def _kind_below(kind: Any, part: str | int) -> Any:
+    """The type of what `part` names: a field, the member of a tagged union, or the entry of a list or mapping."""
+    for model in _models(kind):
+        if part in model.model_fields:
+            return model.model_fields[str(part)].annotation
+        if any(part in get_args(field.annotation) for field in model.model_fields.values()):
+            return model
+    return kind
+
+
+def _models(kind: Any) -> list[type[BaseModel]]:
+    """Every pydantic model in a type: itself, or the arguments of a union, a list, a mapping."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return [kind]
+    return [model for argument in get_args(kind) for model in _models(argument)]
