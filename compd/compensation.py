@@ -1,7 +1,8 @@
-"""From gauge values and a model to a compensated tip and a scale setpoint: pure, shared by daemon and replay.
+"""From gauge values and a model to a compensated tip and a scale setpoint: pure functions, shared by daemon and replay.
 
-Both modes mean the same by a correction: what is added to the command. The command is what a controller that knows
-nothing of joints and frame would send to bring the tip to its target.
+Both modes go the same way: machine frame (3), joints (1), kinematics, and then the effects of the model
+(`compd.model.apply_effects`), if it has any. In both, the correction is what is added to the command, and the command
+is what a controller that knows nothing of joints and frame would send to bring the tip to its target.
 """
 
 from __future__ import annotations
@@ -15,21 +16,21 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
-from compd.model.apply_effects import EffectInputs, EffectMemory, act, whole, with_all
+from compd.model.apply_effects import EffectInputs, EffectMemory, apply_effects, final, final_array
 from compd.model.frame import Frame, solve_frame
 from compd.model.joint_correction import joint_shortening, link_length_mm, scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kinematics import Pose, forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.prediction import PerturbedMachine
-from compd.model.tool import Contact, ToolOnPlate
+from compd.model.tool import Contact
 from compd.model.transform import to_inner
 
 Sources: TypeAlias = Mapping[str, FloatArray]
 
-# An effect is looked up where the scales will stand, which effects themselves shift. What is wrong after the first look
-# is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
-_LOOKS = 2
+# In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
+# error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
+_EFFECT_PASSES = 2
 
 
 class GaugeValues(NamedTuple):
@@ -51,7 +52,7 @@ class WarmStart(NamedTuple):
     """Where the last cycle ended and the next one's Newton starts; rows that failed keep what they came with.
 
     supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
-    effects : what the model's effects remember; of N rows after the last one.
+    effects : what the model's effects remember; of N rows, after the last one.
     """
 
     supports_M_mm: FloatArray
@@ -104,38 +105,39 @@ def compensate_machine_tool(
     values: GaugeValues,
     warm: WarmStart,
 ) -> tuple[Compensation, WarmStart]:
-    """Equation (8), inverse kinematics with the base joints as they are now, and (1) solved for gL.
+    """Machine-tool mode: equation (8), inverse kinematics with the base joints as they are now, (1) solved for gL.
 
     target_mm : (..., 3), in {B0}; with the tool on the plate the place on the work, in {P}.
     target_rotation_B0_rad : (..., 3), hexapod only, rotation vector of the attitude wanted for {P} in {B0}; None
         for machine zero's attitude.
-    values : the scales are not used and may be nan; effects see them where they shall be.
+    values : the scales are not used and may be nan; effects are computed at the setpoint.
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     Raises KinematicsError for an attitude asked of a tripod.
     """
     attitude = _attitude(model, target_rotation_B0_rad, warm)
-    wanted = model.arrangement.wanted(model.frame, target_mm)
+    target = model.arrangement.target_contact(model.frame, target_mm)
     frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
-    nominal = inverse_kinematics(model.mechanism(model.zero.base_joints_M_mm), *wanted, attitude)
-    needed = inverse_kinematics(model.mechanism(frame.base_joints_M_mm), *wanted, attitude)
+    nominal = inverse_kinematics(model.mechanism(model.zero.base_joints_M_mm), *target, attitude)
+    compensated = inverse_kinematics(model.mechanism(frame.base_joints_M_mm), *target, attitude)
     shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
     nominal_scale_mm = nominal.link_length_mm - model.zero.link_length_mm
-    command = _command(model, nominal, nominal_scale_mm, needed, shortening_mm)
-    reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, needed.reason))
-    after = WarmStart(frame.supports_M_mm, needed.origin_M_mm, needed.rotation_M_P, warm.effects)
-    found = _Found(frame, needed, wanted, wanted, command, reason)
-    if model.acting:
-        plain = found
-        for _ in range(_LOOKS):
-            scale_mm = found.command.scale_setpoint_mm
-            machine, remembered = act(model, _sight(values, scale_mm, frame, needed, wanted), warm.effects, True)
-            found = _with_effects(model, plain, machine, attitude)
-        after = after._replace(effects=remembered)
-    return _result(model, found, warm, after)
+    command = _command(model, nominal, nominal_scale_mm, compensated, shortening_mm)
+    reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, compensated.reason))
+    warm_after = WarmStart(frame.supports_M_mm, compensated.origin_M_mm, compensated.rotation_M_P, warm.effects)
+    solution = _Solution(frame, compensated, target, target, command, reason)
+    if model.live_effects:
+        without_effects = solution
+        for _ in range(_EFFECT_PASSES):
+            setpoint_mm = solution.command.scale_setpoint_mm
+            inputs = _effect_inputs(values, setpoint_mm, frame, compensated, target)
+            machine, memory = apply_effects(model, inputs, warm.effects, commanded=True)
+            solution = _command_with_effects(model, without_effects, machine, attitude)
+        warm_after = warm_after._replace(effects=memory)
+    return _result(model, solution, warm, warm_after)
 
 
 def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) -> tuple[Compensation, WarmStart]:
-    """Equations (1) and (3), forward kinematics with the base joints as they are now, and (9).
+    """CMM mode: equations (1) and (3), forward kinematics with the base joints as they are now, and (9).
 
     The correction is that of the command which the scales show now: its target is where uncompensated kinematics
     takes the tip to be.
@@ -144,32 +146,39 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     zero_mm = model.zero.link_length_mm
     shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
     frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
-    now = model.mechanism(frame.base_joints_M_mm)
+    mechanism = model.mechanism(frame.base_joints_M_mm)
     length_mm = link_length_mm(zero_mm, values.scale_mm, shortening_mm)
-    pose = forward_kinematics(now, length_mm, warm.origin_M_mm, warm.rotation_M_P)
+    pose = forward_kinematics(mechanism, length_mm, warm.origin_M_mm, warm.rotation_M_P)
     nominal = forward_kinematics(
         model.mechanism(model.zero.base_joints_M_mm), zero_mm + values.scale_mm, warm.origin_M_mm, warm.rotation_M_P
     )
-    wanted = model.arrangement.made(nominal)
-    needed = inverse_kinematics(now, *wanted, nominal.rotation_M_P)
-    command = _command(model, nominal, values.scale_mm, needed, shortening_mm)
+    target = model.arrangement.contact_at(nominal)
+    compensated = inverse_kinematics(mechanism, *target, nominal.rotation_M_P)
+    command = _command(model, nominal, values.scale_mm, compensated, shortening_mm)
     reason = np.maximum(
-        np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, needed.reason))
+        np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, compensated.reason))
     )
-    after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P, warm.effects)
-    found = _Found(frame, pose, model.arrangement.made(pose), wanted, command, reason)
-    if model.acting:
-        machine, remembered = act(model, _sight(values, values.scale_mm, frame, pose, found.made), warm.effects, False)
-        corrected = _with_effects(model, found, machine, nominal.rotation_M_P)
-        each_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm) + machine.reading_to_length_mm
-        there = forward_kinematics(
-            whole(machine.mechanism, now), with_all(each_mm, length_mm), warm.origin_M_mm, warm.rotation_M_P
+    warm_after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P, warm.effects)
+    solution = _Solution(frame, pose, model.arrangement.contact_at(pose), target, command, reason)
+    if model.live_effects:
+        inputs = _effect_inputs(values, values.scale_mm, frame, pose, solution.contact)
+        machine, memory = apply_effects(model, inputs, warm.effects, commanded=False)
+        solution = _command_with_effects(model, solution, machine, nominal.rotation_M_P)
+        cumulative_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm)
+        pose = forward_kinematics(
+            final(machine.mechanism, mechanism),
+            final_array(cumulative_mm + machine.reading_to_length_mm, length_mm),
+            warm.origin_M_mm,
+            warm.rotation_M_P,
         )
-        tool_mm = wanted.tip_M_mm if isinstance(model.arrangement, ToolOnPlate) else wanted.tip_P_mm
-        made = type(model.arrangement)(with_all(machine.tool_mm, tool_mm)).made(there)
-        found = corrected._replace(pose=there, made=made, reason=np.maximum(corrected.reason, there.reason))
-        after = after._replace(effects=remembered)
-    return _result(model, found, warm, after)
+        tool_mm = final_array(machine.tool_mm, model.arrangement.tool_mm)
+        solution = solution._replace(
+            pose=pose,
+            contact=model.arrangement.contact_at(pose, tool_mm),
+            reason=np.maximum(solution.reason, pose.reason),
+        )
+        warm_after = warm_after._replace(effects=memory)
+    return _result(model, solution, warm, warm_after)
 
 
 class _Command(NamedTuple):
@@ -181,62 +190,69 @@ class _Command(NamedTuple):
     sources: Sources
 
 
-class _Found(NamedTuple):
-    """What a cycle has found; `made` is where the tip is, `wanted` where the command would have it."""
+class _Solution(NamedTuple):
+    """What a cycle computes, before rows that failed are blanked.
+
+    pose, contact : of the platform and of the tip: where they are (CMM mode), or will be at the setpoint.
+    target : the contact to which the command leads.
+    """
 
     frame: Frame
     pose: Pose
-    made: Contact
-    wanted: Contact
+    contact: Contact
+    target: Contact
     command: _Command
     reason: IntArray
 
 
 def _command(
-    model: MachineModel, nominal: Pose, nominal_scale_mm: FloatArray, needed: Pose, joint_shortening_mm: FloatArray
+    model: MachineModel, nominal: Pose, nominal_scale_mm: FloatArray, compensated: Pose, joint_shortening_mm: FloatArray
 ) -> _Command:
-    """The joints' share is what they take from the links; the frame's is what its moving makes of the lengths."""
-    setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, needed.link_length_mm, joint_shortening_mm)
-    sources = {"joints": joint_shortening_mm, "frame": needed.link_length_mm - nominal.link_length_mm}
+    """The command by joints and frame alone. The joints' share is what they take from the links; the frame's is by how
+    much its displacement changes the lengths."""
+    setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, compensated.link_length_mm, joint_shortening_mm)
+    sources = {"joints": joint_shortening_mm, "frame": compensated.link_length_mm - nominal.link_length_mm}
     return _Command(nominal_scale_mm, setpoint_mm, setpoint_mm - nominal_scale_mm, sources)
 
 
-def _sight(values: GaugeValues, scale_mm: FloatArray, frame: Frame, pose: Pose, at: Contact) -> EffectInputs:
+def _effect_inputs(
+    values: GaugeValues, scale_mm: FloatArray, frame: Frame, pose: Pose, contact: Contact
+) -> EffectInputs:
     return EffectInputs(
-        scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, at.tip_M_mm
+        scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, contact.tip_M_mm
     )
 
 
-def _with_effects(model: MachineModel, found: _Found, machine: PerturbedMachine, attitude: FloatArray) -> _Found:
-    """The command that reaches the target on the machine that the effects make; an effect's share is what it adds to
-    those before it."""
-    before = found.command
-    tool_on_plate = isinstance(model.arrangement, ToolOnPlate)
-    contact = (
-        Contact(machine.tool_mm, found.wanted.tip_P_mm)
-        if tool_on_plate
-        else Contact(found.wanted.tip_M_mm, machine.tool_mm)
-    )
-    each = inverse_kinematics(machine.mechanism, *contact, attitude)
+def _command_with_effects(
+    model: MachineModel, solution: _Solution, machine: PerturbedMachine, attitude: FloatArray
+) -> _Solution:
+    """The command that reaches the target on the machine with its effects.
+
+    solution : without effects.  machine : from `apply_effects`, entry k with effects 0 to k. Inverse kinematics solves
+    all of them at once; an effect's share is by how much it changes the setpoint of those before it.
+    """
+    command = solution.command
+    target = model.arrangement.with_tool(solution.target, machine.tool_mm)
+    cumulative = inverse_kinematics(machine.mechanism, *target, attitude)
     setpoints_mm = scale_for_length_mm(
-        model.zero.link_length_mm, each.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
+        model.zero.link_length_mm, cumulative.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
     )
-    shares_mm = setpoints_mm - np.concatenate([before.scale_setpoint_mm[None], setpoints_mm[:-1]])
-    ids = [one.effect.id for one in model.acting]
+    shares_mm = setpoints_mm - np.concatenate([command.scale_setpoint_mm[None], setpoints_mm[:-1]])
+    ids = [fitted.effect.id for fitted in model.live_effects]
     setpoint_mm = setpoints_mm[-1]
     command = _Command(
-        before.nominal_scale_mm,
+        command.nominal_scale_mm,
         setpoint_mm,
-        setpoint_mm - before.nominal_scale_mm,
-        {**before.sources, **dict(zip(ids, shares_mm, strict=True))},
+        setpoint_mm - command.nominal_scale_mm,
+        {**command.sources, **dict(zip(ids, shares_mm, strict=True))},
     )
-    reasons = np.maximum(machine.reason, each.reason)
-    worst = reasons.max(axis=0) if reasons.ndim > found.reason.ndim else reasons
-    return found._replace(
-        frame=whole(machine.frame, found.frame),
-        pose=whole(each, found.pose),
+    reasons = np.maximum(machine.reason, cumulative.reason)
+    reason = reasons.max(axis=0) if reasons.ndim > solution.reason.ndim else reasons
+    return solution._replace(
+        frame=final(machine.frame, solution.frame),
+        pose=final(cumulative, solution.pose),
         command=command,
-        reason=np.maximum(found.reason, worst),
+        reason=np.maximum(solution.reason, reason),
     )
 
 
@@ -259,17 +275,19 @@ def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, war
     return np.asarray(compose(model.frame.zero_rotation_M_B, rotation_matrix(target_rotation_B0_rad)))
 
 
-def _result(model: MachineModel, found: _Found, warm: WarmStart, after: WarmStart) -> tuple[Compensation, WarmStart]:
-    """Everything together; where a row failed, all its numbers nan and its warm start as it was."""
-    frame, pose, made, wanted, command, reason = found
+def _result(
+    model: MachineModel, solution: _Solution, warm: WarmStart, warm_after: WarmStart
+) -> tuple[Compensation, WarmStart]:
+    """Everything together; where a row failed, all its numbers are nan and its warm start stays as it was."""
+    frame, pose, contact, target, command, reason = solution
     result = Compensation(
-        tip_M_mm=made.tip_M_mm,
-        tip_B0_mm=to_inner(model.frame.zero_rotation_M_B, model.frame.zero_origin_M_mm, made.tip_M_mm),
-        tip_P_mm=made.tip_P_mm,
+        tip_M_mm=contact.tip_M_mm,
+        tip_B0_mm=to_inner(model.frame.zero_rotation_M_B, model.frame.zero_origin_M_mm, contact.tip_M_mm),
+        tip_P_mm=contact.tip_P_mm,
         rotation_M_P=pose.rotation_M_P,
         frame=frame,
         link_length_mm=pose.link_length_mm,
-        target_B_mm=to_inner(frame.rotation_M_B, frame.origin_M_mm, wanted.tip_M_mm),
+        target_B_mm=to_inner(frame.rotation_M_B, frame.origin_M_mm, target.tip_M_mm),
         nominal_scale_mm=command.nominal_scale_mm,
         scale_setpoint_mm=command.scale_setpoint_mm,
         correction_mm=command.correction_mm,
@@ -277,27 +295,27 @@ def _result(model: MachineModel, found: _Found, warm: WarmStart, after: WarmStar
         reason=reason,
     )
     if not reason.any():
-        return result, after
-    kept = WarmStart(
-        _where(reason, warm.supports_M_mm, after.supports_M_mm, 2),
-        _where(reason, warm.origin_M_mm, after.origin_M_mm, 1),
-        _where(reason, warm.rotation_M_P, after.rotation_M_P, 2),
-        after.effects,
+        return result, warm_after
+    warm_after = WarmStart(
+        _replace_failed(reason, warm.supports_M_mm, warm_after.supports_M_mm, 2),
+        _replace_failed(reason, warm.origin_M_mm, warm_after.origin_M_mm, 1),
+        _replace_failed(reason, warm.rotation_M_P, warm_after.rotation_M_P, 2),
+        warm_after.effects,
     )
-    return _blanked(result), kept
+    return _blank_failed(result), warm_after
 
 
-def _blanked(result: Compensation) -> Compensation:
+def _blank_failed(result: Compensation) -> Compensation:
     """nan for every number in the rows that failed; the frame has a reason of its own."""
 
     def blank(vector: FloatArray) -> FloatArray:
-        return _where(result.reason, np.nan, vector, 1)
+        return _replace_failed(result.reason, np.nan, vector, 1)
 
     return result._replace(
         tip_M_mm=blank(result.tip_M_mm),
         tip_B0_mm=blank(result.tip_B0_mm),
         tip_P_mm=blank(result.tip_P_mm),
-        rotation_M_P=_where(result.reason, np.nan, result.rotation_M_P, 2),
+        rotation_M_P=_replace_failed(result.reason, np.nan, result.rotation_M_P, 2),
         link_length_mm=blank(result.link_length_mm),
         target_B_mm=blank(result.target_B_mm),
         nominal_scale_mm=blank(result.nominal_scale_mm),
@@ -307,6 +325,6 @@ def _blanked(result: Compensation) -> Compensation:
     )
 
 
-def _where(failed: IntArray, instead: FloatArray | float, values: FloatArray, core: int) -> FloatArray:
-    """`instead` in the rows that failed; each row of `values` has `core` axes."""
-    return np.where(np.reshape(failed, np.shape(failed) + (1,) * core) != 0, instead, values)
+def _replace_failed(reason: IntArray, replacement: FloatArray | float, values: FloatArray, core: int) -> FloatArray:
+    """`replacement` in the rows that failed; each row of `values` has `core` axes."""
+    return np.where(np.reshape(reason, np.shape(reason) + (1,) * core) != 0, replacement, values)

@@ -11,8 +11,8 @@ from compd.arrays import FloatArray
 from compd.configuration.geometry import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
 from compd.configuration.operation import Wiring
 from compd.model.kernels.rotation import rotation_matrix
-from compd.model.machine import MachineModel, machine_model
-from compd.model.observe import Details, constants
+from compd.model.machine import MachineModel, machine_constants, machine_model
+from compd.model.observations import MachineDetails
 from compd.model.tool import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.model.transform import to_outer
 
@@ -46,13 +46,13 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
         weight_N=geometry.platform.weight_N,
         weight_at_P_mm=geometry.platform.weight_at_P_mm,
     )
-    return replace(model, constants=constants(model, details(geometry)))
+    return replace(model, constants=machine_constants(model, machine_details(geometry)))
 
 
-def details(geometry: Geometry) -> Details:
+def machine_details(geometry: Geometry) -> MachineDetails:
     """What effects ask of a geometry beyond the kinematics; nan where it says nothing."""
     unknown = float("nan")
-    return Details(geometry.plate_thickness_mm or unknown, geometry.scale_signal_period_mm or unknown)
+    return MachineDetails(geometry.plate_thickness_mm or unknown, geometry.scale_signal_period_mm or unknown)
 
 
 def joint_weights(wiring: Wiring, links: int) -> FloatArray:

@@ -1,6 +1,18 @@
 """The model file: a machine's effects with their fitted numbers, and every step by which they came to be.
 
 One YAML file, written whole or not at all. Each step keeps what it replaced, so that it can be undone.
+
+    format: 2               # 1 was written by release 0.1.0, with the same keys; a file without it counts as 1
+    machine: tripod-cmm     # name of the configuration, or "external"
+    geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
+    release: 0.1.0          # of compd, that wrote it
+    effects:
+    - effect: link_sag      # an id, /absolute/file.py:NAME, or a formula written out
+      shape: {n: 3.0}       # values of its nonlinear constants
+      parameters:
+      - {name: s, value: 1.0, std: 0.1, unit: um}
+    covariance: [[0.01]]    # of all fitted numbers jointly, in the order of the file
+    steps: []               # see ModelStep
 """
 
 from __future__ import annotations
@@ -8,10 +20,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import yaml
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from compd import __version__
 from compd.arrays import FloatArray
@@ -20,10 +34,10 @@ from compd.files import write_files
 from compd.model.effect import FittedEffect
 from compd.model.library import find
 
-FORMAT = 1
+FORMAT = 2
 Kind = Literal["add", "remove", "fit", "undo"]
 # An effect's id, /absolute/file.py:NAME, or a formula written out.
-Declaration: TypeAlias = str | Mapping[str, Any]
+Declaration: TypeAlias = str | dict[str, Any]
 # The parts of the file that a step replaces, as plain data.
 State: TypeAlias = Mapping[str, Any]
 NOTHING: State = {"effects": [], "covariance": []}
@@ -48,9 +62,12 @@ class ModelStep:
     replaced: State
     undone: bool = False
 
+    # for pydantic, which checks the steps of a file
+    __pydantic_config__ = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
+
 
 @dataclass(frozen=True)
-class Stored:
+class StoredModel:
     """A model file as plain data: what can be shown and undone without the machine."""
 
     machine: str
@@ -80,54 +97,62 @@ class ModelFile:
         effects = [
             {
                 "effect": declared if isinstance(declared, str) else dict(declared),
-                "shape": {name: float(value) for name, value in one.shape.items()},
-                "parameters": _numbers(one, links),
+                "shape": {name: float(value) for name, value in fitted.constants.items()},
+                "parameters": _estimates(fitted, links),
             }
-            for declared, one in zip(self.declared, _each_its_own(self.fitted, self.covariance), strict=True)
+            for declared, fitted in zip(self.declared, _with_own_covariance(self.fitted, self.covariance), strict=True)
         ]
         return {"effects": effects, "covariance": self.covariance.tolist()}
 
 
-def read_stored(path: Path) -> Stored:
-    """Read a model file without looking into its effects.
+def _square(rows: list[list[float]]) -> list[list[float]]:
+    if any(len(row) != len(rows) for row in rows):
+        raise ValueError("is no matrix of numbers: it has not as many rows as columns")
+    return rows
 
-    Raises StateError: no such file, not YAML, another format, a step that cannot be read.
+
+# A key without a value is an empty list or mapping.
+_EmptyList = BeforeValidator(lambda value: [] if value is None else value)
+_EmptyMapping = BeforeValidator(lambda value: {} if value is None else value)
+
+
+class _FileModel(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, coerce_numbers_to_str=True)
+
+
+class _ParameterInFile(_FileModel):
+    name: str
+    value: float
+    std: float = float("nan")
+    unit: str = ""
+
+
+class _EffectInFile(_FileModel):
+    effect: Declaration
+    shape: Annotated[dict[str, float], _EmptyMapping] = {}
+    parameters: list[_ParameterInFile]
+
+
+class _Document(_FileModel):
+    """The keys of the file."""
+
+    format: Annotated[int, Field(ge=1)] = 1
+    machine: str
+    geometry: str = ""
+    release: str = ""
+    effects: Annotated[list[_EffectInFile], _EmptyList] = []
+    covariance: Annotated[list[list[float]], _EmptyList, AfterValidator(_square)] = []
+    steps: Annotated[list[ModelStep], _EmptyList] = []
+
+
+def read_stored(path: Path) -> StoredModel:
+    """Read a model file without looking up its effects.
+
+    Raises StateError with every problem: no such file, not YAML, a later format, keys that are missing, unknown or
+    of the wrong kind.
     """
-    where = str(path)
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise StateError(
-            Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise StateError(Problem(where=where, what="is not YAML", value=str(error).splitlines()[0])) from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else None
-        raise StateError(
-            Problem(
-                where=where,
-                what="is no model file of this version",
-                value=f"format: {found}",
-                allowed=f"format: {FORMAT}",
-            )
-        )
-    try:
-        steps = tuple(ModelStep(**step) for step in data.get("steps") or ())
-    except (TypeError, AttributeError) as error:
-        raise StateError(Problem(where=where, what=f"a step cannot be read: {error}")) from error
-    state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
-    for key, value in state.items():
-        if not isinstance(value, list):
-            raise StateError(
-                Problem(
-                    where=f"{where}, {key}",
-                    what="is no list",
-                    value=str(value)[:80],
-                    allowed="as `compd effect add` writes it",
-                )
-            )
-    return Stored(str(data.get("machine")), state, steps, str(data.get("geometry") or ""))
+    _, stored = _read(path)
+    return stored
 
 
 def read_model_file(path: Path, machine: str, links: int, geometry: str = "") -> ModelFile:
@@ -137,7 +162,7 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
     Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
     installed, numbers that are missing.
     """
-    stored = read_stored(path)
+    document, stored = _read(path)
     if stored.machine != machine:
         raise StateError(
             Problem(
@@ -158,53 +183,113 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
                 next_step="fit it again with `compd effect fit`",
             )
         )
-    return _opened(stored, links, str(path))
-
-
-def _opened(stored: Stored, links: int, where: str) -> ModelFile:
     problems: list[Problem] = []
-    declared: list[Declaration] = []
     fitted: list[FittedEffect] = []
-    for number, entry in enumerate(stored.state["effects"], start=1):
-        place = f"{where}, effect {number}"
+    for number, entry in enumerate(document.effects, start=1):
         try:
-            fitted.append(_fitted(entry, links, place, problems))
-            declared.append(entry["effect"])
+            fitted.append(_fitted_effect(entry, links, f"{path}, effect {number}", problems))
         except CompdError as error:
             problems += error.problems
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            problems.append(
-                Problem(where=place, what=f"cannot be read: {error!r}", allowed="effect, shape, parameters")
-            )
-    count = sum(len(one.theta) for one in fitted)
-    try:
-        covariance = np.array(stored.state["covariance"] or np.zeros((0, 0)), dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise StateError(
-            [*problems, Problem(where=f"{where}, covariance", what=f"is no matrix of numbers: {error}")]
-        ) from error
-    if not problems and covariance.shape != (count, count):
+    count = sum(len(effect.theta) for effect in fitted)
+    covariance = np.array(document.covariance, dtype=np.float64).reshape(len(document.covariance), -1)
+    if not problems and len(covariance) != count:
         problems.append(
             Problem(
-                where=f"{where}, covariance",
+                where=f"{path}, covariance",
                 what="has another size than the parameters",
                 value=str(covariance.shape),
                 allowed=f"({count}, {count})",
+                next_step="fit it again with `compd effect fit`",
             )
         )
     if problems:
         raise StateError(problems)
     return ModelFile(
-        stored.machine, tuple(declared), _each_its_own(fitted, covariance), covariance, stored.steps, stored.geometry
+        stored.machine,
+        tuple(entry.effect for entry in document.effects),
+        _with_own_covariance(fitted, covariance),
+        covariance,
+        stored.steps,
+        stored.geometry,
+    )
+
+
+def _read(path: Path) -> tuple[_Document, StoredModel]:
+    """The checked file, and the same with its effects as they were written."""
+    where = str(path)
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StateError(
+            Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
+        ) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise StateError(Problem(where=where, what="is not YAML", value=str(error).splitlines()[0])) from error
+    if not isinstance(data, dict):
+        raise StateError(
+            Problem(
+                where=where,
+                what="is no model file",
+                value=str(data)[:80],
+                allowed=", ".join(_Document.model_fields),
+                next_step="`compd effect add` writes one",
+            )
+        )
+    if isinstance(data.get("format"), int) and data["format"] > FORMAT:
+        raise StateError(
+            Problem(
+                where=where,
+                what="was written by a later release of compd",
+                value=f"format: {data['format']}",
+                allowed=f"format: 1 to {FORMAT}",
+                next_step=f"install release {data.get('release', 'that wrote it')} or later, or fit the effects anew",
+            )
+        )
+    try:
+        document = _Document.model_validate(data)
+    except ValidationError as error:
+        raise StateError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
+    state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
+    return document, StoredModel(document.machine, state, tuple(document.steps), document.geometry)
+
+
+def _problem(detail: ErrorDetails, where: str) -> Problem:
+    """One of pydantic's errors, with the place as people count: `effects 2` is the second effect."""
+    place = ""
+    for part in detail["loc"]:
+        if isinstance(part, int):
+            place += f" {part + 1}"
+        elif part not in ("str", "dict[str,any]"):  # pydantic's names for the two kinds of declaration
+            place += f", {part}"
+    top_level_keys = ", ".join(_Document.model_fields) if len(detail["loc"]) == 1 else ""
+    what, allowed = {
+        "missing": ("is missing", ""),
+        "extra_forbidden": ("is no key that belongs here", top_level_keys),
+        "list_type": ("is no list", ""),
+        "dict_type": ("is no mapping", ""),
+        "model_type": ("is no mapping", ""),
+        "dataclass_type": ("is no mapping", ""),
+        "unexpected_keyword_argument": ("is no key that belongs here", ""),
+        "string_type": ("is no text", ""),
+        "float_type": ("is no number", ""),
+        "float_parsing": ("is no number", ""),
+        "literal_error": ("is none of the choices", str(detail.get("ctx", {}).get("expected", ""))),
+    }.get(detail["type"], (detail["msg"].removeprefix("Value error, "), ""))
+    return Problem(
+        where=f"{where}{place}",
+        what=what,
+        value="" if detail["type"] == "missing" else str(detail["input"])[:80],
+        allowed=allowed,
+        next_step="mend it, or take the file from a copy",
     )
 
 
 def write_model_file(path: Path, file: ModelFile, links: int) -> None:
     """Write a model whole or not at all. Raises StateError where the disk refuses."""
-    write_stored(path, Stored(file.machine, file.state(links), file.steps, file.geometry))
+    write_stored(path, StoredModel(file.machine, file.state(links), file.steps, file.geometry))
 
 
-def write_stored(path: Path, stored: Stored) -> None:
+def write_stored(path: Path, stored: StoredModel) -> None:
     """As `write_model_file`, from plain data."""
     data = {
         "format": FORMAT,
@@ -228,17 +313,19 @@ def write_stored(path: Path, stored: Stored) -> None:
         ) from error
 
 
-def _each_its_own(fitted: Sequence[FittedEffect], covariance: FloatArray) -> tuple[FittedEffect, ...]:
+def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray) -> tuple[FittedEffect, ...]:
     """The effects, each with its block of the joint covariance."""
-    ends = np.cumsum([0, *(len(one.theta) for one in fitted)])
+    ends = np.cumsum([0, *(len(effect.theta) for effect in fitted)])
     return tuple(
-        replace(one, covariance=covariance[a:b, a:b]) for one, a, b in zip(fitted, ends[:-1], ends[1:], strict=True)
+        replace(effect, covariance=covariance[begin:end, begin:end])
+        for effect, begin, end in zip(fitted, ends[:-1], ends[1:], strict=True)
     )
 
 
-def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Problem]) -> FittedEffect:
-    effect = find(entry["effect"], where)
-    values = {number["name"]: number["value"] for number in entry["parameters"]}
+def _fitted_effect(entry: _EffectInFile, links: int, where: str, problems: list[Problem]) -> FittedEffect:
+    """The effect with its numbers; what is missing goes to `problems`. Raises CompdError where it is not installed."""
+    effect = find(entry.effect, where)
+    values = {parameter.name: parameter.value for parameter in entry.parameters}
     columns = effect.columns(links)
     names = [column.name for column in columns]
     if sorted(values) != sorted(names):
@@ -252,28 +339,32 @@ def _fitted(entry: Mapping[str, Any], links: int, where: str, problems: list[Pro
             )
         )
         return FittedEffect(effect, np.zeros(len(columns)))
-    theta = np.array([column.parameter.fitted(float(values[column.name])) for column in columns])
-    shape = {name: float(value) for name, value in (entry.get("shape") or {}).items()}
-    absent = [constant.name for constant in effect.constants if constant.name not in shape]
-    if absent:
+    theta = np.array([column.parameter.to_theta(values[column.name]) for column in columns])
+    missing = [constant.name for constant in effect.constants if constant.name not in entry.shape]
+    if missing:
         problems.append(
-            Problem(where=where, what=f"has not the shape constants of {effect.id}", allowed=", ".join(absent))
+            Problem(
+                where=where,
+                what=f"has not the shape constants of {effect.id}",
+                allowed=", ".join(missing),
+                next_step="remove the effect and add it again: `compd effect add` searches them",
+            )
         )
-    return FittedEffect(effect, theta, shape)
+    return FittedEffect(effect, theta, entry.shape)
 
 
-def _numbers(one: FittedEffect, links: int) -> list[dict[str, Any]]:
+def _estimates(fitted: FittedEffect, links: int) -> list[dict[str, Any]]:
     """Each number as people read it: value, standard error, unit."""
-    found = []
-    for k, column in enumerate(one.effect.columns(links)):
-        std = float(np.sqrt(one.covariance[k, k])) if k < len(one.covariance) else float("nan")
-        value, value_std = column.parameter.shown(float(one.theta[k]), std)
-        found.append(
+    estimates = []
+    for k, column in enumerate(fitted.effect.columns(links)):
+        std = float(np.sqrt(fitted.covariance[k, k])) if k < len(fitted.covariance) else float("nan")
+        value, value_std = column.parameter.from_theta(float(fitted.theta[k]), std)
+        estimates.append(
             {"name": column.name, "value": float(value), "std": float(value_std), "unit": column.parameter.unit}
         )
-    return found
+    return estimates
 
 
-def numbers_of(fitted: Sequence[FittedEffect], links: int) -> list[tuple[str, dict[str, Any]]]:
+def parameter_estimates(fitted: Sequence[FittedEffect], links: int) -> list[tuple[str, dict[str, Any]]]:
     """(effect id, {name, value, std, unit}) of every number."""
-    return [(one.effect.id, number) for one in fitted for number in _numbers(one, links)]
+    return [(effect.effect.id, estimate) for effect in fitted for estimate in _estimates(effect, links)]

@@ -99,7 +99,7 @@ def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
     for one in step.parameters:
         said = "" if one.plausible else " (implausible)"
         console.print(f"    {one.name} = {one.value:.4g} +- {one.std:.2g} {one.unit}{said}", markup=False)
-    for name, value in step.fitted.shape.items():
+    for name, value in step.fitted.constants.items():
         console.print(f"    {name} = {value:.4g}, searched")
     console.print(
         f"    explains {100 * step.explained_fraction:.3g} % of what was above the noise; error on rows left out "

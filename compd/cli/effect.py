@@ -65,13 +65,14 @@ def _card(one: Effect, configuration: Configuration) -> RenderableType:
     from rich.table import Table
 
     from compd.machine_builder import build_model
-    from compd.model.effect import PORTS, missing
-    from compd.model.observations import settings
+    from compd.model.effect import PORTS
+    from compd.model.effect_needs import unmet_needs
+    from compd.model.observations import available_settings
 
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None
     measured = {wire.name for wire in configuration.wiring.quantities}
-    lacking = missing(one, measured | settings(model.constants), model.links)
+    lacking = unmet_needs(one, measured | available_settings(model.constants), model.links)
 
     card = Table.grid(padding=(0, 2))
     card.add_row("[bold]effect", one.id)

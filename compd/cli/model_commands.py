@@ -116,7 +116,7 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model_file import numbers_of, write_model_file
+    from compd.model_file import parameter_estimates, write_model_file
 
     links = change.after.aligned.rows.links
     if dry_run:
@@ -135,13 +135,13 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
         for column in one.effect.columns(links)
     }
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
-    for effect, number in numbers_of(change.file.fitted, links):
+    for effect, number in parameter_estimates(change.file.fitted, links):
         parameter = ranges[effect, number["name"]]
         inside = parameter.low <= number["value"] <= parameter.high
         said = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
         table.add_row(effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], said)
     for one in change.file.fitted:
-        for name, value in one.shape.items():
+        for name, value in one.constants.items():
             unit = next(constant.unit for constant in one.effect.constants if constant.name == name)
             table.add_row(one.effect.id, name, f"{value:.5g}", "searched", unit, "")
     console.print(table)

@@ -15,12 +15,16 @@ from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.effect import Deltas, Effect, FittedEffect, Port, Shape, deltas, missing, sum_deltas
+from compd.model.deltas import Deltas, deltas_by_effect, sum_deltas
+from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
+from compd.model.effect_needs import unmet_needs
 from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
+from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.observe import Movement, observe, observe_tip
-from compd.model.prediction import Sensitivity, columns, predict, sensitivities
+from compd.model.observe import observe, observe_tip
+from compd.model.prediction import predict
+from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
 from compd.recording.recording import Recording
 
@@ -80,12 +84,12 @@ class AlignedRecording:
             self._by_port.update(sensitivities(self.model, self.rows, new))
         return self._by_port
 
-    def columns(self, effect: Effect, shape: Shape) -> FloatArray:
+    def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
         if self.model is None:
             return np.asarray(basis[:, list(self.axes)])
-        derivatives = columns(effect, self.rows, basis, self.sensitivity(effect.ports))
+        derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))
         return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
 
     @cached_property
@@ -173,10 +177,10 @@ def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[d
 
     Raises CompdError with everything that the effects need and the recording has not.
     """
-    problems = [problem for effect in fitted for problem in missing(effect.effect, rows.available, rows.links)]
+    problems = [problem for effect in fitted for problem in unmet_needs(effect.effect, rows.available, rows.links)]
     if problems:
         raise CompdError(problems)
-    by_effect, _ = deltas(fitted, rows, {})
+    by_effect, _ = deltas_by_effect(fitted, rows, {})
     return by_effect, sum_deltas(list(by_effect.values()))
 
 

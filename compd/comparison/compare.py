@@ -19,12 +19,13 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import frame_motion_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
-from compd.comparison.prediction_uncertainty import GaugeNoise, Uncertainty, first_order, gauge_noise
+from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
 from compd.errors import Problem, RecordingError
 from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
-from compd.model.prediction import pull_back
+from compd.model.sensitivity import link_residuals
+from compd.model.uncertainty import GaugeNoise
 from compd.units import UM_PER_MM
 
 # Outliers bend the fitted frame a little, and the frame decides which rows are outliers: two rounds settle it.
@@ -205,7 +206,7 @@ def compare(
     )
     links_um = None
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
-        links_um = pull_back(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
+        links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
         links_um[~known] = np.nan
     return Comparison(
         aligned=aligned,
@@ -274,16 +275,16 @@ def _uncertainty(
     if covariance is None:
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
-        return None, first_order(aligned, None, fitted, covariance)
+        return None, first_order_uncertainty(aligned, None, fitted, covariance)
     gauges = gauge_noise(aligned, criteria=criteria)
-    uncertainty = first_order(aligned, gauges, fitted, covariance)
+    uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter
         if (gauges_um > criteria.most_gauge_share * repeats.by_axis_um).any():
             gauges = gauge_noise(aligned, from_repeats=False, criteria=criteria)
-            uncertainty = first_order(aligned, gauges, fitted, covariance)
+            uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     return gauges, uncertainty
 
 

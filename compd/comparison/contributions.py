@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import frame_motion_um
-from compd.model.effect import Deltas, sum_deltas
+from compd.model.deltas import Deltas, sum_deltas
 from compd.units import UM_PER_MM
 
 

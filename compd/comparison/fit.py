@@ -33,7 +33,7 @@ from compd.comparison.least_squares import solve_least_squares
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.robust import huber_weights, robust_regression
 from compd.errors import CompdError, Problem
-from compd.model.effect import Effect, FittedEffect, Shape
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
 
 # The prediction is linear in what effects add to within 1e-5: two steps do, a tenth would mean a defect.
@@ -73,7 +73,7 @@ class FitResult:
         return rms(self.residual_um[self.used])
 
 
-def initial_effect(effect: Effect, shape: Shape, links: int) -> FittedEffect:
+def initial_effect(effect: Effect, shape: ConstantValues, links: int) -> FittedEffect:
     """The effect with all parameters 0 and an unknown covariance: where a fit begins."""
     count = len(effect.columns(links))
     return FittedEffect(effect, np.zeros(count), shape, np.full((count, count), np.nan))
@@ -97,7 +97,7 @@ def fit(
     usable, _ = aligned.usable
     initial = tuple(effects)
     effect_deltas(initial, aligned.rows)  # raises where an effect needs what the recording has not
-    columns_um = [aligned.columns(effect.effect, effect.shape) * UM_PER_MM for effect in initial]
+    columns_um = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM for effect in initial]
     ends = np.cumsum([0, *(column.shape[2] for column in columns_um)])
     G_um = np.concatenate([*columns_um, aligned.registration_columns * UM_PER_MM], axis=2)
     usable = usable & np.isfinite(G_um).all(axis=(1, 2))

@@ -20,7 +20,7 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import FitResult, fit, initial_effect
-from compd.model.effect import Effect, FittedEffect, Shape
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 
 # A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
 FINE = 0.01
@@ -29,7 +29,7 @@ FINE = 0.01
 class _Trial(NamedTuple):
     """A fit with one shape, and its loss in um^2."""
 
-    shape: Shape
+    shape: ConstantValues
     loss: float
     result: FitResult
 
@@ -50,12 +50,12 @@ def search_constants(
     Raises CompdError as `fit` does.
     """
     links = aligned.rows.links
-    shapes = effect.shapes(aligned.rows)
+    shapes = effect.constant_grid(aligned.rows)
     if len(shapes) == 1:
         return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um, criteria)
     limit_um2 = (criteria.outlier_sigmas * fit(aligned, model, sigma_um, criteria).rms_um) ** 2
 
-    def trial(shape: Shape) -> _Trial:
+    def trial(shape: ConstantValues) -> _Trial:
         result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um, criteria)
         known = np.isfinite(result.residual_um).all(axis=1)
         return _Trial(shape, float(np.mean(np.minimum(result.residual_um[known] ** 2, limit_um2))), result)
@@ -74,7 +74,7 @@ def search_constants(
     low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
     logarithmic = low > 0  # time constants and periods span decades
 
-    def with_constant(x: float) -> Shape:
+    def with_constant(x: float) -> ConstantValues:
         return {**best.shape, name: float(np.exp(x)) if logarithmic else x}
 
     refined = minimize_scalar(

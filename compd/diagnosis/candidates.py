@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.criteria import Criteria
-from compd.model.effect import Effect, Shape, missing
+from compd.model.effect import ConstantValues, Effect
+from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
 
@@ -26,7 +27,7 @@ class Candidate:
 
     name: str
     effect: Effect
-    shape: Shape
+    shape: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
     searched_parameters: int
@@ -50,7 +51,7 @@ class Candidate:
         """How many times the gain of another effect it must gain to be believed."""
         if self.is_empirical:
             return criteria.description_factor
-        return criteria.contradiction_factor if self.effect.contradicts_declared_frame else 1.0
+        return criteria.contradiction_factor if self.effect.registration else 1.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def library_pool(
         if reason:
             untestable[effect.id] = reason
             continue
-        shapes = effect.shapes(aligned.rows)
+        shapes = effect.constant_grid(aligned.rows)
         searched_parameters = sum(
             criteria.choice_parameters if constant.choice else criteria.searched_constant_parameters
             for constant in effect.constants
@@ -90,19 +91,19 @@ def library_pool(
     return CandidatePool(tuple(candidates), untestable)
 
 
-def _candidate(effect: Effect, shape: Shape, aligned: AlignedRecording, searched_parameters: int) -> Candidate:
-    limits = np.array([column.parameter.fitted_range for column in effect.columns(aligned.rows.links)])
+def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording, searched_parameters: int) -> Candidate:
+    limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
     columns_um = aligned.columns(effect, shape) * UM_PER_MM
     return Candidate(effect.id, effect, shape, columns_um, limits, searched_parameters)
 
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
     """What the effect needs and the recording has not, in words; "" where it has everything."""
-    if effect.contradicts_declared_frame and aligned.registered:
+    if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
     if aligned.model is None and effect.live:
         return "acts inside the machine, and of this machine only the model's prediction is known"
-    return "; ".join(problem.what for problem in missing(effect, aligned.rows.available, aligned.rows.links))
+    return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
 
 
 def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray, criteria: Criteria) -> str:

@@ -13,8 +13,9 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.errors import Problem, RecordingError
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
-from compd.model.observations import Constants, Observations, REFERENCE_TEMPERATURE_degC
-from compd.model.observe import Movement, observe
+from compd.model.motion import Movement
+from compd.model.observations import MachineConstants, Observations, REFERENCE_TEMPERATURE_degC
+from compd.model.observe import observe
 from compd.model.solve_status import Reason
 
 # Places along each edge of the workspace's box.
@@ -182,7 +183,7 @@ def _temperature_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def observe_programmes(
-    model: MachineModel, constants: Constants, chosen: Sequence[Programme], aligned: AlignedRecording
+    model: MachineModel, constants: MachineConstants, chosen: Sequence[Programme], aligned: AlignedRecording
 ) -> Observations:
     """The programmes as rows that effects can be computed on, each a session of its own, with perfect gauges.
 

@@ -16,7 +16,7 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import library
-from compd.model_file import Declaration, Kind, ModelFile, ModelStep, Stored
+from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,12 @@ def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
     if not file.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, file.fitted, file.covariance)
-    unfitted = [initial_effect(fitted.effect, fitted.shape, aligned.rows.links) for fitted in file.fitted]
+    unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in file.fitted]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
     return _change(file, file, result, before, "fit", "", date)
 
 
-def undo(stored: Stored, date: str, where: str) -> Stored:
+def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
     """The model before its last step that is not undone yet; the file keeps the step and its undoing.
 
     where : the file, for messages. Raises StateError where there is no step to undo.
@@ -98,7 +98,7 @@ def undo(stored: Stored, date: str, where: str) -> Stored:
         noise_floor_um=last.noise_floor_um,
         replaced={},
     )
-    return Stored(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
+    return StoredModel(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
 
 
 def _change(

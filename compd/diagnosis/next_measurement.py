@@ -15,9 +15,10 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.least_squares import solve_ridge
 from compd.diagnosis.measurement_programmes import Programme, ProgrammeLimits, observe_programmes, programmes
 from compd.errors import Problem, RecordingError
-from compd.model.effect import FittedEffect, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
-from compd.model.prediction import columns, sensitivities
+from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file
 from compd.units import UM_PER_MM
 
@@ -130,7 +131,9 @@ def plan_measurement(
                 next_step="write a machine configuration",
             )
         )
-    names = list(dict.fromkeys(name for effect in pair for name in quantities(effect.effect, aligned.rows.links)))
+    names = list(
+        dict.fromkeys(name for effect in pair for name in needed_quantities(effect.effect, aligned.rows.links))
+    )
     possible = [programme for programme in programmes(aligned, limits, names) if len(programme) <= rows]
     observations = observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
     lengths = np.array([len(programme) for programme in possible])
@@ -165,7 +168,7 @@ def _rival_refits(
     observations : rows of all programmes.  ends : (K + 1,) of each programme among them.
     """
     effects = (*model, *pair)
-    recorded = [aligned.columns(effect.effect, effect.shape) * UM_PER_MM / sigma_um[:, None] for effect in effects]
+    recorded = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM / sigma_um[:, None] for effect in effects]
     usable, _ = aligned.usable
     known = usable & np.all([np.isfinite(values).all(axis=(1, 2)) for values in recorded], axis=0)
     new = _columns_on(aligned, observations, effects, sigma_um)
@@ -189,8 +192,8 @@ def _columns_on(
     by_port = sensitivities(aligned.model, observations, {port for effect in effects for port in effect.effect.ports})
     whitened = []
     for effect in effects:
-        basis, _ = effect.effect.basis(observations, effect.shape, None)
-        predicted = columns(effect.effect, observations, basis, by_port)
+        basis, _ = effect.effect.basis(observations, effect.constants, None)
+        predicted = effect_sensitivity(effect.effect, observations, basis, by_port)
         measured = (predicted.link_length if aligned.of_links else predicted.tip)[:, list(aligned.axes)]
         whitened.append(measured * UM_PER_MM / sigma_um[:, None])
     return whitened

@@ -143,7 +143,7 @@ def _everything(
 def _nuisance_um(comparison: Comparison) -> FloatArray:
     """(N, m, Q) columns of the model's own parameters and of the instrument's frame."""
     aligned = comparison.aligned
-    columns = [aligned.columns(fitted.effect, fitted.shape) * UM_PER_MM for fitted in comparison.fitted]
+    columns = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in comparison.fitted]
     return np.concatenate([*columns, aligned.registration_columns * UM_PER_MM], axis=2)
 
 

@@ -46,8 +46,8 @@ def estimate_parameters(
     estimates = []
     for k, column in enumerate(effect.columns(links)):
         std = float(np.sqrt(covariance[k, k])) if k < len(covariance) else float("nan")
-        value, shown_std = column.parameter.shown(float(theta[k]), std)
-        plausible = is_plausible(column.parameter.fitted_range, float(theta[k]), std, criteria)
+        value, shown_std = column.parameter.from_theta(float(theta[k]), std)
+        plausible = is_plausible(column.parameter.theta_range, float(theta[k]), std, criteria)
         estimates.append(ParameterEstimate(column.name, value, shown_std, column.parameter.unit, plausible))
     return estimates
 

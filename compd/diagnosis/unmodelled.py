@@ -54,7 +54,7 @@ def with_disturbances(
             others[candidate.name] = _whitened(candidate.columns_um, result, sigma_um)
     if not others or not result.fitted:
         return result
-    own_um = [aligned.columns(fitted.effect, fitted.shape) * UM_PER_MM for fitted in result.fitted]
+    own_um = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in result.fitted]
     A = _whitened(np.concatenate([*own_um, aligned.registration_columns * UM_PER_MM], axis=2), result, sigma_um)
     inverse = normal_inverse(A, RANK_CUT)
     added = np.zeros((A.shape[1], A.shape[1]))

@@ -115,7 +115,7 @@ class DiagnosisStep:
             "explained_fraction": self.explained_fraction,
             "p_adjusted": self.p_value,
             "parameters": [parameter.as_json() for parameter in self.parameters],
-            "constants": dict(self.fitted.shape),
+            "constants": dict(self.fitted.constants),
             "equation": self.effect.equation,
             "alike": {rival.name: rival.cosine for rival in self.rivals},
         }

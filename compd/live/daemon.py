@@ -188,7 +188,7 @@ def _first_models(configuration: Configuration, shelf: ModelLoader) -> Models:
     if file is None:
         return Models(shelf.bare)
     model = shelf.read(Path(file))
-    _log.info("model", file=file, hash=model.hash, effects=[one.effect.id for one in model.machine.acting])
+    _log.info("model", file=file, hash=model.hash, effects=[one.effect.id for one in model.machine.live_effects])
     return Models(model)
 
 

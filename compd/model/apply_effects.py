@@ -1,6 +1,6 @@
-"""A model's effects at work beside its kinematics: what they see, what they remember, and the machine that they make.
+"""Applying a model's effects: the machine with everything that they add at its ports, and what they remember.
 
-One definition for a single snapshot and for N of them: a row's memory is what the rows before it left behind.
+One definition serves a single snapshot and N rows of them: a row's memory is what the rows before it left behind.
 """
 
 from __future__ import annotations
@@ -12,33 +12,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, Memories, deltas
+from compd.model.deltas import Deltas, Memories, deltas_by_effect
 from compd.model.frame import Frame
 from compd.model.kinematics import Mechanism, Pose
 from compd.model.machine import MachineModel
-from compd.model.observations import Motion, Observations, moved
-from compd.model.observe import Movement, rows_at
-from compd.model.prediction import PerturbedMachine, altered
+from compd.model.motion import Motion, Movement, track_motion
+from compd.model.observations import Observations
+from compd.model.observe import observe_at_pose
+from compd.model.prediction import PerturbedMachine, perturb_machine
 
 _Parts = TypeVar("_Parts", Frame, Pose, Mechanism)
-_NOTHING: Memories = {}
+_NO_MEMORIES: Memories = {}
 
 
 class EffectMemory(NamedTuple):
     """What effects hand from one snapshot to the next; nothing in it is ever changed in place.
 
-    motion : of the links, where an effect asks for it; None before the first snapshot.
+    motion : of the links, where an effect depends on it; None before the first snapshot.
     memories : by effect id.
     commanded : whether that motion is of commanded scales (machine-tool mode) and not of scales as read.
     """
 
     motion: Motion | None = None
-    memories: Memories = _NOTHING
+    memories: Memories = _NO_MEMORIES
     commanded: bool = False
 
 
 class EffectInputs(NamedTuple):
-    """What there is to see in one snapshot, or in N of them.
+    """What effects are computed from in one snapshot, or in N of them.
 
     scale_mm (..., n), joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  quantities : (...) each.
     time_s (...): monotonic.  frame, pose, tip_M_mm (..., 3): by the kinematics alone.
@@ -54,120 +55,116 @@ class EffectInputs(NamedTuple):
     tip_M_mm: FloatArray
 
 
-def see(
-    model: MachineModel, sight: EffectInputs, before: EffectMemory, commanded: bool
-) -> tuple[Observations, EffectMemory]:
-    """The rows that effects see, N = 1 for a single snapshot; and the motion after them, memories as they were.
+def apply_effects(
+    model: MachineModel, inputs: EffectInputs, memory: EffectMemory, commanded: bool
+) -> tuple[PerturbedMachine, EffectMemory]:
+    """The machine with its K live effects added one after the other, and what they remember.
 
-    commanded : the scales are where they shall be, not where they are.
+    Every array that an effect changes has one more axis in front, (K, ...): entry k holds effects 0 to k together, so
+    that the last entry is the whole machine (`final`) and the differences are the effects' shares.
+    commanded : the scales are where they are to be, not where they are.
+    """
+    rows, memory_after = build_observations(model, inputs, memory, commanded)
+    by_effect, memories = deltas_by_effect(model.live_effects, rows, memory.memories)
+    cumulative = cumulate_deltas(list(by_effect.values()))
+    if inputs.scale_mm.ndim == 1:
+        cumulative = {port: values[:, 0] for port, values in cumulative.items()}
+    machine = perturb_machine(model, inputs.joint_mm, inputs.frame_mm, cumulative, inputs.frame)
+    return machine, memory_after._replace(memories=memories)
+
+
+def build_observations(
+    model: MachineModel, inputs: EffectInputs, memory: EffectMemory, commanded: bool
+) -> tuple[Observations, EffectMemory]:
+    """The rows from which effects are computed, N = 1 for a single snapshot; and the memory with the motion after them.
+
+    The effects' own memories are as they were; `apply_effects` replaces them.
     """
     assert model.constants is not None, "a model with effects has its constants"
-    count = 1 if sight.scale_mm.ndim == 1 else len(sight.scale_mm)
-    scale_mm, joint_mm, frame_mm = (_rows(part, count, 1) for part in (sight.scale_mm, sight.joint_mm, sight.frame_mm))
-    time_s = _rows(np.asarray(sight.time_s, dtype=np.float64), count, 0)
-    motion = before.motion
-    start = np.zeros(count, dtype=bool)
-    start[0] = motion is None and not before.memories
-    movement, motion = _movement(model, before, commanded, time_s, scale_mm, joint_mm)
-    pose = sight.pose
-    rows = rows_at(
+    count = 1 if inputs.scale_mm.ndim == 1 else len(inputs.scale_mm)
+    scale_mm, joint_mm, frame_mm = (
+        _as_rows(readings, count, 1) for readings in (inputs.scale_mm, inputs.joint_mm, inputs.frame_mm)
+    )
+    time_s = _as_rows(np.asarray(inputs.time_s, dtype=np.float64), count, 0)
+    session_start = np.zeros(count, dtype=bool)
+    session_start[0] = memory.motion is None and not memory.memories
+    movement, motion = _track_motion(model, memory, commanded, time_s, scale_mm, joint_mm)
+    pose = inputs.pose
+    rows = observe_at_pose(
         model.constants,
-        _rows(sight.frame.base_joints_M_mm, count, 2),
+        _as_rows(inputs.frame.base_joints_M_mm, count, 2),
         pose._replace(
-            origin_M_mm=_rows(pose.origin_M_mm, count, 1),
-            rotation_M_P=_rows(pose.rotation_M_P, count, 2),
-            link_length_mm=_rows(pose.link_length_mm, count, 1),
+            origin_M_mm=_as_rows(pose.origin_M_mm, count, 1),
+            rotation_M_P=_as_rows(pose.rotation_M_P, count, 2),
+            link_length_mm=_as_rows(pose.link_length_mm, count, 1),
         ),
-        _rows(sight.tip_M_mm, count, 1),
+        _as_rows(inputs.tip_M_mm, count, 1),
         scale_mm=scale_mm,
         joint_mm=joint_mm,
         frame_mm=frame_mm,
-        quantities={name: _rows(np.asarray(value), count, 0) for name, value in sight.quantities.items()},
+        quantities={name: _as_rows(np.asarray(value), count, 0) for name, value in inputs.quantities.items()},
         time_s=time_s,
-        session_start=start,
+        session_start=session_start,
         movement=movement,
     )
-    return rows, EffectMemory(motion, before.memories, commanded)
+    return rows, EffectMemory(motion, memory.memories, commanded)
 
 
-def act(
-    model: MachineModel, sight: EffectInputs, before: EffectMemory, commanded: bool
-) -> tuple[PerturbedMachine, EffectMemory]:
-    """The machine as the effects alter it, one after the other, and what they remember.
-
-    Every array that an effect alters has one more axis in front, (K, ...): its k-th entry holds effects 0 to k.
-    """
-    rows, after = see(model, sight, before, commanded)
-    each, memories = deltas(model.acting, rows, before.memories)
-    added = one_after_another(list(each.values()))
-    if sight.scale_mm.ndim == 1:
-        added = {port: values[:, 0] for port, values in added.items()}
-    machine = altered(model, sight.joint_mm, sight.frame_mm, added, sight.frame)
-    return machine, after._replace(memories=memories)
-
-
-def kept(remembered: EffectMemory, old: MachineModel, new: MachineModel) -> EffectMemory:
-    """What of it holds for another model: the motion, and what the very same effects left with the same constants."""
-    before = {one.effect.id: one for one in old.acting}
+def carry_over(memory: EffectMemory, old: MachineModel, new: MachineModel) -> EffectMemory:
+    """What of a memory is valid for another model: the motion, and the memories of effects that are the same in both,
+    with the same constants."""
+    before = {fitted.effect.id: fitted for fitted in old.live_effects}
     memories = {
-        name: remembered.memories[name]
-        for name, one in ((one.effect.id, one) for one in new.acting)
-        if name in remembered.memories and before[name].effect is one.effect and before[name].shape == one.shape
+        fitted.effect.id: memory.memories[fitted.effect.id]
+        for fitted in new.live_effects
+        if fitted.effect.id in memory.memories
+        and before[fitted.effect.id].effect is fitted.effect
+        and before[fitted.effect.id].constants == fitted.constants
     }
-    return remembered._replace(memories=memories)
+    return memory._replace(memories=memories)
 
 
-def whole(each: _Parts, like: _Parts) -> _Parts:
-    """What `act` has altered, with all effects: `with_all` for every array; `like` is the same without effects."""
-    return type(like)._make(map(with_all, each, like))
+def final(cumulative: _Parts, nominal: _Parts) -> _Parts:
+    """The parts with all effects, from those that `apply_effects` gives; `nominal` is the same without effects."""
+    return type(nominal)._make(map(final_array, cumulative, nominal))
 
 
-def with_all(each: NDArray[Any], like: NDArray[Any]) -> NDArray[Any]:
-    """The last entry where there is one for each effect: one axis more than `like` has."""
-    return each[-1] if each.ndim > like.ndim else each
+def final_array(cumulative: NDArray[Any], nominal: NDArray[Any]) -> NDArray[Any]:
+    """The entry with all effects of (K, ...); the array itself where no effect changes it, as the axes tell."""
+    return cumulative[-1] if cumulative.ndim > nominal.ndim else cumulative
 
 
-def one_after_another(each: Sequence[Deltas]) -> Deltas:
+def cumulate_deltas(by_effect: Sequence[Deltas]) -> Deltas:
     """(K, N, size) per port: what the first k + 1 of K effects add together."""
-    found: Deltas = {}
-    for k, one in enumerate(each):
-        for port, values in one.items():
-            if port not in found:
-                found[port] = np.zeros((len(each), *values.shape))
-            found[port][k:] += values
-    return found
+    cumulative: Deltas = {}
+    for k, deltas in enumerate(by_effect):
+        for port, values in deltas.items():
+            if port not in cumulative:
+                cumulative[port] = np.zeros((len(by_effect), *values.shape))
+            cumulative[port][k:] += values
+    return cumulative
 
 
-def _rows(part: FloatArray, count: int, core: int) -> FloatArray:
-    """(count, ...) of what has `core` axes of its own, or rows of them. Cheap for one row, as the live loop has."""
+def _as_rows(values: FloatArray, count: int, core: int) -> FloatArray:
+    """(count, ...) of an array whose single row has `core` axes, or of rows of it; a single row is not broadcast."""
     if count == 1:
-        return part if part.ndim > core else part[None]
-    return np.broadcast_to(part, (count, *part.shape[part.ndim - core :]))
+        return values if values.ndim > core else values[None]
+    return np.broadcast_to(values, (count, *values.shape[values.ndim - core :]))
 
 
-def _movement(
+def _track_motion(
     model: MachineModel,
-    before: EffectMemory,
+    memory: EffectMemory,
     commanded: bool,
     time_s: FloatArray,
     scale_mm: FloatArray,
     joint_mm: FloatArray,
 ) -> tuple[Movement, Motion | None]:
-    """How the links move at each row, and the motion after the last; unknown where no effect asks."""
-    if not model.watches_motion:
-        unknown = np.full(scale_mm.shape, np.nan)
-        return Movement(np.zeros(scale_mm.shape), unknown, np.full(joint_mm.shape, np.nan)), None
-    motion = before.motion
-    if motion is not None and before.commanded != commanded:
-        # a command is not where the scale stands: going over from one to the other is no motion
+    """How the links move in each row, and the motion after the last; unknown where no effect depends on it."""
+    if not model.needs_motion:
+        return Movement.unknown(scale_mm, joint_mm), None
+    motion = memory.motion
+    if motion is not None and memory.commanded != commanded:
+        # a scale does not stand where it is commanded: changing from one mode to the other is no motion
         motion = motion._replace(scale_mm=scale_mm[0], turning_mm=scale_mm[0])
-    found = []
-    for k, time in enumerate(time_s.tolist()):
-        if motion is None or (np.isfinite(scale_mm[k]).all() and np.isfinite(joint_mm[k]).all()):
-            motion = moved(motion, time, scale_mm[k], joint_mm[k])
-        found.append(motion)
-    return Movement(
-        np.array([one.direction for one in found]),
-        np.array([one.velocity_mm_per_s for one in found]),
-        np.array([one.joint_velocity_mm_per_s for one in found]),
-    ), motion
+    return track_motion(motion, time_s, scale_mm, joint_mm)

@@ -1,22 +1,31 @@
 """What an effect is: one physical cause, where in the machine it acts, and what it adds there.
 
-An effect adds `basis(rows) @ theta` at its ports: linear in its fitted parameters theta. What is not linear (a time
-constant, a period) is a shape constant, given or searched. The machine model propagates from the port to the tip;
-an effect never computes a tip error itself.
+An effect adds basis(rows) @ theta at its ports: it is linear in its fitted parameters theta. What it is not linear in
+(a time constant, a period) is a nonlinear constant, taken from the machine's description or searched. The machine model
+propagates from the port to the tip; an effect never computes a tip error itself.
+
+Example: a link that grows with temperature, delta_i = a l_i dT_i, in a file of its own, used as `/path/mine.py:MINE`:
+
+    def _expansion(rows, constants):                 # (N, n, 1): n links, one parameter
+        return (1e-6 * rows.link_mm * rows.link_warming_K)[:, :, None]
+
+    MINE = Effect(
+        id="my_expansion", ports=("link",), physics="The links grow with temperature.",
+        equation="delta_i = a l_i dT_i", symbols={"a": "expansion coefficient, ppm/K"}, source="Oiwa, section 2.2",
+        needs=("temperature_link_{link}_degC",), parameters=(Parameter("a", "ppm/K", 0, 23, "steel 12"),),
+        mistaken_for=("link_zero",), separated_by="two temperatures", basis=memoryless_basis(_expansion),
+    )
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.errors import Problem
 from compd.model.observations import Observations
 
 Port: TypeAlias = Literal[
@@ -35,26 +44,15 @@ PORTS: dict[Port, str] = {
     "reference": "what the reference instrument shows: x, y, z in mm, then rotation about x, y, z in rad (6)",
 }
 
-# How many values of a parameter there are, and how the n-th is called.
+# What a parameter has one value for.
 Per: TypeAlias = Literal["machine", "link", "axis", "link_axis"]
 
-Shape: TypeAlias = Mapping[str, float]
-# What an effect remembers from row to row; None at the start. Only the effect knows what is in it.
+# Values of an effect's nonlinear constants, by name.
+ConstantValues: TypeAlias = Mapping[str, float]
+# What an effect remembers from row to row; None at the start. Only the effect itself knows what is in it.
 Memory: TypeAlias = tuple[FloatArray, ...] | None
-Basis: TypeAlias = Callable[[Observations, Shape, Memory], tuple[FloatArray, Memory]]
-
-_WORDS = {
-    "force": ("force_x_N", "force_y_N", "force_z_N"),
-    "direction": (),  # these four come from the scales and the clock: every machine has them
-    "motion": (),
-    "time": (),
-    "order": (),
-}
-_SETTINGS = {
-    "revolute_axes": "only a tripod (kinematics: tripod_3spr) has revolute axes",
-    "plate_thickness_mm": "write `plate_thickness_mm` under `geometry:`",
-    "scale_signal_period_mm": "write `scale_signal_period_mm` under `geometry:`",
-}
+# From rows, constants and memory to (N, sum of port sizes, P) and the memory after; see `Effect`.
+Basis: TypeAlias = Callable[[Observations, ConstantValues, Memory], tuple[FloatArray, Memory]]
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ class Parameter:
     reciprocal: bool = False
 
     def suffixes(self, links: int) -> list[str]:
-        """One for each value that this parameter has on a machine of so many links."""
+        """What follows the name of each of its values on a machine of so many links: `_1`, `_2`, `_3`."""
         return {
             "machine": [""],
             "link": [f"_{i + 1}" for i in range(links)],
@@ -82,7 +80,7 @@ class Parameter:
             "link_axis": [f"_{i + 1}{axis}" for i in range(links) for axis in "xyz"],
         }[self.per]
 
-    def shown(self, theta: float, std: float = float("nan")) -> tuple[float, float]:
+    def from_theta(self, theta: float, std: float = float("nan")) -> tuple[float, float]:
         """Value and standard error in `unit`, from the fitted number and its own; to first order."""
         if not self.reciprocal:
             return theta, std
@@ -90,22 +88,23 @@ class Parameter:
             return float("inf"), float("nan")
         return 1.0 / theta, std / theta**2
 
-    def fitted(self, value: float) -> float:
+    def to_theta(self, value: float) -> float:
         """The number that enters the fit, from a value in `unit`."""
         return 1.0 / value if self.reciprocal else value
 
     @property
-    def fitted_range(self) -> tuple[float, float]:
+    def theta_range(self) -> tuple[float, float]:
         """Plausible range of the number that is fitted."""
-        ends = sorted((self.fitted(self.low), self.fitted(self.high)))
+        ends = sorted((self.to_theta(self.low), self.to_theta(self.high)))
         return ends[0], ends[1]
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A shape constant: what the effect is not linear in.
+    """A nonlinear constant: what the effect is not linear in.
 
-    grid : the values that a search tries, in `unit`.
+    low, high : plausible range in `unit`.  source : where that range comes from.
+    grid : the values that a search tries, in `unit`; two of them are a choice, with nothing between them.
     setting : name of the machine's setting that gives the value, which is then not searched.
     """
 
@@ -119,7 +118,7 @@ class Constant:
 
     @property
     def choice(self) -> bool:
-        """Whether one of two values is true, and nothing between them."""
+        """Whether one of the two values of the grid is true, and nothing between them."""
         return len(self.grid) <= 2
 
 
@@ -135,12 +134,16 @@ class Column:
 class Effect:
     """One physical cause.
 
-    ports : where it acts; `basis` gives (N, size, P) with the ports' sizes one after the other, P fitted numbers.
+    ports : where it acts.
+    physics : what happens, in a sentence.  equation, symbols, source : as a paper would give them.
     needs : quantities by name (`{link}` stands for each link), or "force", "direction", "motion", "time",
         "order" (of the rows), "revolute_axes", "plate_thickness_mm".
+    mistaken_for : ids of effects that look alike.  separated_by : measurements that tell them apart.
+    basis : gives (N, size, P) with the ports' sizes one after the other on axis 1 and P fitted numbers, in mm (rad for
+        directions) per unit of each number.
     remembers : a row's value depends on earlier rows; memory goes in and comes out.
     follows_reading : what it adds depends on its comparators' own readings.
-    contradicts_declared_frame : it says that the reference does not show {M}, which the recording's sidecar declares.
+    registration : a rigid motion of the reference's whole frame, as laying two frames over one another takes away.
     """
 
     id: str
@@ -157,7 +160,7 @@ class Effect:
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
     follows_reading: bool = False
-    contradicts_declared_frame: bool = False
+    registration: bool = False
 
     @property
     def port(self) -> str:
@@ -166,7 +169,7 @@ class Effect:
 
     @property
     def live(self) -> bool:
-        """Whether it belongs to the machine; what happens at the reference instrument does not."""
+        """Whether it belongs to the machine and enters the live loop; what errs at the reference does not."""
         return "reference" not in self.ports
 
     def columns(self, links: int) -> list[Column]:
@@ -177,155 +180,39 @@ class Effect:
             for suffix in parameter.suffixes(links)
         ]
 
-    def shapes(self, rows: Observations) -> list[dict[str, float]]:
-        """Every combination of shape constants to try on these rows; one, maybe empty, where nothing is searched."""
-        found: list[dict[str, float]] = [{}]
+    def constant_grid(self, rows: Observations) -> list[dict[str, float]]:
+        """Every combination of nonlinear constants to try on these rows; a single one where nothing is searched."""
+        combinations: list[dict[str, float]] = [{}]
         for constant in self.constants:
-            given = rows.setting(constant.setting) if constant.setting else None
-            values = constant.grid if given is None else (given,)
-            found = [{**shape, constant.name: value} for shape in found for value in values]
-        return found
+            setting = rows.setting(constant.setting) if constant.setting else None
+            values = constant.grid if setting is None else (setting,)
+            combinations = [{**chosen, constant.name: value} for chosen in combinations for value in values]
+        return combinations
 
 
 @dataclass(frozen=True)
 class FittedEffect:
     """An effect with its numbers: what a machine model carries.
 
-    theta : (P,), in the order of `effect.columns`.  covariance : (P, P), nan where it is not known.
+    theta : (P,), in the order of `effect.columns`.  constants : values of its nonlinear constants.
+    covariance : (P, P), nan where it is not known.
     """
 
     effect: Effect
     theta: FloatArray
-    shape: Shape = field(default_factory=dict)
+    constants: ConstantValues = field(default_factory=dict)
     covariance: FloatArray = field(default_factory=lambda: np.full((1, 1), np.nan))
 
 
-Deltas: TypeAlias = dict[Port, FloatArray]
-Memories: TypeAlias = Mapping[str, Memory]
+def memoryless_basis(columns: Callable[[Observations, ConstantValues], FloatArray]) -> Basis:
+    """The basis of an effect without memory, from a function of rows and constants."""
 
-
-def port_size(port: Port, rows: Observations) -> int:
-    """How many numbers a port takes on this machine."""
-    n = rows.links
-    return {
-        "scale": n,
-        "joint": int(rows.joint_mm.shape[1]),
-        "frame": 9,
-        "link": n,
-        "base_joint": 3 * n,
-        "platform_joint": 3 * n,
-        "revolute_axis": 3 * len(rows.revolute_axes_P),
-        "plate": 9,
-        "tool": 3,
-        "reference": 6,
-    }[port]
-
-
-def by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> Deltas:
-    """Split axis 1 of (N, sum of sizes, ...) into the effect's ports."""
-    if len(effect.ports) == 1:
-        return {effect.ports[0]: values}
-    ends = np.cumsum([port_size(port, rows) for port in effect.ports])[:-1]
-    return dict(zip(effect.ports, np.split(values, ends, axis=1), strict=True))
-
-
-def delta(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
-    """What one effect adds at its ports: (N, size) each, in mm (rad for directions); and its memory after."""
-    basis, memory = fitted.effect.basis(rows, fitted.shape, memory)
-    # summed column by column: a matrix product may add up differently for one row than for many
-    total = np.zeros(basis.shape[:2])
-    for column, value in enumerate(fitted.theta):
-        total += basis[:, :, column] * value
-    return by_port(fitted.effect, rows, total), memory
-
-
-def deltas(
-    fitted: Sequence[FittedEffect], rows: Observations, memories: Memories
-) -> tuple[dict[str, Deltas], dict[str, Memory]]:
-    """What each effect adds, by id, and all memories after. Start with no memories: {}."""
-    found: dict[str, Deltas] = {}
-    after: dict[str, Memory] = {}
-    for one in fitted:
-        found[one.effect.id], after[one.effect.id] = delta(one, rows, memories.get(one.effect.id))
-    return found, after
-
-
-def sum_deltas(each: Collection[Deltas]) -> Deltas:
-    """The sum of several effects at each port, in their order."""
-    total: Deltas = {}
-    for one in each:
-        for port, value in one.items():
-            total[port] = total[port] + value if port in total else value
-    return total
-
-
-def quantities(effect: Effect, links: int) -> list[str]:
-    """The measured quantities that the effect needs, by their full names."""
-    found: list[str] = []
-    for need in effect.needs:
-        if "{link}" in need:
-            found += [need.format(link=i + 1) for i in range(links)]
-        elif need in _WORDS:
-            found += _WORDS[need]
-        elif need not in _SETTINGS:
-            found.append(need)
-    return found
-
-
-def missing(effect: Effect, available: Collection[str], links: int) -> list[Problem]:
-    """What the effect needs and does not get; empty where it can be used.
-
-    available : names of the quantities that gauges or columns deliver, and of the settings that the machine has
-        (`Rows.available`, or `settings` beside the wiring's quantities).
-    """
-    problems = [
-        Problem(
-            where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
-        )
-        for name in quantities(effect, links)
-        if name not in available
-    ]
-    problems += [
-        Problem(
-            where=f"effect {effect.id}",
-            what=f"needs {need}, which this machine does not have",
-            next_step=_SETTINGS[need],
-        )
-        for need in effect.needs
-        if need in _SETTINGS and need not in available
-    ]
-    if effect.live and not links:
-        problems.append(
-            Problem(
-                where=f"effect {effect.id}",
-                what=f"acts at the port {effect.port}, which an external model has not",
-                allowed="effects at the port `reference`",
-                next_step="write a machine configuration",
-            )
-        )
-    return problems
-
-
-def _gauge_to_add(name: str) -> str:
-    kind = re.split(r"_", name, maxsplit=1)[0]
-    gauge = {
-        "temperature": "a thermometer",
-        "force": "a force gauge",
-        "pressure": "a barometer",
-        "humidity": "a hygrometer",
-    }.get(kind, "a gauge")
-    return f"wire {gauge} under `wiring: quantities:` as `name: {name}`, or record a column of that name"
-
-
-def memoryless(columns: Callable[[Observations, Shape], FloatArray]) -> Basis:
-    """A basis whose rows stand alone."""
-
-    def basis(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
-        return columns(rows, shape), memory
+    def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
+        return columns(rows, constants), memory
 
     return basis
 
 
-def one_per_link(values: FloatArray) -> FloatArray:
-    """(N, n) values, each link with a parameter of its own -> (N, n, n)."""
+def columns_per_link(values: FloatArray) -> FloatArray:
+    """Basis (N, n, n) of an effect with one parameter per link, from its values (N, n)."""
     return np.asarray(values[:, :, None] * np.eye(values.shape[1]))

@@ -15,10 +15,11 @@ from compd.model.effect import FittedEffect
 from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_frame
 from compd.model.kernels.rotation import compose
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
-from compd.model.observations import Constants
+from compd.model.observations import MachineConstants, MachineDetails
 from compd.model.solve_status import require
+from compd.model.statics import link_forces
 from compd.model.tool import Arrangement, Contact
-from compd.model.transform import to_inner
+from compd.model.transform import to_inner, to_outer
 
 
 class AtZero(NamedTuple):
@@ -46,7 +47,7 @@ class MachineModel:
     arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.joint_correction`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
-    constants : what effects ask of the description beyond the kinematics; None where nothing was given.
+    constants : what effects need beyond the kinematics; None where none was computed, as for a model without effects.
     """
 
     frame: FrameGeometry
@@ -59,7 +60,7 @@ class MachineModel:
     zero: AtZero
     effects: tuple[FittedEffect, ...] = ()
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    constants: Constants | None = None
+    constants: MachineConstants | None = None
 
     @property
     def links(self) -> int:
@@ -72,18 +73,18 @@ class MachineModel:
         return len(self.revolute_axes_P) == 0
 
     @cached_property
-    def acting(self) -> tuple[FittedEffect, ...]:
-        """The effects that belong to the machine; those at the reference instrument never act on it."""
-        return tuple(one for one in self.effects if one.effect.live)
+    def live_effects(self) -> tuple[FittedEffect, ...]:
+        """The effects of the machine itself; those of the reference instrument never enter the live loop."""
+        return tuple(fitted for fitted in self.effects if fitted.effect.live)
 
     @cached_property
-    def watches_motion(self) -> bool:
-        """Whether an effect asks how the links move."""
-        return any({"direction", "motion"} & set(one.effect.needs) for one in self.acting)
+    def needs_motion(self) -> bool:
+        """Whether an effect depends on the links' direction of travel or velocity."""
+        return any({"direction", "motion"} & set(fitted.effect.needs) for fitted in self.live_effects)
 
-    def fading(self, weight: float) -> Self:
-        """The same machine with its effects counting `weight`, 0 to 1."""
-        return replace(self, effects=tuple(replace(one, theta=one.theta * weight) for one in self.effects))
+    def with_effect_weight(self, weight: float) -> Self:
+        """The same machine with all fitted numbers of its effects times `weight`, 0 to 1: a model that is faded in."""
+        return replace(self, effects=tuple(replace(fitted, theta=fitted.theta * weight) for fitted in self.effects))
 
     def mechanism(self, base_joints_M_mm: FloatArray) -> Mechanism:
         """The links with the base joints (..., n, 3) where they are now."""
@@ -114,28 +115,28 @@ def machine_model(
     Raises KinematicsError where machine zero is unreachable, near-singular or not finite, ValueError for arrays of
     a wrong shape.
     """
-    supports, base_joints = _frozen(supports_M_mm), _frozen(base_joints_M_mm)
+    supports, base_joints = _read_only(supports_M_mm), _read_only(base_joints_M_mm)
     axes = np.asarray(revolute_axes_P, dtype=np.float64).reshape(-1, 3)
-    axes = _frozen(axes / np.sqrt((axes * axes).sum(-1, keepdims=True)))
+    axes = _read_only(axes / np.sqrt((axes * axes).sum(-1, keepdims=True)))
     carriers: IntArray = np.array(support_of_joint, dtype=np.int64)
     carriers.flags.writeable = False
-    plate, platform_joints, weights = _frozen(plate_points_M_mm), _frozen(platform_joints_P_mm), _frozen(joint_weights)
+    plate, platform_joints, weights = map(_read_only, (plate_points_M_mm, platform_joints_P_mm, joint_weights))
     _check_shapes(supports, plate, base_joints, carriers, platform_joints, weights)
     distances, _ = distances_mm(supports, plate)
     origin, rotation = base_pose(supports)
     offsets = to_inner(rotation, np.zeros(3), base_joints - supports[carriers])
-    frame = FrameGeometry(plate, _frozen(offsets), carriers, supports, _frozen(origin), _frozen(rotation))
+    frame = FrameGeometry(plate, _read_only(offsets), carriers, supports, _read_only(origin), _read_only(rotation))
     require(
         solve_frame(frame, distances).reason,
         "frame at machine zero",
         "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
     )
     mechanism = Mechanism(base_joints, platform_joints, axes)
-    attitude = _facing(base_joints, platform_joints) if zero_rotation_M_P is None else zero_rotation_M_P
+    attitude = _parallel_attitude(base_joints, platform_joints) if zero_rotation_M_P is None else zero_rotation_M_P
     pose = inverse_kinematics(mechanism, *zero_contact, attitude)
     check = "check the tip and the attitude at machine zero, base joints, platform joints and revolute axes"
     require(pose.reason, "links at machine zero", check)
-    # the links must also lead back to machine zero, or the first warm start would
+    # forward kinematics must lead back to machine zero as well: the first cycle starts from there
     require(
         forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P).reason,
         "links at machine zero",
@@ -143,19 +144,57 @@ def machine_model(
     )
     zero = AtZero(
         base_joints,
-        _frozen(pose.origin_M_mm),
-        _frozen(pose.rotation_M_P),
-        Contact(*map(_frozen, zero_contact)),
-        _frozen(pose.link_length_mm),
-        _frozen(distances),
+        _read_only(pose.origin_M_mm),
+        _read_only(pose.rotation_M_P),
+        Contact(*map(_read_only, zero_contact)),
+        _read_only(pose.link_length_mm),
+        _read_only(distances),
     )
     return MachineModel(
-        frame, platform_joints, axes, arrangement, weights, float(weight_N), _frozen(weight_at_P_mm), zero
+        frame, platform_joints, axes, arrangement, weights, float(weight_N), _read_only(weight_at_P_mm), zero
     )
 
 
-def _facing(base_joints_M_mm: FloatArray, platform_joints_P_mm: FloatArray) -> FloatArray:
-    """Attitude at which the triangle of the platform joints lies as that of the base joints does: near a tripod's."""
+def machine_constants(model: MachineModel, details: MachineDetails) -> MachineConstants:
+    """What all rows of this machine have in common; computed once per machine, not in a cycle."""
+    zero = model.zero
+    platform_joints_M = to_outer(zero.rotation_M_P, zero.platform_origin_M_mm, model.platform_joints_P_mm)
+    directions_M = (platform_joints_M - zero.base_joints_M_mm) / zero.link_length_mm[:, None]
+    if len(model.revolute_axes_P):
+        axes_M = to_outer(zero.rotation_M_P, np.zeros(3), model.revolute_axes_P)
+    else:
+        # horizontal and square to the link; a vertical link has no such direction of its own and gets x of {M}
+        level = np.cross(directions_M, [0.0, 0.0, 1.0])
+        axes_M = np.where(np.linalg.norm(level, axis=1, keepdims=True) > 1e-6, level, [1.0, 0.0, 0.0])
+    axes_M = axes_M - (axes_M * directions_M).sum(axis=1, keepdims=True) * directions_M
+    weight_alone = link_forces(
+        model.mechanism(zero.base_joints_M_mm),
+        zero.platform_origin_M_mm,
+        zero.rotation_M_P,
+        np.zeros(3),
+        zero.contact.tip_M_mm,
+        model.weight_N,
+        model.weight_at_P_mm,
+    )
+    return MachineConstants(
+        platform_joints_P_mm=model.platform_joints_P_mm,
+        revolute_axes_P=model.revolute_axes_P,
+        tool_P_mm=zero.contact.tip_P_mm,
+        zero_directions_M=directions_M,
+        zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),
+        zero_axial_force_N=weight_alone.axial_N,
+        weight_N=model.weight_N,
+        weight_at_P_mm=model.weight_at_P_mm,
+        frame_zero_mm=zero.distances_mm,
+        plate_points_M_mm=model.frame.plate_points_M_mm,
+        plate_thickness_mm=details.plate_thickness_mm,
+        scale_signal_period_mm=details.scale_signal_period_mm,
+        instrument_M_mm=np.array(details.instrument_M_mm),
+    )
+
+
+def _parallel_attitude(base_joints_M_mm: FloatArray, platform_joints_P_mm: FloatArray) -> FloatArray:
+    """Attitude that lays the triangle of the platform joints parallel to that of the base joints: a tripod's guess."""
     _, base = base_pose(base_joints_M_mm)
     _, platform = base_pose(platform_joints_P_mm)
     return np.asarray(compose(base, platform.T))
@@ -169,7 +208,7 @@ def _check_shapes(
     platform_joints: FloatArray,
     weights: FloatArray,
 ) -> None:
-    """Kernels trust indices and sizes: refuse here what would lead them astray."""
+    """Kernels do not check indices and sizes; raise here for those that would read outside an array."""
     links = base_joints.shape[0]
     shapes = {
         "supports_M_mm": (supports.shape, (3, 3)),
@@ -179,9 +218,9 @@ def _check_shapes(
         "platform_joints_P_mm": (platform_joints.shape, (links, 3)),
         "joint_weights": (weights.shape, (links, weights.shape[-1])),
     }
-    wrong = [f"{name} is {found}, must be {wanted}" for name, (found, wanted) in shapes.items() if found != wanted]
-    if wrong:
-        raise ValueError("; ".join(wrong))
+    errors = [f"{name} is {shape}, must be {right}" for name, (shape, right) in shapes.items() if shape != right]
+    if errors:
+        raise ValueError("; ".join(errors))
     if carriers.min() < 0 or carriers.max() > 2:
         raise KinematicsError(
             Problem(
@@ -193,7 +232,7 @@ def _check_shapes(
         )
 
 
-def _frozen(values: ArrayLike) -> FloatArray:
+def _read_only(values: ArrayLike) -> FloatArray:
     """A contiguous read-only copy."""
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False

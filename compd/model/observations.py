@@ -1,16 +1,16 @@
-"""What effects see: N instants of a machine, with everything measured and what the nominal model makes of it."""
+"""What effects are computed from: N instants of a machine, with all readings and the nominal model's pose."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.model.kinematics import Mechanism
 from compd.model.statics import link_forces
@@ -21,26 +21,35 @@ REFERENCE_TEMPERATURE_degC = 20.0
 # ISO 2533 standard atmosphere: at this pressure interferometers' tables have their zero.
 REFERENCE_PRESSURE_hPa = 1013.25
 
-# A scale that has turned round by less than this stands still: its noise is some 10 nm, a backlash 0.1 um or more.
-REVERSAL_MM = 1e-3
-# Velocity is averaged over so long: a step of a scale, 10 nm, within a cycle of 1 ms is 10 mm/s of noise without.
-VELOCITY_WINDOW_S = 0.02
-
-Flags: TypeAlias = NDArray[Any]
-
-# An effect that saw these columns would see the answer.
-ANSWERS = ("reference_", "model_")
+# Columns of the reference instrument and of a model: an effect computed from them would be fitted to its own answer.
+ANSWER_PREFIXES = ("reference_", "model_")
 
 
-class Constants(NamedTuple):
-    """What the machine's description adds to its kinematics; nan where the description says nothing.
+class MachineDetails(NamedTuple):
+    """What effects need of a machine's description beyond its kinematics; nan where it says nothing.
+
+    plate_thickness_mm, scale_signal_period_mm: of the configuration's `geometry:`.
+    instrument_M_mm: where the reference instrument's beam starts. Only the refractive index of air depends on it;
+        without a place of its own the beam is taken to start at the origin of {M}.
+    """
+
+    plate_thickness_mm: float = math.nan
+    scale_signal_period_mm: float = math.nan
+    instrument_M_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class MachineConstants(NamedTuple):
+    """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
     platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.
-    tool_P_mm (3,), at machine zero.  zero_directions_M (n, 3): links at machine zero, from base to platform.
+    tool_P_mm (3,), at machine zero.
+    zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
+    zero_axes_M (n, 3): unit vector square to each link at machine zero, towards which its base joint's first angle
+        counts: the revolute axis on a tripod, horizontal on a hexapod.
     zero_axial_force_N (n,): with the platform's weight alone.  weight_N, weight_at_P_mm (3,): the platform's.
     frame_zero_mm (9,): t1..t3, u1..u6 at machine zero.  plate_points_M_mm (3, 3).
     plate_thickness_mm, scale_signal_period_mm.
-    instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless told.
+    instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless configured.
     """
 
     platform_joints_P_mm: FloatArray
@@ -60,8 +69,9 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True)
 class Observations:
-    """N instants. Lengths in mm; {M} and {P} as everywhere; computed without any effect.
+    """N instants of a machine; the pose is that of the nominal model, before any effect is applied.
 
+    constants : of the machine, the same in every row.
     scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): readings, zero at machine zero.
     quantities : everything else measured, by its name with its unit, (N,) each; no column of the reference.
     time_s (N,).  session_start (N,): True where a row has no history.
@@ -71,13 +81,13 @@ class Observations:
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
     """
 
-    constants: Constants
+    constants: MachineConstants
     scale_mm: FloatArray
     joint_mm: FloatArray
     frame_mm: FloatArray
     quantities: Mapping[str, FloatArray]
     time_s: FloatArray
-    session_start: Flags
+    session_start: BoolArray
     direction: FloatArray
     velocity_mm_per_s: FloatArray
     joint_velocity_mm_per_s: FloatArray
@@ -89,13 +99,13 @@ class Observations:
     tip_M_mm: FloatArray
 
     def __post_init__(self) -> None:
-        seen = [name for name in self.quantities if name.startswith(ANSWERS)]
-        if seen:
+        refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
+        if refused:
             raise CompdError(
                 Problem(
                     where="rows for effects",
                     what="an effect must never see the answer",
-                    value=", ".join(seen),
+                    value=", ".join(refused),
                     allowed="measured quantities only",
                     next_step="leave these columns out",
                 )
@@ -103,6 +113,16 @@ class Observations:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def select(self, index: IntArray) -> Observations:
+        """The rows of this index (R,), in its order."""
+        chosen: dict[str, Any] = {
+            column.name: getattr(self, column.name)[index]
+            for column in fields(self)
+            if column.name not in ("constants", "quantities")
+        }
+        quantities = {name: values[index] for name, values in self.quantities.items()}
+        return replace(self, **chosen, quantities=quantities)
 
     @property
     def links(self) -> int:
@@ -116,8 +136,8 @@ class Observations:
 
     @property
     def available(self) -> set[str]:
-        """Names of the quantities and settings that there are: what `missing` asks for."""
-        return set(self.quantities) | settings(self.constants)
+        """Names of the quantities and settings that there are, as `unmet_needs` takes them."""
+        return set(self.quantities) | available_settings(self.constants)
 
     def setting(self, name: str) -> float | None:
         """A number from the machine's description, None where it has none."""
@@ -168,59 +188,18 @@ class Observations:
 
     @cached_property
     def joint_angles_rad(self) -> FloatArray:
-        """(N, n, 2) by which each base joint has turned since machine zero: towards its `zero_axes_M`, and across."""
+        """(N, n, 2) rotation of each base joint since machine zero: towards its `zero_axes_M`, and square to that."""
         along_zero, axes = self.constants.zero_directions_M, self.constants.zero_axes_M
         along = (self.directions_M * along_zero).sum(axis=-1)
-        first = (self.directions_M * axes).sum(axis=-1)
-        second = (self.directions_M * np.cross(along_zero, axes)).sum(axis=-1)
-        return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=-1)
+        towards_axis = (self.directions_M * axes).sum(axis=-1)
+        across = (self.directions_M * np.cross(along_zero, axes)).sum(axis=-1)
+        return np.stack([np.arctan2(towards_axis, along), np.arctan2(across, along)], axis=-1)
 
 
-def settings(constants: Constants) -> set[str]:
-    """Which of the settings that effects may need this machine has."""
-    found = {"revolute_axes"} if len(constants.revolute_axes_P) else set()
+def available_settings(constants: MachineConstants) -> set[str]:
+    """The settings that this machine has, of those that effects may need."""
+    settings = {"revolute_axes"} if len(constants.revolute_axes_P) else set()
     for name in ("plate_thickness_mm", "scale_signal_period_mm"):
         if not np.isnan(getattr(constants, name)):
-            found.add(name)
-    return found
-
-
-class Motion(NamedTuple):
-    """What the live loop remembers of the motion, from one snapshot to the next.
-
-    time_s.  scale_mm (n,), joint_mm (k,): the last readings.
-    turning_mm (n,): the farthest each link has got in its direction.  direction (n,): +1, -1, 0 at the start.
-    velocity_mm_per_s (n,), joint_velocity_mm_per_s (k,): averaged over VELOCITY_WINDOW_S.
-    """
-
-    time_s: float
-    scale_mm: FloatArray
-    joint_mm: FloatArray
-    turning_mm: FloatArray
-    direction: FloatArray
-    velocity_mm_per_s: FloatArray
-    joint_velocity_mm_per_s: FloatArray
-
-
-def moved(before: Motion | None, time_s: float, scale_mm: FloatArray, joint_mm: FloatArray) -> Motion:
-    """The motion after one more snapshot; pass None at the start, where direction is unknown and velocity zero.
-
-    A link has turned round when it has come back by more than REVERSAL_MM.
-    """
-    if before is None:
-        still = np.zeros_like(scale_mm)
-        return Motion(time_s, scale_mm, joint_mm, scale_mm, still, still, np.zeros_like(joint_mm))
-    since_mm = scale_mm - before.turning_mm
-    direction = np.where(np.abs(since_mm) > REVERSAL_MM, np.sign(since_mm), before.direction)
-    # onwards the farthest point goes with the link; while it comes back by less, it stays
-    onwards = (direction != before.direction) | (since_mm * before.direction > 0)
-    turning_mm = np.where(onwards, scale_mm, before.turning_mm)
-    elapsed_s = time_s - before.time_s
-    if elapsed_s <= 0.0:
-        return before._replace(turning_mm=turning_mm, direction=direction, scale_mm=scale_mm, joint_mm=joint_mm)
-    share = -np.expm1(-elapsed_s / VELOCITY_WINDOW_S)
-    speed = before.velocity_mm_per_s
-    speed = speed + share * ((scale_mm - before.scale_mm) / elapsed_s - speed)
-    joint_speed = before.joint_velocity_mm_per_s
-    joint_speed = joint_speed + share * ((joint_mm - before.joint_mm) / elapsed_s - joint_speed)
-    return Motion(time_s, scale_mm, joint_mm, turning_mm, direction, speed, joint_speed)
+            settings.add(name)
+    return settings

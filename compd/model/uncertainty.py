@@ -1,85 +1,123 @@
-"""How sure the live tip is: gauges' declared noise and fitted numbers' errors, to first order (GUM, 5.1)."""
+"""Uncertainty of the tip from the gauges' noise and the fitted numbers' errors, to first order (GUM, JCGM 100:2008).
+
+GUM 5.1.2, for errors that are independent: u^2 = sum_i (c_i u_i)^2 with sensitivity coefficients c_i. GUM 5.2.2, for
+fitted numbers, whose errors are correlated: u^2 = g^T V g with their covariance V. The two are independent of each
+other, so that their variances add up. An uncertainty that is not known is nan and stays nan in the sum.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Deltas, FittedEffect, Memories, Port, deltas, quantities, sum_deltas
+from compd.model.deltas import Deltas, Memories, deltas_by_effect, sum_deltas
+from compd.model.effect import FittedEffect, Port
+from compd.model.effect_needs import needed_quantities
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
-from compd.model.prediction import Sensitivity, columns, sensitivities
+from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
+
+# The ports at which length gauges are read, in the order in which their variances are added up.
+GAUGE_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
 
 
 class GaugeNoise(NamedTuple):
-    """Standard deviation of one reading: scale_mm (n,), joint_mm (k,), frame_mm (9,); quantities in their own unit.
+    """Standard deviation of one reading of each gauge.
 
-    A quantity that is not named has a noise that is not known.
+    scale_mm (n,), joint_mm (k,), frame_mm (9,).
+    quantities : of other gauges by name, in their own unit; one that is not named has an unknown noise.
+    how : how the noise was found, for people.
     """
 
     scale_mm: FloatArray
     joint_mm: FloatArray
     frame_mm: FloatArray
-    quantities: Mapping[str, float]
+    quantities: Mapping[str, float] = MappingProxyType({})
+    how: str = ""
+
+    def at_port(self, port: Port) -> FloatArray:
+        """Of the gauges of one of GAUGE_PORTS, mm."""
+        return {"scale": self.scale_mm, "joint": self.joint_mm, "frame": self.frame_mm}[port]
+
+
+def gauge_variance(sensitivity: Mapping[Port, FloatArray], noise: GaugeNoise) -> FloatArray:
+    """GUM 5.1.2: variance (N, m), in mm2, of m predicted coordinates by the noise of all length gauges.
+
+    sensitivity : (N, m, size) for each of GAUGE_PORTS, mm per mm.
+
+    Example: a tip that moves by 1.2 mm per mm of each of three scales with a noise of 0.1 um, and by nothing else, has
+    a variance of 3 (1.2 x 1e-4 mm)^2 and a standard uncertainty of 0.21 um.
+    """
+    return np.asarray(sum(sensitivity[port] ** 2 @ noise.at_port(port) ** 2 for port in GAUGE_PORTS))
+
+
+def parameter_variance(derivatives: FloatArray, covariance: FloatArray) -> FloatArray:
+    """GUM 5.2.2: variance (N, m) of m predicted coordinates by the errors of P fitted numbers, g^T V g for each.
+
+    derivatives : (N, m, P), of each coordinate by each number.  covariance : (P, P); nan in it makes the variance nan.
+    """
+    return np.asarray((derivatives @ covariance * derivatives).sum(axis=2))
 
 
 def tip_uncertainty_mm(model: MachineModel, rows: Observations, noise: GaugeNoise, memories: Memories) -> FloatArray:
     """Standard uncertainty of the tip (N, 3): in {M}, with the tool on the plate of the touched place in {P}.
 
-    Errors of different gauges have nothing to do with each other; those of fitted numbers have the model's covariance.
-    How an effect at the scales' port changes with their noise is left out: at most a few per cent of that noise.
+    The noise of the scales also changes what an effect at the port `scale` adds; that is left out: at most a few per
+    cent of the noise itself.
     nan where a fitted number's error or a needed quantity's noise is not known.
     """
-    readings: tuple[tuple[Port, FloatArray], ...] = (
-        ("scale", noise.scale_mm),
-        ("joint", noise.joint_mm),
-        ("frame", noise.frame_mm),
-    )
-    ports = {port for one in model.acting for port in one.effect.ports}
-    by = sensitivities(model, rows, {*ports, "scale", "joint", "frame"})
-    variance = sum(((by[port].tip ** 2) @ sigma_mm**2 for port, sigma_mm in readings), start=np.zeros((len(rows), 3)))
-    variance = variance + _by_parameters(model, rows, by, memories)
+    ports = {port for fitted in model.live_effects for port in fitted.effect.ports}
+    by_port = sensitivities(model, rows, {*ports, *GAUGE_PORTS})
+    variance = gauge_variance({port: by_port[port].tip for port in GAUGE_PORTS}, noise)
+    variance = variance + _variance_by_effects(model, rows, by_port, memories)
     for name in rows.quantities:
-        variance = variance + _by_quantity(model, rows, by, memories, name, noise.quantities.get(name, np.nan)) ** 2
+        error_mm = _tip_by_quantity(model, rows, by_port, memories, name, noise.quantities.get(name, np.nan))
+        variance = variance + error_mm**2
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _by_parameters(
-    model: MachineModel, rows: Observations, by: Mapping[Port, Sensitivity], memories: Memories
+def _variance_by_effects(
+    model: MachineModel, rows: Observations, by_port: Mapping[Port, Sensitivity], memories: Memories
 ) -> FloatArray:
-    """(N, 3) variance, mm2, by the errors of the numbers of the effects that act."""
-    parts: list[FloatArray] = []
-    used: list[int] = []
+    """(N, 3) variance, mm2, by the errors of the live effects' numbers."""
+    derivatives: list[FloatArray] = []
+    live: list[int] = []  # places of the live effects' numbers in the model's covariance
     begin = 0
-    for one in model.effects:
-        end = begin + len(one.theta)
-        if one.effect.live:
-            basis, _ = one.effect.basis(rows, one.shape, memories.get(one.effect.id))
-            parts.append(columns(one.effect, rows, basis, by).tip)
-            used += range(begin, end)
+    for fitted in model.effects:
+        end = begin + len(fitted.theta)
+        if fitted.effect.live:
+            basis, _ = fitted.effect.basis(rows, fitted.constants, memories.get(fitted.effect.id))
+            derivatives.append(effect_sensitivity(fitted.effect, rows, basis, by_port).tip)
+            live += range(begin, end)
         begin = end
-    if not parts:
+    if not derivatives:
         return np.zeros((len(rows), 3))
-    G = np.concatenate(parts, axis=2)
-    covariance = model.covariance[np.ix_(used, used)] if len(model.covariance) else np.full((len(used),) * 2, np.nan)
-    return np.asarray((G @ covariance * G).sum(axis=2))
+    unknown = np.full((len(live),) * 2, np.nan)
+    covariance = model.covariance[np.ix_(live, live)] if len(model.covariance) else unknown
+    return parameter_variance(np.concatenate(derivatives, axis=2), covariance)
 
 
-def _by_quantity(
-    model: MachineModel, rows: Observations, by: Mapping[Port, Sensitivity], memories: Memories, name: str, sigma: float
+def _tip_by_quantity(
+    model: MachineModel,
+    rows: Observations,
+    by_port: Mapping[Port, Sensitivity],
+    memories: Memories,
+    name: str,
+    sigma: float,
 ) -> FloatArray:
-    """(N, 3) by how many mm the tip moves when one quantity shows more by its standard deviation."""
-    using = [one for one in model.acting if name in quantities(one.effect, model.links)]
-    more = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
-    before, after = (_added(using, seen, memories) for seen in (rows, more))
-    moved = (by[port].tip @ (after[port] - before[port])[:, :, None] for port in after)
-    return np.asarray(sum(moved, start=np.zeros((len(rows), 3, 1)))[:, :, 0])
+    """(N, 3) by how many mm the tip moves when one quantity reads more by its standard deviation sigma."""
+    effects = [fitted for fitted in model.live_effects if name in needed_quantities(fitted.effect, model.links)]
+    raised = replace(rows, quantities={**rows.quantities, name: rows.quantities[name] + sigma})
+    before, after = (_total_deltas(effects, observations, memories) for observations in (rows, raised))
+    tip_mm = (by_port[port].tip @ (after[port] - before[port])[:, :, None] for port in after)
+    return np.asarray(sum(tip_mm, start=np.zeros((len(rows), 3, 1)))[:, :, 0])
 
 
-def _added(effects: Sequence[FittedEffect], rows: Observations, memories: Memories) -> Deltas:
-    each, _ = deltas(effects, rows, memories)
-    return sum_deltas(list(each.values()))
+def _total_deltas(effects: Sequence[FittedEffect], rows: Observations, memories: Memories) -> Deltas:
+    by_effect, _ = deltas_by_effect(effects, rows, memories)
+    return sum_deltas(list(by_effect.values()))

@@ -11,7 +11,7 @@ from plotly.graph_objects import Figure
 from compd.arrays import rms
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import covariates
-from compd.model_file import ModelFile, numbers_of
+from compd.model_file import ModelFile, parameter_estimates
 from compd.report.figures import (
     plot_contributions,
     plot_histogram,
@@ -160,7 +160,7 @@ def _excluded(comparison: Comparison) -> PageTable:
 def _effects(model: ModelFile, comparison: Comparison) -> PageTable:
     rows = [
         [effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"]]
-        for effect, number in numbers_of(model.fitted, comparison.aligned.rows.links)
+        for effect, number in parameter_estimates(model.fitted, comparison.aligned.rows.links)
     ]
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 

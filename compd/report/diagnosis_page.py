@@ -13,7 +13,8 @@ from compd.comparison.compare import Comparison
 from compd.comparison.covariates import Covariate, covariates
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, in_um
-from compd.model.effect import Effect, quantities
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities
 from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 from compd.report.small_multiples import small_multiples
 from compd.units import unit_of
@@ -69,7 +70,7 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
         [one.name, f"{one.value:.4g} +- {one.std:.2g} {one.unit}" + ("" if one.plausible else ", implausible")]
         for one in step.parameters
     ]
-    rows += [[name, f"{value:.4g}, searched"] for name, value in step.fitted.shape.items()]
+    rows += [[name, f"{value:.4g}, searched"] for name, value in step.fitted.constants.items()]
     rows += [
         ["explains", f"{100 * step.explained_fraction:.0f} % of what was left above the noise"],
         ["error on rows left out", f"{step.heldout_rms_um:.3g} um"],
@@ -98,7 +99,7 @@ def _of_step(number: int, step: DiagnosisStep, found: Diagnosis) -> list[Panel]:
 def _drivers(effect: Effect, comparison: Comparison) -> list[Covariate]:
     """What drives an effect, among what can be drawn; place and link lengths where there is nothing else."""
     every = covariates(comparison.aligned)
-    needed = quantities(effect, comparison.aligned.rows.links)
+    needed = needed_quantities(effect, comparison.aligned.rows.links)
     names = {_name(name) for name in needed}
     found = [one for one in every if one.name in names]
     if "direction" in effect.needs:

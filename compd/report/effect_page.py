@@ -8,7 +8,7 @@ import numpy as np
 from plotly.graph_objects import Cone, Figure, Scatter, Scatter3d
 
 from compd.configuration import Configuration
-from compd.machine_builder import build_model, details
+from compd.machine_builder import build_model, machine_details
 from compd.model.effect import Constant, Effect, Parameter
 from compd.report.effect_signature import (
     ASIDE_MM,
@@ -28,7 +28,7 @@ AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain
 def write_effect_page(path: Path, effect: Effect, configuration: Configuration) -> None:
     """Write the page. Raises CompdError where the machine lacks a setting that the effect needs."""
     model = build_model(configuration.geometry, configuration.wiring)
-    result = compute_signature(effect, model, details(configuration.geometry))
+    result = compute_signature(effect, model, machine_details(configuration.geometry))
     largest_um = float(np.linalg.norm(result.tip_um, axis=1).max())
     numbers = ", ".join(f"{name} = {value}" for name, value in result.parameters.items())
     verdict = (

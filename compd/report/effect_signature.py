@@ -10,11 +10,14 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model.effect import Constant, Effect, FittedEffect, Parameter, delta, missing, quantities
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Constant, Effect, FittedEffect, Parameter
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.kinematics import inverse_kinematics
-from compd.model.machine import MachineModel
-from compd.model.observations import Observations, REFERENCE_PRESSURE_hPa, moved
-from compd.model.observe import Details, Movement, constants, observe
+from compd.model.machine import MachineModel, machine_constants
+from compd.model.motion import Movement, update_motion
+from compd.model.observations import MachineDetails, Observations, REFERENCE_PRESSURE_hPa
+from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.units import UM_PER_MM
 
@@ -72,14 +75,14 @@ class Signature(NamedTuple):
     parameters: dict[str, str]
 
 
-def compute_signature(effect: Effect, model: MachineModel, details: Details) -> Signature:
+def compute_signature(effect: Effect, model: MachineModel, details: MachineDetails) -> Signature:
     """Arrows and curves of one effect with parameters from the middle of their plausible range.
 
     Raises CompdError where this machine lacks what the effect needs (a plate thickness, revolute axes).
     """
-    needed = quantities(effect, model.links)
+    needed = needed_quantities(effect, model.links)
     on_machine = _EffectOnMachine(effect, model, details, needed)
-    lacking = missing(effect, on_machine.rows(Drive(np.zeros((1, 3)))).available, model.links)
+    lacking = unmet_needs(effect, on_machine.rows(Drive(np.zeros((1, 3)))).available, model.links)
     if lacking:
         raise CompdError(lacking)
     across = np.linspace(-REACH_MM, REACH_MM, 5)
@@ -90,7 +93,7 @@ def compute_signature(effect: Effect, model: MachineModel, details: Details) -> 
         grid + model.zero.contact.tip_M_mm,
         on_machine.tip_um(Drive(grid, apart=True)),
         curves,
-        _parameter_values(effect, on_machine.fitted.shape),
+        _parameter_values(effect, on_machine.fitted.constants),
     )
 
 
@@ -114,11 +117,11 @@ def _parameter_values(effect: Effect, shape: Mapping[str, float]) -> dict[str, s
 class _EffectOnMachine:
     """One effect on one machine."""
 
-    def __init__(self, effect: Effect, model: MachineModel, details: Details, needed: Sequence[str]) -> None:
+    def __init__(self, effect: Effect, model: MachineModel, details: MachineDetails, needed: Sequence[str]) -> None:
         self._model, self._needed = model, needed
-        self._common = constants(model, details)
+        self._common = machine_constants(model, details)
         columns = effect.columns(model.links)
-        theta = np.array([column.parameter.fitted(typical_value(column.parameter)) for column in columns])
+        theta = np.array([column.parameter.to_theta(typical_value(column.parameter)) for column in columns])
         if any(parameter.per == "link_axis" for parameter in effect.parameters):
             theta[1:] = 0.0  # all joints moved alike would only move the whole machine
         period = details.scale_signal_period_mm
@@ -157,7 +160,7 @@ class _EffectOnMachine:
     def tip_um(self, drive: Drive) -> FloatArray:
         """(N, 3) by which the effect moves the tip."""
         rows = self.rows(drive)
-        deltas, _ = delta(self.fitted, rows)
+        deltas, _ = effect_deltas(self.fitted, rows)
         with_effect = predict(self._model, rows, deltas)
         return np.asarray(UM_PER_MM * (with_effect.tip_mm - predict(self._model, rows, {}).tip_mm))
 
@@ -177,7 +180,7 @@ def _directions(scale_mm: FloatArray) -> FloatArray:
     motion = None
     directions = np.empty_like(scale_mm)
     for row, scales in enumerate(scale_mm):
-        motion = moved(motion, float(row), scales, np.zeros(0))
+        motion = update_motion(motion, float(row), scales, np.zeros(0))
         directions[row] = np.where(motion.direction == 0, 1.0, motion.direction)
     return directions
 

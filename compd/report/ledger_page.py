@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
-from compd.model_file import Stored
+from compd.model_file import StoredModel
 from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 
 LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
 
 
-def write_ledger_page(path: Path, model: Stored) -> None:
+def write_ledger_page(path: Path, model: StoredModel) -> None:
     """Write the page: the error after each step, and the steps. The model has one step or more."""
     steps = model.steps
     labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
@@ -39,7 +39,7 @@ def write_ledger_page(path: Path, model: Stored) -> None:
     write_page(path, f"Ledger: {model.machine}", verdict, panels, "")
 
 
-def ledger_rows(model: Stored) -> list[list[str]]:
+def ledger_rows(model: StoredModel) -> list[list[str]]:
     """One line per step."""
     return [
         [

@@ -10,7 +10,8 @@ import numpy as np
 from compd.gauge import good
 from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.model.effect import FittedEffect, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.library import library
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
@@ -73,7 +74,7 @@ def _with_effects(measured: Machine, count: int) -> Models:
         FittedEffect(effect, np.full(len(effect.columns(links)), 0.01), {c.name: c.grid[0] for c in effect.constants})
         for effect in effects
     )
-    names = tuple(dict.fromkeys(name for effect in effects for name in quantities(effect, links)))
+    names = tuple(dict.fromkeys(name for effect in effects for name in needed_quantities(effect, links)))
     applied = LiveModel(replace(measured.model, effects=fitted), "", "", names, measured.wires.quantity_wires(names))
     return Models(applied)
 

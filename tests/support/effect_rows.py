@@ -9,16 +9,18 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from compd.model.effect import Effect, delta
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Effect
 from compd.model.kinematics import inverse_kinematics
 from compd.model.library import library
 from compd.model.library.scale import PERIODS_MM
-from compd.model.machine import MachineModel
-from compd.model.observations import Observations
-from compd.model.observe import Details, Movement, constants, observe
+from compd.model.machine import MachineModel, machine_constants
+from compd.model.motion import Movement
+from compd.model.observations import MachineDetails, Observations
+from compd.model.observe import observe
 from tests.support.model_machines import Floats, hexapod, tips, tripod
 
-DETAILS = Details(plate_thickness_mm=200.0, scale_signal_period_mm=0.020)
+DETAILS = MachineDetails(plate_thickness_mm=200.0, scale_signal_period_mm=0.020)
 TRIPOD, HEXAPOD = tripod(), hexapod()
 LIBRARY = library()
 PLACES = ("room", "base", "frame", "platform", "tool", "plate_top", "plate_bottom")
@@ -50,7 +52,7 @@ def at_tips(
         "session_start": np.arange(count) == 0,
         "movement": Movement(np.ones((count, n)), np.zeros((count, n)), np.zeros((count, k))),
     }
-    return observe(model, constants(model, DETAILS), **(arguments | given))
+    return observe(model, machine_constants(model, DETAILS), **(arguments | given))
 
 
 def at_zero(model: MachineModel = TRIPOD, values: Mapping[str, Any] | None = None, **given: Any) -> Observations:
@@ -82,7 +84,7 @@ def varied(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[str, Any]
 
 def rows_of(model: MachineModel, arguments: Mapping[str, Any]) -> Observations:
     """The rows of such arguments."""
-    return observe(model, constants(model, DETAILS), **arguments)
+    return observe(model, machine_constants(model, DETAILS), **arguments)
 
 
 def part(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
@@ -104,7 +106,7 @@ def added(id_: str, rows: Observations, *theta: float, **shape: float) -> Floats
     from compd.model.effect import FittedEffect
 
     effect = LIBRARY[id_]
-    found, _ = delta(FittedEffect(effect, np.array(theta), shape), rows)
+    found, _ = effect_deltas(FittedEffect(effect, np.array(theta), shape), rows)
     return found[effect.ports[0]]
 
 

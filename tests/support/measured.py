@@ -30,7 +30,7 @@ def tripod() -> Configuration:
 def hidden(effect: str, *values: float, **shape: float) -> FittedEffect:
     """A library effect with its numbers in the unit that people read."""
     one = library()[effect]
-    theta = [column.parameter.fitted(value) for column, value in zip(one.columns(3), values, strict=True)]
+    theta = [column.parameter.to_theta(value) for column, value in zip(one.columns(3), values, strict=True)]
     return FittedEffect(one, np.array(theta), shape)
 
 

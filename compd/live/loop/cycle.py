@@ -21,7 +21,7 @@ from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues, ShadowResul
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, usable
 from compd.live.loop.tip_uncertainty import uncertainty_um
 from compd.live.loop.wiring import MachineWires, WiredValues
-from compd.model.apply_effects import EffectMemory, kept
+from compd.model.apply_effects import EffectMemory, carry_over
 from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 from compd.model.uncertainty import GaugeNoise
@@ -142,9 +142,9 @@ class Cycle:
         if old.shadow is not None and new.applied is old.shadow:
             was, effects = old.shadow.machine, self._shadow
         elif new.shadow is not None and new.shadow is not old.shadow:
-            self._shadow = kept(effects, was, new.shadow.machine)
+            self._shadow = carry_over(effects, was, new.shadow.machine)
         if new.applied is not old.applied:
-            self._warm = self._warm._replace(effects=kept(effects, was, new.applied.machine))
+            self._warm = self._warm._replace(effects=carry_over(effects, was, new.applied.machine))
             self._adopting = self._models is not None
             self._u_tip_um = None
             if self._last_good is not None and not set(new.applied.quantities) <= set(self._last_good.quantities):
@@ -294,7 +294,7 @@ class Cycle:
 
 def _counting(applied: LiveModel, weight: float) -> MachineModel:
     """Its effects fade with the set that they belong to."""
-    return applied.machine if weight == 1.0 else applied.machine.fading(weight)
+    return applied.machine if weight == 1.0 else applied.machine.with_effect_weight(weight)
 
 
 def _compensated(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from compd.gauge import Quality
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.wiring import Wire
-from compd.model.observations import REVERSAL_MM
+from compd.model.motion import REVERSAL_MM
 
 
 class Directions:

@@ -14,9 +14,10 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
-from compd.model.effect import FittedEffect, missing, quantities
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
-from compd.model.observations import settings
+from compd.model.observations import available_settings
 from compd.model_file import read_model_file
 from compd.readings import Snapshot
 
@@ -50,7 +51,7 @@ class LiveModel:
     @property
     def summary(self) -> Mapping[str, Any]:
         """For MODEL and STATUS; what happens at the reference instrument is named as not live."""
-        found: dict[str, Any] = {"effects": [one.effect.id for one in self.machine.acting]}
+        found: dict[str, Any] = {"effects": [one.effect.id for one in self.machine.live_effects]}
         if self.file:
             found |= {"model": self.hash, "file": self.file}
         if idle := [one.effect.id for one in self.machine.effects if not one.effect.live]:
@@ -103,7 +104,9 @@ class ModelLoader:
         if problems := [*self._unusable(file.fitted), *_misnamed(file.fitted)]:
             raise StateError(problems)
         machine = replace(bare, effects=file.fitted, covariance=file.covariance)
-        names = dict.fromkeys(name for one in machine.acting for name in quantities(one.effect, bare.links))
+        names = dict.fromkeys(
+            name for one in machine.live_effects for name in needed_quantities(one.effect, bare.links)
+        )
         try_out(machine, tuple(names), str(path))
         if _hash(path) != before:
             raise StateError(Problem(where=str(path), what="has changed while it was read", next_step="ask again"))
@@ -113,9 +116,9 @@ class ModelLoader:
         """Live effects that lack a gauge, a setting or the recording's own clock."""
         bare = self.bare.machine
         assert bare.constants is not None
-        available = {*self._wires.quantity_names, *settings(bare.constants)}
+        available = {*self._wires.quantity_names, *available_settings(bare.constants)}
         live = [one for one in fitted if one.effect.live]
-        problems = [problem for one in live for problem in missing(one.effect, available, bare.links)]
+        problems = [problem for one in live for problem in unmet_needs(one.effect, available, bare.links)]
         return problems + [
             Problem(
                 where=f"effect {one.effect.id}",
@@ -153,7 +156,7 @@ def _misnamed(fitted: tuple[FittedEffect, ...]) -> list[Problem]:
             next_step="fit it again with `compd effect fit`",
         )
         for one in fitted
-        if not np.isfinite([*one.theta, *one.shape.values()]).all()
+        if not np.isfinite([*one.theta, *one.constants.values()]).all()
     ]
 
 
@@ -169,8 +172,7 @@ def try_out(machine: MachineModel, names: tuple[str, ...], where: str) -> None:
         dict.fromkeys(names, np.array(np.nan)),
         0.0,
     )
-    zero = machine.zero.contact
-    target_mm = zero.tip_P_mm if hasattr(machine.arrangement, "tool_M_mm") else zero.tip_M_mm
+    target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
     try:
         _, warm = compensate_cmm(machine, unread, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, unread._replace(time_s=1.0), warm)

@@ -17,7 +17,7 @@ from compd.compensation import WarmStart
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.model.apply_effects import EffectMemory
-from compd.model.observations import Motion
+from compd.model.motion import Motion
 
 # Tags in recordings: they stay as they are, whatever the classes are called.
 _KINDS: Mapping[str, Any] = {

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from compd.arrays import FloatArray
 from compd.errors import ConfigurationError, Problem
-from compd.model.effect import Constant, Effect, Memory, Parameter, Port, Shape
+from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, Port
 from compd.model.formula.evaluator import Formula
 from compd.model.formula.parser import LARGEST_EXPONENT, parse
 from compd.model.observations import Observations
@@ -208,7 +208,7 @@ def _basis(written: FormulaDeclaration, formula: Formula) -> Any:
     axis = "xyz".index(written.axis) if written.axis else None
     to_mm = TO_MM[written.gives]
 
-    def basis(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
+    def basis(rows: Observations, shape: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
         places = {"joint": rows.joint_mm.shape[1], "frame": 9, "plate": 3, "tool": 1, "reference": 1}.get(
             written.port, rows.links
         )

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Constant, Effect, Parameter, Shape, memoryless
+from compd.model.effect import Constant, ConstantValues, Effect, Parameter, memoryless_basis
 from compd.model.observations import Observations
 
 UM = 1e-3  # mm
 
 
-def _position(rows: Observations, shape: Shape) -> FloatArray:
+def _position(rows: Observations, constants: ConstantValues) -> FloatArray:
     return np.broadcast_to(UM * np.eye(3 * rows.links), (len(rows), 3 * rows.links, 3 * rows.links))
 
 
-def _runout(rows: Observations, shape: Shape) -> FloatArray:
+def _runout(rows: Observations, constants: ConstantValues) -> FloatArray:
     """Columns: angle and wave outside, links inside; each moves its own joint along the revolute axis.
 
     One harmonic will do: over the 10 or 15 degrees that a joint turns, a second and a third one look like the first
@@ -26,7 +26,7 @@ def _runout(rows: Observations, shape: Shape) -> FloatArray:
     waves = [
         wave
         for angle_rad in (angles_rad[:, :, 0], angles_rad[:, :, 1])
-        for wave in (np.sin(angle_rad), np.cos(angle_rad) - shape["z"])
+        for wave in (np.sin(angle_rad), np.cos(angle_rad) - constants["z"])
     ]
     basis = np.zeros((len(rows), n, 3, len(waves), n))
     for column, values in enumerate(waves):
@@ -47,7 +47,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um", -100, 100, "machining and assembly", "link_axis"),),
         mistaken_for=("link_zero", "platform_joint_position"),
         separated_by="the whole workspace to its edges; measuring the joints on a coordinate measuring machine",
-        basis=memoryless(_position),
+        basis=memoryless_basis(_position),
     ),
     Effect(
         id="joint_runout",
@@ -68,7 +68,7 @@ EFFECTS = (
         ),
         mistaken_for=("tool_offset",),
         separated_by="points in a ring and along a radius: runout follows the joints' angles, an offset does not",
-        basis=memoryless(_runout),
+        basis=memoryless_basis(_runout),
         constants=(Constant("z", "1", 0, 1, "how the joints' places were found", (1.0, 0.0)),),
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Constant, Effect, Memory, Parameter, Shape, memoryless, one_per_link
+from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, columns_per_link, memoryless_basis
 from compd.model.memory import lag
 from compd.model.observations import Observations
 
@@ -14,16 +14,16 @@ UM = 1e-3  # mm
 SAG_LENGTH_MM = 500.0  # the length at which a link's sag is stated
 
 
-def _expansion(rows: Observations, shape: Shape) -> FloatArray:
+def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
     return np.asarray(PPM * rows.link_mm * rows.link_warming_K)[:, :, None]
 
 
-def _lagged(rows: Observations, shape: Shape, memory: Memory) -> tuple[FloatArray, Memory]:
-    warming_K, memory = lag(rows.time_s, rows.link_warming_K, rows.session_start, shape["tau"], memory)
+def _lagged(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
+    warming_K, memory = lag(rows.time_s, rows.link_warming_K, rows.session_start, constants["tau"], memory)
     return np.asarray(PPM * rows.link_mm * warming_K)[:, :, None], memory
 
 
-def _elasticity(rows: Observations, shape: Shape) -> FloatArray:
+def _elasticity(rows: Observations, constants: ConstantValues) -> FloatArray:
     return UM * (rows.axial_force_N - rows.constants.zero_axial_force_N)[:, :, None]
 
 
@@ -31,17 +31,17 @@ def _hertz(force_N: FloatArray) -> FloatArray:
     return np.asarray(np.sign(force_N) * np.cbrt(force_N * force_N))
 
 
-def _contact(rows: Observations, shape: Shape) -> FloatArray:
+def _contact(rows: Observations, constants: ConstantValues) -> FloatArray:
     return UM * (_hertz(rows.axial_force_N) - _hertz(rows.constants.zero_axial_force_N))[:, :, None]
 
 
-def _sag(rows: Observations, shape: Shape) -> FloatArray:
+def _sag(rows: Observations, constants: ConstantValues) -> FloatArray:
     leaning = 1 - rows.directions_M[:, :, 2] ** 2
-    return np.asarray(-UM * leaning * (rows.link_mm / SAG_LENGTH_MM) ** shape["n"])[:, :, None]
+    return np.asarray(-UM * leaning * (rows.link_mm / SAG_LENGTH_MM) ** constants["n"])[:, :, None]
 
 
-def _zero(rows: Observations, shape: Shape) -> FloatArray:
-    return one_per_link(np.full_like(rows.link_mm, UM))
+def _zero(rows: Observations, constants: ConstantValues) -> FloatArray:
+    return columns_per_link(np.full_like(rows.link_mm, UM))
 
 
 _EXPANSION_RANGE = "Super-Invar rod 0-0.8, steel 11-12.5, aluminium 23"
@@ -62,7 +62,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
         mistaken_for=("link_expansion_lag", "link_zero"),
         separated_by="a change of temperature by 3 K, fast enough that a lag would show",
-        basis=memoryless(_expansion),
+        basis=memoryless_basis(_expansion),
     ),
     Effect(
         id="link_expansion_lag",
@@ -118,7 +118,7 @@ EFFECTS = (
         ),
         mistaken_for=("joint_contact",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
-        basis=memoryless(_elasticity),
+        basis=memoryless_basis(_elasticity),
     ),
     Effect(
         id="joint_contact",
@@ -135,7 +135,7 @@ EFFECTS = (
         parameters=(Parameter("c", "um/N^(2/3)", 0.01, 1, "steel balls of 25 mm 0.05, of 5 mm on flats 0.5"),),
         mistaken_for=("link_elasticity",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
-        basis=memoryless(_contact),
+        basis=memoryless_basis(_contact),
     ),
     Effect(
         id="link_sag",
@@ -154,7 +154,7 @@ EFFECTS = (
         parameters=(Parameter("s", "um", 0, 20, "stiff tube 0, slender spindle 20"),),
         mistaken_for=("scale_gain",),
         separated_by="equally long links at different inclinations",
-        basis=memoryless(_sag),
+        basis=memoryless_basis(_sag),
         constants=(Constant("n", "1", 3, 7, "catenary 3, beam 7", (3.0, 7.0)),),
     ),
     Effect(
@@ -168,6 +168,6 @@ EFFECTS = (
         parameters=(Parameter("z", "um", -50, 50, "adjustment of machine zero", "link"),),
         mistaken_for=("tool_offset",),
         separated_by="the edges of the workspace, where the links point differently than in the middle",
-        basis=memoryless(_zero),
+        basis=memoryless_basis(_zero),
     ),
 )

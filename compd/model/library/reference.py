@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Effect, Parameter, Shape, memoryless
+from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
 from compd.model.observations import Observations, REFERENCE_PRESSURE_hPa
 
 PPM = 1e-6
@@ -25,7 +25,7 @@ def _translation(values: FloatArray) -> FloatArray:
     return np.concatenate([values, np.zeros_like(values)], axis=1)
 
 
-def _bending(rows: Observations, shape: Shape) -> FloatArray:
+def _bending(rows: Observations, constants: ConstantValues) -> FloatArray:
     points = rows.constants.plate_points_M_mm
     middle = points.mean(axis=0)
     radius_squared = ((points - middle) ** 2)[:, :2].sum(axis=1).mean()
@@ -36,17 +36,17 @@ def _bending(rows: Observations, shape: Shape) -> FloatArray:
     return _translation(np.stack([np.zeros_like(z), np.zeros_like(z), z], axis=1)[:, :, None])
 
 
-def _drift(rows: Observations, shape: Shape) -> FloatArray:
+def _drift(rows: Observations, constants: ConstantValues) -> FloatArray:
     return _translation(UM / HOUR_S * rows.time_s[:, None, None] * np.eye(3))
 
 
-def _air(rows: Observations, shape: Shape) -> FloatArray:
+def _air(rows: Observations, constants: ConstantValues) -> FloatArray:
     pressure_hPa = rows.quantity("pressure_hPa") - REFERENCE_PRESSURE_hPa
     index = PPM * (INDEX_PPM_PER_K * rows.warming_K("room") + INDEX_PPM_PER_hPa * pressure_hPa)
     return _translation(((rows.tip_M_mm - rows.constants.instrument_M_mm) * index[:, None])[:, :, None])
 
 
-def _registration(rows: Observations, shape: Shape) -> FloatArray:
+def _registration(rows: Observations, constants: ConstantValues) -> FloatArray:
     basis = np.zeros((len(rows), 6, 6))
     x, y, z = rows.tip_M_mm.T
     basis[:, 0, 0] = basis[:, 1, 1] = basis[:, 2, 2] = UM
@@ -76,7 +76,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 4, 12, "granite 4-8, cast iron 9-12"),),
         mistaken_for=("tool_expansion",),
         separated_by="the middle and the edges of the plate under different gradients",
-        basis=memoryless(_bending),
+        basis=memoryless_basis(_bending),
     ),
     Effect(
         id="reference_drift",
@@ -89,7 +89,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um/h", -5, 5, "tripods and magnetic stands after setting up", "axis"),),
         mistaken_for=("link_zero", "link_expansion"),
         separated_by="a fixed target measured again and again; points revisited at other temperatures",
-        basis=memoryless(_drift),
+        basis=memoryless_basis(_drift),
     ),
     Effect(
         id="reference_air_index",
@@ -109,7 +109,7 @@ EFFECTS = (
         ),
         mistaken_for=("scale_gain",),
         separated_by="the same points at two pressures, or a retroreflector at a known distance",
-        basis=memoryless(_air),
+        basis=memoryless_basis(_air),
     ),
     Effect(
         id="reference_registration",
@@ -129,7 +129,7 @@ EFFECTS = (
         ),
         mistaken_for=(),
         separated_by="three reference marks on the surface plate",
-        basis=memoryless(_registration),
-        contradicts_declared_frame=True,
+        basis=memoryless_basis(_registration),
+        registration=True,
     ),
 )

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Effect, Parameter, Shape, memoryless
+from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
 from compd.model.observations import Observations
 
 PPM = 1e-6
 UM = 1e-3  # mm
 
 
-def _expansion(rows: Observations, shape: Shape) -> FloatArray:
+def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
     return np.asarray(PPM * rows.constants.tool_P_mm * rows.warming_K("tool")[:, None])[:, :, None]
 
 
-def _offset(rows: Observations, shape: Shape) -> FloatArray:
+def _offset(rows: Observations, constants: ConstantValues) -> FloatArray:
     return np.broadcast_to(UM * np.eye(3), (len(rows), 3, 3))
 
 
-def _bending(rows: Observations, shape: Shape) -> FloatArray:
+def _bending(rows: Observations, constants: ConstantValues) -> FloatArray:
     force_P_N = (rows.rotation_M_P * rows.force_M_N[:, :, None]).sum(axis=1)  # R^T F
     return np.asarray(UM * force_P_N[:, :, None])
 
@@ -41,7 +41,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 25, "carbon fibre 0, tungsten carbide 5, steel 12, aluminium 23-25"),),
         mistaken_for=("plate_bending",),
         separated_by="two tools of different length, or warm the tool alone",
-        basis=memoryless(_expansion),
+        basis=memoryless_basis(_expansion),
     ),
     Effect(
         id="tool_offset",
@@ -54,7 +54,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis"),),
         mistaken_for=("link_zero",),
         separated_by="the edges of the workspace, where the platform tilts; a tool of another length",
-        basis=memoryless(_offset),
+        basis=memoryless_basis(_offset),
     ),
     Effect(
         id="tool_bending",
@@ -70,6 +70,6 @@ EFFECTS = (
         parameters=(Parameter("C", "um/N", 0.01, 1, "end mill of 20 mm 0.01, stylus of 50 mm 1"),),
         mistaken_for=("link_elasticity",),
         separated_by="the same force in several directions at the middle and the edges; a tool of another length",
-        basis=memoryless(_bending),
+        basis=memoryless_basis(_bending),
     ),
 )

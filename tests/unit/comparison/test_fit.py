@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
-from compd.comparison.prediction_uncertainty import first_order, gauge_noise, monte_carlo
+from compd.comparison.prediction_uncertainty import first_order_uncertainty, gauge_noise, monte_carlo
 from compd.comparison.shape_search import search_constants
 from compd.errors import CompdError
 from compd.model.effect import FittedEffect
@@ -108,7 +108,7 @@ def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> N
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
     found = fit(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
     assert not found.outlier.any()
-    assert found.fitted[0].effect.parameters[0].shown(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
+    assert found.fitted[0].effect.parameters[0].from_theta(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
 
 
 def test_what_the_data_cannot_tell_apart_has_no_error(blank: AlignedRecording) -> None:
@@ -126,7 +126,7 @@ def test_a_time_constant_is_searched(tmp_path: Path) -> None:
     truth = hidden("link_expansion_lag", 8.0, tau=1300.0)
     one = aligned(record(tmp_path, columns, [truth]))
     (found,) = search_constants(one, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
-    assert found.shape["tau"] == pytest.approx(1300.0, rel=0.05)
+    assert found.constants["tau"] == pytest.approx(1300.0, rel=0.05)
     assert found.theta[0] == pytest.approx(8.0, rel=0.02)
 
 
@@ -141,7 +141,7 @@ def test_first_order_uncertainty_agrees_with_monte_carlo(blank: AlignedRecording
     one = measured(blank, truth, white(blank, 6))
     found = fit(one, fresh("link_elasticity", "backlash"))
     noise = gauge_noise(one)
-    first = first_order(one, noise, found.fitted, found.covariance).total_um
+    first = first_order_uncertainty(one, noise, found.fitted, found.covariance).total_um
     index = np.arange(0, 300, 30)
     trials = monte_carlo(one, noise, found.fitted, found.covariance, index, trials=2000, seed=1)
     np.testing.assert_allclose(trials, first[index], rtol=0.08)  # 2000 trials: 1.6 % each

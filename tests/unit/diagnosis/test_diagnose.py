@@ -71,7 +71,7 @@ def test_three_hidden_effects_are_all_named(tmp_path: Path) -> None:
 def test_a_searched_constant_is_found_with_its_effect(tmp_path: Path) -> None:
     diagnosis = diagnose_with_effects(tmp_path, {"link_expansion_lag": (2.0,)})
     assert effect_ids(diagnosis) == ["link_expansion_lag"]
-    assert diagnosis.steps[0].fitted.shape["tau"] == pytest.approx(900.0, rel=0.2)
+    assert diagnosis.steps[0].fitted.constants["tau"] == pytest.approx(900.0, rel=0.2)
 
 
 def test_nothing_hidden_is_adequate_and_costs_no_search(tmp_path: Path) -> None:

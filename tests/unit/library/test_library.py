@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError, PluginError
-from compd.model.effect import PORTS, Effect, FittedEffect, deltas, missing, port_size, quantities
+from compd.model.deltas import deltas_by_effect, port_size
+from compd.model.effect import PORTS, Effect, FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find, library
-from compd.model.observations import moved
+from compd.model.motion import update_motion
 from compd.model.observe import observe_tip
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, at_zero, part, rows_of, some_shape, varied
 from tests.support.model_machines import Floats
@@ -78,16 +80,16 @@ def test_rows_at_once_are_row_after_row_bit_for_bit(effect: Effect, model: objec
     machine = TRIPOD if model is TRIPOD else HEXAPOD
     arguments = varied(machine)
     rows = rows_of(machine, arguments)
-    if missing(effect, rows.available, rows.links):
+    if unmet_needs(effect, rows.available, rows.links):
         assert "revolute_axes" in effect.needs
         return
     theta = np.linspace(0.3, 1.7, len(effect.columns(rows.links)))
     fitted = [FittedEffect(effect, theta, some_shape(effect))]
-    at_once, last = deltas(fitted, rows, {})
+    at_once, last = deltas_by_effect(fitted, rows, {})
     one_by_one = []
     memories = {}
     for i in range(len(rows)):
-        found, memories = deltas(fitted, rows_of(machine, part(arguments, slice(i, i + 1))), memories)
+        found, memories = deltas_by_effect(fitted, rows_of(machine, part(arguments, slice(i, i + 1))), memories)
         one_by_one.append(found[effect.id])
     for port, values in at_once[effect.id].items():
         assert values.shape == (len(rows), port_size(port, rows))
@@ -102,28 +104,28 @@ def test_rows_at_once_are_row_after_row_bit_for_bit(effect: Effect, model: objec
 
 def test_a_missing_gauge_is_named() -> None:
     available = at_zero().available - {"temperature_link_2_degC"}
-    (problem,) = missing(LIBRARY["link_expansion"], available, 3)
+    (problem,) = unmet_needs(LIBRARY["link_expansion"], available, 3)
     assert "temperature_link_2_degC" in problem.what
     assert "wire a thermometer under `wiring: quantities:`" in problem.next_step
-    (problem,) = missing(LIBRARY["tool_bending"], available - {"force_y_N"}, 3)
+    (problem,) = unmet_needs(LIBRARY["tool_bending"], available - {"force_y_N"}, 3)
     assert "a force gauge" in problem.next_step
-    (problem,) = missing(LIBRARY["plate_bending"], available - {"plate_thickness_mm"}, 3)
+    (problem,) = unmet_needs(LIBRARY["plate_bending"], available - {"plate_thickness_mm"}, 3)
     assert "plate_thickness_mm" in problem.next_step
-    assert not missing(LIBRARY["link_expansion"], at_zero().available, 3)
+    assert not unmet_needs(LIBRARY["link_expansion"], at_zero().available, 3)
 
 
 def test_every_effect_reads_no_more_than_it_declares() -> None:
     """A basis that reads a quantity which is not in `needs` fails here: only what is declared is there."""
     for effect in BUNDLED:
         arguments = varied(TRIPOD, 2)
-        declared = set(quantities(effect, 3))
+        declared = set(needed_quantities(effect, 3))
         arguments["quantities"] = {k: v for k, v in arguments["quantities"].items() if k in declared}
         effect.basis(rows_of(TRIPOD, arguments), some_shape(effect), None)
 
 
 def test_a_hexapod_has_no_revolute_axes() -> None:
     for id_ in ("revolute_axis_tilt", "joint_runout"):
-        (problem,) = missing(LIBRARY[id_], at_zero(HEXAPOD).available, 6)
+        (problem,) = unmet_needs(LIBRARY[id_], at_zero(HEXAPOD).available, 6)
         assert "tripod" in problem.next_step
 
 
@@ -142,7 +144,7 @@ def test_of_an_external_model_only_the_reference_can_err() -> None:
         np.array([0.0, 3600.0]),
         np.array([True, False]),
     )
-    usable = [effect.id for effect in BUNDLED if not missing(effect, rows.available, rows.links)]
+    usable = [effect.id for effect in BUNDLED if not unmet_needs(effect, rows.available, rows.links)]
     assert usable == ["reference_drift", "reference_air_index", "reference_registration"]
     basis, _ = LIBRARY["reference_air_index"].basis(rows, {}, None)
     np.testing.assert_allclose(basis[0, :3, 0], tip[0] * (-0.93e-6 - 2.7e-6), rtol=1e-12)
@@ -153,7 +155,7 @@ def test_links_remember_their_direction_through_noise() -> None:
     path_mm = [0.0, 0.5, 1.0, 0.9995, 1.0004, 0.9996, 0.99, 0.9904, 0.98, 0.9815]
     seen = []
     for i, position in enumerate(path_mm):
-        motion = moved(motion, 0.001 * i, np.array([position]), np.zeros(1))
+        motion = update_motion(motion, 0.001 * i, np.array([position]), np.zeros(1))
         seen.append(float(motion.direction[0]))
     assert seen == [0, 1, 1, 1, 1, 1, -1, -1, -1, 1]
 
@@ -162,7 +164,7 @@ def test_a_link_that_comes_back_in_tiny_steps_has_turned_round() -> None:
     motion = None
     seen = []
     for i, position in enumerate([0.0, 5.0, 4.9997, 4.9994, 4.9991, 4.9988]):
-        motion = moved(motion, 0.001 * i, np.array([position]), np.zeros(1))
+        motion = update_motion(motion, 0.001 * i, np.array([position]), np.zeros(1))
         seen.append(float(motion.direction[0]))
     assert seen == [0, 1, 1, 1, 1, -1]
 
@@ -170,7 +172,7 @@ def test_a_link_that_comes_back_in_tiny_steps_has_turned_round() -> None:
 def test_velocity_settles_at_the_links_speed() -> None:
     motion = None
     for i in range(400):
-        motion = moved(motion, 0.001 * i, np.array([30.0 * 0.001 * i]), np.array([-1e-6 * i]))
+        motion = update_motion(motion, 0.001 * i, np.array([30.0 * 0.001 * i]), np.array([-1e-6 * i]))
     assert motion is not None
     np.testing.assert_allclose(motion.velocity_mm_per_s, 30.0, rtol=1e-6)
     np.testing.assert_allclose(motion.joint_velocity_mm_per_s, -1e-3, rtol=1e-6)
@@ -220,11 +222,11 @@ def test_effects_of_an_installed_package(own_file: Path, tmp_path: Path, monkeyp
 
 def test_a_stiffness_is_fitted_as_a_compliance() -> None:
     (k,) = LIBRARY["link_elasticity"].parameters
-    value, std = k.shown(1 / 28.0, 0.001)
+    value, std = k.from_theta(1 / 28.0, 0.001)
     assert value == pytest.approx(28.0)
     assert std == pytest.approx(0.001 * 28.0**2)
-    assert k.fitted_range == (1 / 200, 1 / 5)
-    assert k.shown(k.fitted(17.0))[0] == pytest.approx(17.0)
+    assert k.theta_range == (1 / 200, 1 / 5)
+    assert k.from_theta(k.to_theta(17.0))[0] == pytest.approx(17.0)
 
 
 def as_matrix(values: Floats) -> Floats:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.model.effect import Deltas, FittedEffect, delta
-from compd.model.observe import Movement
+from compd.model.deltas import Deltas, effect_deltas
+from compd.model.effect import FittedEffect
+from compd.model.motion import Movement
 from compd.model.prediction import predict
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, added, at_tips, at_zero, solved_tip
 from tests.support.model_machines import Floats, tips
@@ -76,7 +77,7 @@ def test_latency_brings_the_reading_up_to_date() -> None:
         joint_mm=now_joint_mm - joint_speed * tau_s,
         movement=Movement(np.sign(speed), speed, joint_speed),
     )
-    found, _ = delta(FittedEffect(LIBRARY["gauge_latency"], np.array([20.0])), rows)
+    found, _ = effect_deltas(FittedEffect(LIBRARY["gauge_latency"], np.array([20.0])), rows)
     np.testing.assert_allclose(rows.scale_mm + found["scale"], now_mm, rtol=1e-12)
     np.testing.assert_allclose(rows.joint_mm + found["joint"], now_joint_mm, rtol=1e-12)
 
@@ -169,7 +170,7 @@ def test_a_joint_elsewhere_moves_the_tip_as_another_solver_says(id_: str, port: 
     machine = TRIPOD if model is TRIPOD else HEXAPOD
     theta = np.random.default_rng(5).uniform(-100, 100, 3 * machine.links)
     rows = at_tips(machine, machine.zero.contact.tip_M_mm[None] + [[25.0, -40.0, 10.0]])
-    found, _ = delta(FittedEffect(LIBRARY[id_], theta), rows)
+    found, _ = effect_deltas(FittedEffect(LIBRARY[id_], theta), rows)
     tip = predict(machine, rows, found).tip_mm[0]
     expected = solved_tip(machine, rows.link_mm[0], **{moved: UM * theta.reshape(-1, 3)})
     np.testing.assert_allclose(tip, expected, atol=1e-8)
@@ -180,7 +181,7 @@ def test_a_joint_elsewhere_moves_the_tip_as_another_solver_says(id_: str, port: 
 def test_axes_turned_about_z_move_the_tip_as_another_solver_says() -> None:
     w_urad = np.array([300.0, -500.0, 200.0])
     rows = at_tips(TRIPOD, np.array([[40.0, -50.0, 160.0]]))
-    found, _ = delta(FittedEffect(LIBRARY["revolute_axis_tilt"], w_urad), rows)
+    found, _ = effect_deltas(FittedEffect(LIBRARY["revolute_axis_tilt"], w_urad), rows)
     turned = np.stack(
         [
             Rotation.from_rotvec([0, 0, w * 1e-6]).apply(np.array(e))
@@ -195,7 +196,7 @@ def test_axes_turned_about_z_move_the_tip_as_another_solver_says() -> None:
 def test_a_platform_that_grows_is_a_larger_platform() -> None:
     rows = at_zero(values={"temperature_platform_degC": 24.0})
     grown = 80.0 * (1 + 12e-6 * 4)
-    found, _ = delta(FittedEffect(LIBRARY["platform_expansion"], np.array([12.0])), rows)
+    found, _ = effect_deltas(FittedEffect(LIBRARY["platform_expansion"], np.array([12.0])), rows)
     tip = predict(TRIPOD, rows, found).tip_mm[0]
     np.testing.assert_allclose(tip, [0, 0, 700 - np.sqrt(LINK_MM**2 - (250 - grown) ** 2) - 60], atol=1e-9)
 

@@ -138,7 +138,7 @@ def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tri
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("value: 1.0", "value: one", "cannot be read"),
+        ("value: 1.0", "value: one", "is no number"),
         ("effects:", "effects: 5\nothers:", "is no list"),
         ("covariance:", "covariance: [[1], [2, 3]]\nothers:", "is no matrix of numbers"),
         ("machine: tripod-cmm", "machine: tripod-cmm\ngeometry: 0123", "another geometry of this machine"),

@@ -19,7 +19,7 @@ from compd.live.record.replay import replay as replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
 from compd.model.apply_effects import EffectMemory
-from compd.model.observations import Motion
+from compd.model.motion import Motion
 from tests.support.live_machine import CONFIG, machine
 from tests.support.recorded_run import ROOMY, Run
 from tests.unit.live.test_effects import file_with

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.model.effect import Effect, FittedEffect, deltas, sum_deltas
-from compd.model.machine import MachineModel
-from compd.model.observations import Observations, moved
-from compd.model.observe import Movement, constants, observe
+from compd.model.deltas import deltas_by_effect, sum_deltas
+from compd.model.effect import Effect, FittedEffect
+from compd.model.machine import MachineModel, machine_constants
+from compd.model.motion import Movement, update_motion
+from compd.model.observations import Observations
+from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
@@ -26,13 +28,13 @@ ROWS = 24
 def fitted(effect: Effect, model: MachineModel) -> FittedEffect:
     """With plausible numbers, so that every effect moves the tip; a scale's cyclic error is 1 % of its period."""
     share = 0.1 if effect.id == "scale_cyclic" else 0.3
-    theta = [share * column.parameter.fitted_range[1] for column in effect.columns(model.links)]
+    theta = [share * column.parameter.theta_range[1] for column in effect.columns(model.links)]
     return FittedEffect(effect, np.array(theta), some_shape(effect))
 
 
 def carrying(model: MachineModel, *effects: Effect) -> MachineModel:
     return replace(
-        model, effects=tuple(fitted(effect, model) for effect in effects), constants=constants(model, DETAILS)
+        model, effects=tuple(fitted(effect, model) for effect in effects), constants=machine_constants(model, DETAILS)
     )
 
 
@@ -61,7 +63,7 @@ def seen_as_recording(model: MachineModel, values: GaugeValues) -> Observations:
     motion, motions = None, []
     for i in range(ROWS):
         one = row(values, i)
-        motion = moved(motion, float(one.time_s), one.scale_mm, one.joint_mm)
+        motion = update_motion(motion, float(one.time_s), one.scale_mm, one.joint_mm)
         motions.append(motion)
     movement = Movement(
         *(
@@ -70,7 +72,11 @@ def seen_as_recording(model: MachineModel, values: GaugeValues) -> Observations:
         )
     )
     return observe(
-        model, constants(model, DETAILS), **values._asdict(), session_start=np.arange(ROWS) == 0, movement=movement
+        model,
+        machine_constants(model, DETAILS),
+        **values._asdict(),
+        session_start=np.arange(ROWS) == 0,
+        movement=movement,
     )
 
 
@@ -87,7 +93,7 @@ def test_the_tip_is_where_the_workbench_predicts_it(model: MachineModel, effect:
     machine = carrying(model, effect)
     found, _ = compensate_cmm(machine, values, WarmStart.at_zero(machine))
     rows = seen_as_recording(model, values)
-    each, _ = deltas(machine.effects, rows, {})
+    each, _ = deltas_by_effect(machine.effects, rows, {})
     predicted = predict(model, rows, sum_deltas(list(each.values())))
     assert not found.reason.any()
     assert found.tip_M_mm == pytest.approx(predicted.tip_mm, abs=1e-9)

@@ -12,12 +12,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from compd.errors import ConfigurationError
-from compd.model.effect import Effect, FittedEffect, delta, missing
+from compd.model.deltas import effect_deltas
+from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.formula.evaluator import FUNCTIONS, Formula
 from compd.model.formula.parser import DEEPEST, LONGEST, parse
 from compd.model.library import find
-from compd.model.prediction import columns, predict, sensitivities
+from compd.model.prediction import predict
+from compd.model.sensitivity import effect_sensitivity, sensitivities
 from tests.support.effect_rows import HEXAPOD, TRIPOD, at_zero, rows_of, varied
 
 ALLOWED_NODES = (ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
@@ -319,16 +322,16 @@ def test_the_persons_example() -> None:
     effect = find(GRANITE, "model.yaml:12")
     assert effect.needs == ("humidity_pct",)
     rows = at_zero(values={"humidity_pct": 53.0})
-    found, _ = delta(FittedEffect(effect, np.array([0.1])), rows)
+    found, _ = effect_deltas(FittedEffect(effect, np.array([0.1])), rows)
     np.testing.assert_allclose(found["link"], 0.3e-3)
-    (problem,) = missing(effect, rows.available - {"humidity_pct"}, 3)
+    (problem,) = unmet_needs(effect, rows.available - {"humidity_pct"}, 3)
     assert "a hygrometer" in problem.next_step
 
 
 def test_temperature_link_is_the_links_own() -> None:
     effect = written("k * (temperature_link - 20) * link_mm / 1000")
     rows = at_zero(values={"temperature_link_2_degC": 21.5})
-    found, _ = delta(FittedEffect(effect, np.array([2.0])), rows)
+    found, _ = effect_deltas(FittedEffect(effect, np.array([2.0])), rows)
     np.testing.assert_allclose(found["link"][0] / (2e-3 * rows.link_mm[0] / 1000), [0, 1.5, 0], atol=1e-12)
     assert written("k * strain_link_ppm").needs == ("strain_link_{link}_ppm",)
 
@@ -352,12 +355,12 @@ def test_a_formula_serves_every_port_and_moves_the_tip(model: object, more: dict
     )
     arguments = varied(machine, 6)
     rows = rows_of(machine, arguments)
-    shape = effect.shapes(rows)[3]
+    shape = effect.constant_grid(rows)[3]
     theta = np.array([1.0, -2.0, 0.5])
-    found, _ = delta(FittedEffect(effect, theta, shape), rows)
+    found, _ = effect_deltas(FittedEffect(effect, theta, shape), rows)
     moved = predict(machine, rows, found).tip_mm - predict(machine, rows, {}).tip_mm
     basis, _ = effect.basis(rows, shape, None)
-    by = columns(effect, rows, basis, sensitivities(machine, rows, effect.ports))
+    by = effect_sensitivity(effect, rows, basis, sensitivities(machine, rows, effect.ports))
     np.testing.assert_allclose(by.tip @ theta, moved, atol=1e-3 * np.abs(moved).max())
     if more["port"] == "reference":
         np.testing.assert_allclose(moved[:, [0, 2]], 0, atol=1e-12)
@@ -370,12 +373,12 @@ def test_a_lag_in_a_formula_remembers() -> None:
     arguments = varied(TRIPOD, 9)
     rows = rows_of(TRIPOD, arguments)
     fitted = FittedEffect(effect, np.array([1.0, 2.0]), {"tau": 60.0})
-    whole, _ = delta(fitted, rows)
+    whole, _ = effect_deltas(fitted, rows)
     memory = None
     for i in range(9):
         from tests.support.effect_rows import part
 
-        one, memory = delta(fitted, rows_of(TRIPOD, part(arguments, slice(i, i + 1))), memory)
+        one, memory = effect_deltas(fitted, rows_of(TRIPOD, part(arguments, slice(i, i + 1))), memory)
         np.testing.assert_array_equal(one["link"][0], whole["link"][i])
 
 
@@ -384,7 +387,7 @@ def test_one_parameter_per_link() -> None:
     effect = formula_effect(
         {"id": "mine", "port": "link", "formula": "k * direction", "parameters": declared}, "a.yaml:7"
     )
-    found, _ = delta(FittedEffect(effect, np.array([1.0, 2.0, 3.0])), at_zero())
+    found, _ = effect_deltas(FittedEffect(effect, np.array([1.0, 2.0, 3.0])), at_zero())
     np.testing.assert_allclose(found["link"][0], [1e-3, 2e-3, 3e-3])
     assert effect.needs == ("direction",)
 

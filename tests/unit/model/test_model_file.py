@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from compd.errors import StateError
-from compd.model_file import ModelFile, ModelStep, read_model_file, write_model_file
+from compd.model_file import ModelFile, ModelStep, read_model_file, read_stored, write_model_file
 from tests.support.measured import hidden
 
 FORMULA = {
@@ -45,7 +45,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert found.declared == example().declared
     assert found.steps == example().steps
     np.testing.assert_allclose(found.fitted[0].theta, 1 / 28.0, rtol=1e-15)
-    assert dict(found.fitted[1].shape) == {"tau": 1300.0}
+    assert dict(found.fitted[1].constants) == {"tau": 1300.0}
     np.testing.assert_array_equal(found.covariance, example().covariance)
     np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
 
@@ -83,13 +83,19 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
     ("edit", "said"),
     [
         (lambda data: data.update(machine="hexapod"), "belongs to another machine"),
-        (lambda data: data.update(format=9), "no model file of this version"),
+        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 2(.|\n)*next: install"),
+        (lambda data: data.update(format=0), "format: "),
+        (lambda data: data.update(colour="red"), "m.yaml, colour: is no key that belongs here"),
         (lambda data: data["effects"][0].update(effect="link_elastisity"), "no such effect"),
         (lambda data: data["effects"][0].update(parameters=[]), "has not the parameters of link_elasticity"),
         (lambda data: data["effects"][1].update(shape={}), "has not the shape constants"),
-        (lambda data: data["effects"][1].pop("parameters"), "effect 2: cannot be read"),
+        (lambda data: data["effects"][1].pop("parameters"), "effects 2, parameters: is missing"),
         (lambda data: data.update(covariance=[[1.0]]), "another size"),
-        (lambda data: data["steps"][0].pop("kind"), "a step cannot be read"),
+        (lambda data: data["effects"][0].update(effect=None), "effects 1, effect: is no text"),
+        (lambda data: data["effects"][0]["parameters"][0].update(value="much"), "parameters 1, value: is no number"),
+        (lambda data: data["steps"][0].update(kind="guess"), "steps 1, kind: is none of the choices"),
+        (lambda data: data["steps"][0].update(colour="red"), "steps 1, colour: is no key that belongs here"),
+        (lambda data: data["steps"][0].pop("kind"), "steps 1, kind: is missing"),
     ],
 )
 def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: str) -> None:
@@ -100,6 +106,31 @@ def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: st
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(StateError, match=said):
         read_model_file(path, "tripod-cmm", 3)
+
+
+@pytest.mark.parametrize("format_", [1, None])
+def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    data = yaml.safe_load(path.read_text())
+    assert data.pop("format") == 2
+    path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
+    assert read_model_file(path, "tripod-cmm", 3).declared == example().declared
+
+
+def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    write_model_file(path, example(), 3)
+    data = yaml.safe_load(path.read_text())
+    data["covariance"] = [[1.0, 2.0], [3.0]]
+    data["effects"][0].pop("parameters")
+    data["steps"][0]["rms_after_um"] = "little"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError) as caught:
+        read_stored(path)
+    places = [problem.where.removeprefix(f"{path}, ") for problem in caught.value.problems]
+    assert places == ["effects 1, parameters", "covariance", "steps 1, rms_after_um"]
+    assert all(problem.next_step for problem in caught.value.problems)
 
 
 def test_every_problem_is_in_one_message(tmp_path: Path) -> None:

@@ -13,14 +13,16 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.model.effect import PORTS, Deltas, FittedEffect, Port, delta, deltas, port_size, sum_deltas
+from compd.model.deltas import deltas_by_effect, effect_deltas, port_size, sum_deltas
+from compd.model.effect import PORTS, FittedEffect, Port
 from compd.model.joint_correction import scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_vector
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
+from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.observe import Movement
-from compd.model.prediction import altered, columns, predict, pull_back, sensitivities, shares
+from compd.model.prediction import perturb_machine, predict
+from compd.model.sensitivity import effect_sensitivity, link_residuals, sensitivities
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, rows_of, some_shape, varied
@@ -79,10 +81,10 @@ def test_an_effects_columns_are_what_its_numbers_do(id_: str) -> None:
     effect = LIBRARY[id_]
     rows = rows_of(TRIPOD, varied(TRIPOD, 5))
     basis, _ = effect.basis(rows, some_shape(effect), None)
-    theta = 1e-3 * np.array([sum(one.parameter.fitted_range) / 2 or one.parameter.high for one in effect.columns(3)])
-    found, _ = delta(FittedEffect(effect, theta, some_shape(effect)), rows)
+    theta = 1e-3 * np.array([sum(one.parameter.theta_range) / 2 or one.parameter.high for one in effect.columns(3)])
+    found, _ = effect_deltas(FittedEffect(effect, theta, some_shape(effect)), rows)
     moved = predict(TRIPOD, rows, found).tip_mm - predict(TRIPOD, rows, {}).tip_mm
-    by = columns(effect, rows, basis, sensitivities(TRIPOD, rows, effect.ports))
+    by = effect_sensitivity(effect, rows, basis, sensitivities(TRIPOD, rows, effect.ports))
     assert by.tip.shape == (5, 3, len(theta))
     np.testing.assert_allclose(by.tip @ theta, moved, atol=1e-3 * np.abs(moved).max() + 1e-12)
     assert np.abs(moved).max() > 0
@@ -100,7 +102,7 @@ def test_a_row_that_cannot_be_solved_says_so_and_harms_no_other() -> None:
     assert np.isnan(found.tip_mm[[1, 2]]).all()
     by = sensitivities(TRIPOD, rows, list(PORTS))
     assert np.isfinite(by["link"].tip[[0, 3]]).all()
-    pulled = pull_back(by["link"], np.ones((4, 3)))
+    pulled = link_residuals(by["link"], np.ones((4, 3)))
     assert np.isnan(pulled[[1, 2]]).all()
     assert np.isfinite(pulled[[0, 3]]).all()
 
@@ -111,26 +113,12 @@ def test_a_residual_pulled_back_leads_to_the_tip_again(model: MachineModel) -> N
     link = sensitivities(model, rows, ["link"])["link"]
     errors_mm = np.random.default_rng(0).normal(0, 1e-3, (8, model.links))
     residual_mm = (link.tip @ errors_mm[:, :, None])[:, :, 0]
-    pulled = pull_back(link, residual_mm)
+    pulled = link_residuals(link, residual_mm)
     np.testing.assert_allclose((link.tip @ pulled[:, :, None])[:, :, 0], residual_mm, atol=1e-12)
     if model is TRIPOD:
         np.testing.assert_allclose(pulled, errors_mm, atol=1e-12)
     else:
         assert (np.linalg.norm(pulled, axis=1) <= np.linalg.norm(errors_mm, axis=1) + 1e-15).all()
-
-
-def test_shares_add_up() -> None:
-    rows = rows_of(TRIPOD, varied(TRIPOD))
-    ids = ["link_expansion", "backlash", "base_joint_position", "tool_bending", "frame_rod_expansion"]
-    fitted = [FittedEffect(LIBRARY[id_], np.full(len(LIBRARY[id_].columns(3)), 2.0)) for id_ in ids]
-    each, _ = deltas(fitted, rows, {})
-    found = shares(TRIPOD, rows, each)
-    whole = predict(TRIPOD, rows, sum_deltas(list(each.values()))).tip_mm - predict(TRIPOD, rows, {}).tip_mm
-    assert list(found) == ids
-    np.testing.assert_allclose(sum(found.values()), whole, atol=1e-12)
-    alone: Deltas = each["tool_bending"]
-    by_itself = predict(TRIPOD, rows, alone).tip_mm - rows.tip_M_mm
-    np.testing.assert_allclose(found["tool_bending"], by_itself, rtol=2e-3)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -144,10 +132,10 @@ def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
         for effect in machine_effects
         if model is not HEXAPOD or "revolute_axes" not in effect.needs
     ]
-    each, _ = deltas(fitted, rows, {})
+    each, _ = deltas_by_effect(fitted, rows, {})
     found = sum_deltas(list(each.values()))
     shown = predict(model, rows, found)
-    machine = altered(model, rows.joint_mm, rows.frame_mm, found)
+    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, found)
     places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
     pose = inverse_kinematics(machine.mechanism, *places, shown.rotation_M_P)
     length_mm = pose.link_length_mm - machine.reading_to_length_mm
@@ -193,14 +181,14 @@ def test_the_hidden_effects_come_out_with_their_numbers(name: str, part: str) ->
     answer = json.loads((folder / "answer.json").read_text())["effects"]
     rows, residual_um = recorded(folder / f"{part}.csv")
     by = sensitivities(TRIPOD, rows, list(PORTS))
-    blocks = [columns(LIBRARY[id_], rows, LIBRARY[id_].basis(rows, {}, None)[0], by).tip for id_ in answer]
+    blocks = [effect_sensitivity(LIBRARY[id_], rows, LIBRARY[id_].basis(rows, {}, None)[0], by).tip for id_ in answer]
     G = 1e3 * np.concatenate(blocks, axis=2).reshape(residual_um.size, -1)
     theta, _, rank, _ = np.linalg.lstsq(G, residual_um.ravel(), rcond=None)
     left_um = residual_um.ravel() - G @ theta
     assert np.sqrt((left_um**2).mean()) < 0.165  # the reference's 0.15 and the gauges' noise
     true = np.concatenate([np.atleast_1d(value) for value in answer.values()])
     shown = [
-        one.parameter.shown(value)[0]
+        one.parameter.from_theta(value)[0]
         for one, value in zip([c for id_ in answer for c in LIBRARY[id_].columns(3)], theta, strict=True)
     ]
     assert rank == len(true)

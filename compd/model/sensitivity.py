@@ -1,0 +1,188 @@
+"""How the predicted tip changes with what is added at the machine's ports: the derivatives of `predict`.
+
+The pose x = (displacement of {P} in mm, rotation about {M}'s axes in rad) satisfies the closure of the links,
+
+    |d_i| = l_i  for each link i,   d_i . R e_i = 0  for each revolute axis i,   d_i = p + R c_i - a_i,
+
+six equations f(x, q) = r with r = (l, 0), where q stands for whatever the ports change: base joints a_i, platform
+joints c_i, revolute axes e_i. To first order a change of q or r moves the pose by
+
+    dx = J^-1 (dr - f_q dq),   J = f_x   (6 x 6).
+
+Below, `inverse` is J^-1 and `_closure_demand` the bracket per unit of what is added at a port. With u_i the unit vector
+of link i, its entries for link i and axis i are
+
+    scale, link      1                         joint            minus the joint weights, equation (1)
+    base_joint       u_i and R e_i             platform_joint   -R^T u_i and -e_i, in {P}
+    revolute_axis    -R^T d_i, in {P}          frame, plate     those of base_joint times d a / d (distances or points)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.model.deltas import port_size, split_by_port
+from compd.model.effect import Effect, Port
+from compd.model.frame import solve_frame
+from compd.model.kinematics import closure_at
+from compd.model.machine import MachineModel
+from compd.model.observations import Observations
+
+# Step of the central differences through the octahedron, whose sides are about 1 m: the difference's own error is of
+# order (1e-3 / 1e3)^2 = 1e-12, and rounding of coordinates, 1e-13 mm, makes 1e-10 of it.
+DIFFERENCE_STEP_MM = 1e-3
+
+
+class Sensitivity(NamedTuple):
+    """How a prediction changes with what is added at one port of `size` numbers, or with `size` fitted numbers.
+
+    tip : (N, 3, size), mm per mm (or per rad at the port `revolute_axis`).
+    rotation : (N, 3, size), rad per mm, about {M}'s axes.
+    link_length : (N, n, size).
+    """
+
+    tip: FloatArray
+    rotation: FloatArray
+    link_length: FloatArray
+
+
+def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Port]) -> dict[Port, Sensitivity]:
+    """Derivatives of `predict` by what is added at each of `ports`, where nothing is added.
+
+    From the closure's derivatives (module docstring); for the ports `frame` and `plate` with central differences
+    through the octahedron, chained with the port `base_joint`. Rows without a pose are nan.
+
+    Example: how much a micrometre on each scale moves the tip, (N, 3, n) in um:
+
+        sensitivities(model, rows, ["scale"])["scale"].tip
+    """
+    inverse = _pose_by_closure(model, rows)
+    tip_by_pose = _tip_by_pose(model, rows)
+    by_port: dict[Port, Sensitivity] = {}
+    for port in ports:
+        size = port_size(port, rows)
+        tip, rotation, link_length = (np.zeros((len(rows), m, size)) for m in (3, 3, rows.links))
+        if port == "tool":
+            # p + R tool in {M}, or R^T (tool - p) in {P}
+            tip[:] = rows.rotation_M_P.transpose(0, 2, 1) if model.arrangement.on_plate else rows.rotation_M_P
+        elif port == "reference":
+            tip[:, :, :3] = rotation[:, :, 3:] = np.eye(3)
+        else:
+            pose = inverse @ _closure_demand(model, rows, port)
+            tip, rotation = tip_by_pose @ pose, pose[:, 3:]
+        if port in ("scale", "link"):
+            link_length[:] = np.eye(size)
+        elif port == "joint":
+            link_length[:] = -model.joint_weights
+        by_port[port] = Sensitivity(tip, rotation, link_length)
+    return by_port
+
+
+def effect_sensitivity(
+    effect: Effect, rows: Observations, basis: FloatArray, by_port: Mapping[Port, Sensitivity]
+) -> Sensitivity:
+    """The prediction's derivatives by an effect's P fitted numbers: (N, 3, P), (N, 3, P), (N, n, P).
+
+    basis : (N, sum of port sizes, P), from `effect.basis`.  by_port : from `sensitivities`, for the effect's ports.
+    """
+    parts = [(by_port[port], values) for port, values in split_by_port(effect, rows, basis).items()]
+    tip, rotation, link_length = (
+        sum((sensitivity[i] @ values for sensitivity, values in parts), start=np.zeros(())) for i in range(3)
+    )
+    return Sensitivity(tip, rotation, link_length)
+
+
+def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
+    """The link lengths' errors (N, n), in mm, that would explain residuals (N, 3) at the tip.
+
+    link : the sensitivity of the port `link`. For a hexapod, whose attitude is free, the smallest such errors
+    (pseudoinverse). Rows without a pose are nan.
+    """
+    good = np.asarray(np.isfinite(link.tip).all(axis=(1, 2)))
+    errors_mm = np.full((len(good), link.tip.shape[2]), np.nan)
+    errors_mm[good] = (np.linalg.pinv(link.tip[good]) @ tip_residual_mm[good, :, None])[:, :, 0]
+    return errors_mm
+
+
+def base_joints_by_distances(model: MachineModel, distances_mm: FloatArray) -> FloatArray:
+    """Derivatives (N, 3 n, 9) of the base joints in {M} by the frame's distances (N, 9); by central differences."""
+    return _central_difference(
+        solve_frame(model.frame, distances_mm + _steps()[:, None]).base_joints_M_mm, len(distances_mm)
+    )
+
+
+def _base_joints_by_plate(model: MachineModel, distances_mm: FloatArray) -> FloatArray:
+    """Derivatives (N, 3 n, 9) of the base joints in {M} by the plate's points; by central differences."""
+    plates = model.frame.plate_points_M_mm + _steps().reshape(18, 1, 3, 3)
+    frame = solve_frame(model.frame._replace(plate_points_M_mm=plates), distances_mm)
+    return _central_difference(frame.base_joints_M_mm, len(distances_mm))
+
+
+def _steps() -> FloatArray:
+    """(18, 9): one step forwards for each of nine numbers, then one backwards."""
+    return DIFFERENCE_STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
+
+
+def _central_difference(stepped_mm: FloatArray, count: int) -> FloatArray:
+    """From points (18, count, n, 3) after `_steps` to derivatives (count, 3 n, 9)."""
+    ends = stepped_mm.reshape(18, count, -1)
+    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * DIFFERENCE_STEP_MM), 0, 2))
+
+
+def _pose_by_closure(model: MachineModel, rows: Observations) -> FloatArray:
+    """J^-1 (N, 6, 6): displacement and rotation of the platform by n link lengths and k offsets of revolute axes."""
+    closure = closure_at(model.mechanism(rows.base_joints_M_mm), rows.origin_M_mm, rows.rotation_M_P)
+    lengths = np.concatenate([closure.length_by_displacement, closure.length_by_rotation_mm], axis=2)
+    offsets = np.concatenate([closure.offset_by_displacement, closure.offset_by_rotation_mm], axis=2)
+    J = np.concatenate([lengths, offsets], axis=1)
+    good = np.isfinite(J).all(axis=(1, 2))
+    inverse = np.full_like(J, np.nan)
+    inverse[good] = np.linalg.inv(J[good])
+    return inverse
+
+
+def _tip_by_pose(model: MachineModel, rows: Observations) -> FloatArray:
+    """(N, 3, 6): the tip by displacement v and rotation w of the platform.
+
+    Tool on the platform: v + w x r in {M}, with r from the origin of {P} to the tip. Tool on the plate: the place on
+    the work moves the other way, -R^T (v + w x r) in {P}.
+    """
+    x, y, z = (rows.tip_M_mm - rows.origin_M_mm).T
+    nought = np.zeros_like(x)
+    by_rotation = np.stack([nought, z, -y, -z, nought, x, y, -x, nought], axis=1).reshape(-1, 3, 3)  # w x r
+    tip_M = np.concatenate([np.broadcast_to(np.eye(3), by_rotation.shape), by_rotation], axis=2)
+    if model.arrangement.on_plate:
+        return np.asarray(-rows.rotation_M_P.transpose(0, 2, 1) @ tip_M)
+    return tip_M
+
+
+def _closure_demand(model: MachineModel, rows: Observations, port: Port) -> FloatArray:
+    """(N, 6, size): dr - f_q dq of the module docstring per unit of what is added at `port`; link lengths come first,
+    then the offsets of the revolute axes."""
+    count, n, k = len(rows), rows.links, len(model.revolute_axes_P)
+    if port in ("frame", "plate"):
+        distances_mm = model.zero.distances_mm + rows.frame_mm
+        by = base_joints_by_distances if port == "frame" else _base_joints_by_plate
+        return np.asarray(_closure_demand(model, rows, "base_joint") @ by(model, distances_mm))
+    if port in ("scale", "link", "joint"):
+        demand = np.zeros((count, 6, port_size(port, rows)))
+        demand[:, :n] = -model.joint_weights if port == "joint" else np.eye(n)
+        return demand
+    link, axis = np.arange(n), np.arange(k)
+    directions_P = rows.directions_M @ rows.rotation_M_P  # R^T u
+    if port == "revolute_axis":
+        tilted = np.zeros((count, 6, k, 3))
+        tilted[:, n + axis, axis] = -directions_P[:, :k] * rows.link_mm[:, :k, None]
+        return tilted.reshape(count, 6, 3 * k)
+    displaced = np.zeros((count, 6, n, 3))
+    if port == "base_joint":
+        displaced[:, link, link] = rows.directions_M
+        displaced[:, n + axis, axis] = rows.revolute_axes_M
+    else:
+        displaced[:, link, link] = -directions_P
+        displaced[:, n + axis, axis] = -model.revolute_axes_P
+    return displaced.reshape(count, 6, 3 * n)
