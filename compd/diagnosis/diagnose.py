@@ -182,7 +182,7 @@ def _depends_on(
 
 
 def _p_values(search: SubsetSearch, effects: tuple[int, ...]) -> dict[str, float]:
-    """p-value of each effect of the library, corrected for all of them and for their shape constants.
+    """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
 
     The noise is what the named effects leave; where none is named, what the best candidate leaves.
     """

@@ -29,7 +29,7 @@ class Change:
 
 
 def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording, date: str) -> Change:
-    """Add an effect and fit all effects together; its shape constants are searched.
+    """Add an effect and fit all effects together; its nonlinear constants are searched.
 
     declared : how the file declares the effect.  date : of the step, as it is to be written.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
@@ -67,7 +67,7 @@ def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str
 
 
 def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
-    """Fit all effects again from zero, shape constants as they are. Raises StateError where there are none."""
+    """Fit all effects again from zero, nonlinear constants as they are. Raises StateError where there are none."""
     if not file.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, file.fitted, file.covariance)
