@@ -50,8 +50,9 @@ def compare(
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
         from compd.report.comparison_page import write_comparison_page
+        from compd.report.page import check_page_path
 
-        write_page_to(html)
+        check_page_path(html)
         write_comparison_page(html, found, file)
     if as_json:
         each = [one.as_json() for one in found]
@@ -60,16 +61,6 @@ def compare(
     print_comparisons(found)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
-
-
-def write_page_to(path: Path) -> None:
-    """Raise CompdError where a page cannot be written, before the work and not after it."""
-    from compd.errors import CompdError, Problem
-
-    if not path.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
-        )
 
 
 def print_comparisons(found: list[Comparison]) -> None:

@@ -39,7 +39,6 @@ def diagnose(
     """Learn which physical effect is missing: the verdict, then the evidence, then what to measure next."""
     from rich.console import Console
 
-    from compd.cli.compare import write_page_to
     from compd.cli.progress import steps_shown
     from compd.comparison.open import open_model, open_recording
     from compd.diagnosis.diagnose import diagnose as diagnose_recording
@@ -47,7 +46,9 @@ def diagnose(
     from compd.model.library import library
 
     if html is not None:
-        write_page_to(html)
+        from compd.report.page import check_page_path
+
+        check_page_path(html)
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
     file = open_model(model, aligned)

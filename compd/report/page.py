@@ -18,6 +18,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
+from compd.errors import CompdError, Problem
+
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
 
@@ -44,6 +46,14 @@ class Panel:
     title: str
     caption: str
     content: Figure | PageTable
+
+
+def check_page_path(path: Path) -> None:
+    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it."""
+    if not path.parent.is_dir():
+        raise CompdError(
+            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
+        )
 
 
 def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], footer: str) -> None:
