@@ -43,7 +43,7 @@ def diagnose(
     from compd.comparison.open import open_model, open_recording
     from compd.diagnosis.diagnose import diagnose as diagnose_recording
     from compd.diagnosis.holdout import evaluate_holdout
-    from compd.model.library import library
+    from compd.model.library import load_library
 
     if html is not None:
         from compd.report.page import check_page_path
@@ -52,7 +52,7 @@ def diagnose(
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
     file = open_model(model, aligned)
-    effects = [*library().values()]
+    effects = [*load_library().values()]
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, file.fitted, file.covariance, effects, progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]

@@ -60,7 +60,7 @@ def diagnose(
 
     Example::
 
-        diagnosis = diagnose(aligned, (), None, list(library().values()))
+        diagnosis = diagnose(aligned, (), None, list(load_library().values()))
         diagnosis.verdict  # "identified"
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """

@@ -13,7 +13,7 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.criteria import Criteria
 from compd.model.effect import Effect
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
 # Times at which a step is looked for first; then between the best one's neighbours.
@@ -74,7 +74,7 @@ class EmpiricalTerm:
 
     def effect(self) -> Effect:
         """The formula as an effect, its constant a parameter; along the first axis where there are several."""
-        return find(self.declaration(self.axes[0]), "description")
+        return find_effect(self.declaration(self.axes[0]), "description")
 
     def constant_values(self, value: float | None) -> dict[str, float]:
         """The nonlinear constants of `effect`, by name, at a value of the term's; None for a term without one."""

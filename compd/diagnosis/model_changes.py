@@ -15,7 +15,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
@@ -111,7 +111,7 @@ def _change(
     aligned = before.aligned
     criteria = Criteria()
     fitted_ids = [fitted.effect.id for fitted in result.fitted]
-    others = library_pool(aligned, list(library().values()), fitted_ids, criteria)
+    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria)
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(

@@ -14,10 +14,10 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.regression import RegressionData, Regressors
 from compd.diagnosis.rivals import collinearity, find_rivals, simplify
 from compd.diagnosis.subset_search import Subset, SubsetSearch
-from compd.model.library import library
+from compd.model.library import load_library
 
 ROWS = 240
-LIBRARY = library()
+LIBRARY = load_library()
 ORDINARY, CONTRADICTING = LIBRARY["link_expansion"], LIBRARY["reference_registration"]
 
 
