@@ -37,8 +37,8 @@ Rules for every driver:
 - `read` does not sleep or log, nor repeat a poll that failed: the line's thread decides when to ask again.
 
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
-``driver: /etc/compd/my_gauge.py:MyGauge``. A gauge that is pure description is a preset instead: a YAML file in a folder of
-the group ``compd.gauge_presets``. ``drivers/template`` is a complete package to copy, with a simulated device;
+``driver: /etc/compd/my_gauge.py:MyGauge``. A gauge that is pure description is a preset instead, a YAML file in a folder
+of the group ``compd.gauge_presets``. ``drivers/template`` is a complete package to copy, with a simulated device;
 ``compd driver test`` tries a driver on wires that go wrong.
 """
 

@@ -49,10 +49,11 @@ def compare(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
-        from compd.report.comparison_page import write_report
+        from compd.report.comparison_page import write_comparison_page
+        from compd.report.page import check_page_path
 
-        write_page_to(html)
-        write_report(html, found, file)
+        check_page_path(html)
+        write_comparison_page(html, found, file)
     if as_json:
         each = [one.as_json() for one in found]
         typer.echo(json.dumps(each[0] if len(each) == 1 else {"recordings": each}, indent=1, allow_nan=False))
@@ -62,22 +63,12 @@ def compare(
         typer.echo(f"The same as pictures: {html}")
 
 
-def write_page_to(path: Path) -> None:
-    """Raise CompdError where a page cannot be written, before the work and not after it."""
-    from compd.errors import CompdError, Problem
-
-    if not path.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
-        )
-
-
 def print_comparisons(found: list[Comparison]) -> None:
     """The result for a person: a table, then sentences."""
     from rich.console import Console
     from rich.table import Table
 
-    from compd.report.comparison_page import name_of, nothing_found, summary
+    from compd.report.comparison_page import name_of, no_trend_text, summary
 
     console = Console(highlight=False)
     numbers = summary(found)
@@ -94,7 +85,7 @@ def print_comparisons(found: list[Comparison]) -> None:
         console.print(one.verdict)
         console.print(f"Noise floor: {one.floor.how}.")
         if not one.trends:
-            console.print(f"Where it fails: {nothing_found(one)}.")
+            console.print(f"Where it fails: {no_trend_text(one)}.")
         for trend in one.trends[:MOST_SENTENCES]:
             console.print(f"  - {trend.text}")
         if len(one.trends) > MOST_SENTENCES:

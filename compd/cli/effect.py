@@ -53,9 +53,9 @@ def show(
     configuration = load(machine or shipped_configuration("tripod-cmm.yaml"))
     Console().print(_card(one, configuration))
     if html is not None:
-        from compd.report.effect_page import write_signature
+        from compd.report.effect_page import write_effect_page
 
-        write_signature(html, one, configuration)
+        write_effect_page(html, one, configuration)
         typer.echo(f"{one.id} on {configuration.machine}: {html}")
 
 

@@ -16,9 +16,9 @@ def ledger(
     from rich.console import Console
     from rich.table import Table
 
-    from compd.cli.compare import write_page_to
     from compd.model_file import read_stored
-    from compd.report.comparison_page import LEDGER_HEAD, ledger_rows, write_ledger
+    from compd.report.ledger_page import LEDGER_HEAD, ledger_rows, write_ledger_page
+    from compd.report.page import check_page_path
 
     stored = read_stored(model)
     steps = stored.steps
@@ -32,6 +32,6 @@ def ledger(
         table.add_row(*row, "#" * max(1, round(16 * step.rms_after_um / largest)))
     console.print(table)
     if html is not None:
-        write_page_to(html)
-        write_ledger(html, stored)
+        check_page_path(html)
+        write_ledger_page(html, stored)
         typer.echo(f"The falling error as a picture: {html}")

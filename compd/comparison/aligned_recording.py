@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.registration import Registration, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
@@ -129,7 +130,11 @@ class AlignedRecording:
         return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
 
 
-def align_recording(recording: Recording, configuration: Configuration | None) -> AlignedRecording:
+def align_recording(
+    recording: Recording,
+    configuration: Configuration | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> AlignedRecording:
     """A recording on the machine that the configuration describes; None only for an external model.
 
     Raises RecordingError where there is no reference, or where nothing can be computed from any row.
@@ -158,7 +163,9 @@ def align_recording(recording: Recording, configuration: Configuration | None) -
     registration = None
     # with fewer than three axes a frame cannot be laid over another: it must lie near already
     if recording.reference.frame == "instrument" and len(axes) == 3:
-        registration = register(np.where(recording.excluded[:, None], np.nan, measured_mm), observations.tip_M_mm)
+        registration = register(
+            np.where(recording.excluded[:, None], np.nan, measured_mm), observations.tip_M_mm, criteria
+        )
         measured_mm = measured_mm if registration is None else registration.into_M(measured_mm)
     return AlignedRecording(
         recording, model, observations, recording.reference_axes, axes, measured_mm, registration, geometry_hash

@@ -15,6 +15,7 @@ from scipy.stats import f as f_distribution
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import frame_motion_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
@@ -27,13 +28,8 @@ from compd.model.sensitivity import link_residuals
 from compd.model.uncertainty import GaugeNoise
 from compd.units import UM_PER_MM
 
-# Noise makes the floor ratio of a complete model larger than this quantile in 2.5 of 100 recordings.
-CONFIDENCE = 0.975
-FEWEST_ROWS = 5
 # Outliers bend the fitted frame a little, and the frame decides which rows are outliers: two rounds settle it.
 FRAME_ROUNDS = 3
-# More than this times the scatter of repeats cannot come from the gauges; a half is left to chance.
-MOST_GAUGE_SHARE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class Comparison:
     floor : the noise floor.  uncertainty : of the prediction.  gauges : the gauges' noise, None for an external model.
     contributions : by source.  trends : what the residual follows.
     link_residual_um : (N, n) the residual as errors of link lengths, None where no link length can be inferred.
-    attitude_residual_urad : (N, 3), None where no attitude was measured.
+    attitude_residual_urad : (N, 3), None where no attitude was measured.  criteria : thresholds.
     """
 
     aligned: AlignedRecording
@@ -63,6 +59,7 @@ class Comparison:
     trends: tuple[Trend, ...]
     link_residual_um: FloatArray | None
     attitude_residual_urad: FloatArray | None
+    criteria: ComparisonCriteria
 
     @cached_property
     def rms_by_axis_um(self) -> FloatArray:
@@ -94,7 +91,7 @@ class Comparison:
         """
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
-        return self.floor_ratio <= float(f_distribution.ppf(CONFIDENCE, numbers, dof))
+        return self.floor_ratio <= float(f_distribution.ppf(self.criteria.at_floor_confidence, numbers, dof))
 
     @property
     def verdict(self) -> str:
@@ -180,7 +177,10 @@ class Comparison:
 
 
 def compare(
-    aligned: AlignedRecording, fitted: Sequence[FittedEffect] = (), covariance: FloatArray | None = None
+    aligned: AlignedRecording,
+    fitted: Sequence[FittedEffect] = (),
+    covariance: FloatArray | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> Comparison:
     """Compare a recording with the model and its effects; nothing of the model is fitted here.
 
@@ -189,12 +189,12 @@ def compare(
     """
     by_effect, total = effect_deltas(fitted, aligned.rows)
     predicted_mm = aligned.predicted_mm(total)
-    known, left_out = _known_rows(aligned, predicted_mm)
+    known, left_out = _known_rows(aligned, predicted_mm, criteria)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
     residual_um[~known] = np.nan
-    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known)
+    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known, criteria)
     used = known & ~outlier
-    gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance)
+    gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
     floor = noise_floor(
         residual_um,
         used,
@@ -202,6 +202,7 @@ def compare(
         aligned.recording.reference_sigma_mm * UM_PER_MM,
         np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
         _orders(aligned),
+        criteria,
     )
     links_um = None
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
@@ -218,26 +219,29 @@ def compare(
         uncertainty=uncertainty,
         gauges=gauges,
         contributions=contributions(aligned, by_effect, used),
-        trends=find_trends(aligned, residual_um, links_um, used, floor),
+        trends=find_trends(aligned, residual_um, links_um, used, floor, criteria),
         link_residual_um=links_um,
         attitude_residual_urad=aligned.attitude_residual_urad(total),
+        criteria=criteria,
     )
 
 
-def _known_rows(aligned: AlignedRecording, predicted_mm: FloatArray) -> tuple[BoolArray, dict[str, int]]:
+def _known_rows(
+    aligned: AlignedRecording, predicted_mm: FloatArray, criteria: ComparisonCriteria
+) -> tuple[BoolArray, dict[str, int]]:
     """(N,) rows with a measured and a predicted value; and reason -> number of the other rows."""
     usable, left_out = aligned.usable
     known = usable & np.isfinite(predicted_mm).all(axis=1)
     left_out = dict(left_out)
     if (usable & ~known).any():
         left_out["a quantity that an effect needs is empty"] = int((usable & ~known).sum())
-    if known.sum() < FEWEST_ROWS:
+    if known.sum() < criteria.fewest_rows:
         raise RecordingError(
             Problem(
                 where=str(aligned.recording.path),
                 what="too few rows can be compared",
                 value=str(int(known.sum())),
-                allowed=f"{FEWEST_ROWS} or more",
+                allowed=f"{criteria.fewest_rows} or more",
                 next_step="; ".join(f"{count} rows: {reason}" for reason, count in left_out.items()),
             )
         )
@@ -245,14 +249,14 @@ def _known_rows(aligned: AlignedRecording, predicted_mm: FloatArray) -> tuple[Bo
 
 
 def _remove_frame_motion(
-    aligned: AlignedRecording, residual_um: FloatArray, known: BoolArray
+    aligned: AlignedRecording, residual_um: FloatArray, known: BoolArray, criteria: ComparisonCriteria
 ) -> tuple[FloatArray, BoolArray]:
     """The residual (N, m) without what a motion of the instrument's frame explains, and the outliers (N,)."""
     outlier = np.zeros(len(known), dtype=bool)
     rest_um = residual_um
     for _ in range(FRAME_ROUNDS):
         rest_um = residual_um - frame_motion_um(aligned, residual_um, known & ~outlier)
-        new_outlier = outlier_rows(rest_um, known, aligned.recording.visit)
+        new_outlier = outlier_rows(rest_um, known, aligned.recording.visit, criteria)
         if (new_outlier == outlier).all():
             break
         outlier = new_outlier
@@ -265,20 +269,21 @@ def _uncertainty(
     used: BoolArray,
     fitted: Sequence[FittedEffect],
     covariance: FloatArray | None,
+    criteria: ComparisonCriteria,
 ) -> tuple[GaugeNoise | None, Uncertainty]:
     """The gauges' noise, None for an external model, and the prediction's uncertainty."""
     if covariance is None:
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
         return None, first_order_uncertainty(aligned, None, fitted, covariance)
-    gauges = gauge_noise(aligned)
+    gauges = gauge_noise(aligned, criteria=criteria)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
-    repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
+    repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter
-        if (gauges_um > MOST_GAUGE_SHARE * repeats.by_axis_um).any():
-            gauges = gauge_noise(aligned, from_repeats=False)
+        if (gauges_um > criteria.most_gauge_share * repeats.by_axis_um).any():
+            gauges = gauge_noise(aligned, from_repeats=False, criteria=criteria)
             uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     return gauges, uncertainty
 

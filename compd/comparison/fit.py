@@ -11,7 +11,7 @@ fit is repeated until they no longer change. Standard errors: `cluster_covarianc
 
 Example::
 
-    model = [initial_effect(library()["link_expansion"], {}, links=3)]
+    model = [initial_effect(load_library()["link_expansion"], {}, links=3)]
     result = fit(align_recording(recording, configuration), model)
     result.fitted[0].theta          # (1,) in the unit of fit
     np.sqrt(result.covariance)      # (1, 1) its standard error
@@ -28,6 +28,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.cluster_covariance import cluster_covariance, neighbour_blocks
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.least_squares import solve_least_squares
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.robust import huber_weights, robust_regression
@@ -79,7 +80,10 @@ def initial_effect(effect: Effect, shape: ConstantValues, links: int) -> FittedE
 
 
 def fit(
-    aligned: AlignedRecording, effects: Sequence[FittedEffect], weight_sigma_um: FloatArray | None = None
+    aligned: AlignedRecording,
+    effects: Sequence[FittedEffect],
+    weight_sigma_um: FloatArray | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> FitResult:
     """Fit the effects together, and with them the instrument's frame where it is not known.
 
@@ -107,7 +111,7 @@ def fit(
         theta, registration, residual_um = _gauss_newton(
             aligned, initial, ends, G_um, theta, registration, usable & ~outlier, sigma_um
         )
-        new_outlier = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit)
+        new_outlier = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, criteria)
         # a set of outliers that comes back would alternate for ever
         if (new_outlier == outlier).all() or new_outlier.tobytes() in earlier:
             break

@@ -7,12 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.robust import LEAST_SIGMA, robust_sigma
-
-# Beyond five standard deviations a normal error comes once in two million: it is no noise.
-OUTLIER_SIGMAS = 5.0
-# With fewer rows a median says nothing.
-FEWEST_ROWS = 5
 
 
 class Replicates(NamedTuple):
@@ -27,10 +23,9 @@ class Replicates(NamedTuple):
     size: IntArray
     deviation_um: FloatArray
 
-    @property
-    def outlier(self) -> BoolArray:
+    def outlier(self, criteria: ComparisonCriteria) -> BoolArray:
         """(R,) rows farther from their visit's mean than the noise of replicates explains."""
-        limit_um = OUTLIER_SIGMAS * np.maximum(robust_sigma(self.deviation_um), LEAST_SIGMA)
+        limit_um = criteria.outlier_sigmas * np.maximum(robust_sigma(self.deviation_um), LEAST_SIGMA)
         return np.asarray((np.abs(self.deviation_um) > limit_um).any(axis=1))
 
 
@@ -51,23 +46,28 @@ def find_replicates(residual_um: FloatArray, use: BoolArray, visit: IntArray) ->
     return Replicates(rows[repeated], group[repeated], size[repeated], deviation_um[repeated] * scale[:, None])
 
 
-def outlier_rows(residual_um: FloatArray, use: BoolArray, visit: IntArray | None = None) -> BoolArray:
-    """(N,) rows of `use` (N,) with a coordinate of residual_um (N, m) farther than OUTLIER_SIGMAS robust standard
+def outlier_rows(
+    residual_um: FloatArray,
+    use: BoolArray,
+    visit: IntArray | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> BoolArray:
+    """(N,) rows of `use` (N,) with a coordinate of residual_um (N, m) farther than `outlier_sigmas` robust standard
     deviations from the median.
 
     visit : (N,) as in `find_replicates`. A row that another row of the same visit repeats is no outlier: the machine
     really was there, and what the model lacks there is to be explained.
     """
     outlier = np.zeros(len(residual_um), dtype=bool)
-    if use.sum() < FEWEST_ROWS:
+    if use.sum() < criteria.fewest_rows:
         return outlier
     middle_um = np.median(residual_um[use], axis=0)
-    limit_um = OUTLIER_SIGMAS * np.maximum(robust_sigma(residual_um[use] - middle_um), LEAST_SIGMA)
+    limit_um = criteria.outlier_sigmas * np.maximum(robust_sigma(residual_um[use] - middle_um), LEAST_SIGMA)
     far = np.isfinite(residual_um) & (np.abs(residual_um - middle_um) > limit_um)
     outlier = use & far.any(axis=1)
     if visit is None or not outlier.any():
         return outlier
     replicates = find_replicates(residual_um, use, visit)
     if replicates is not None:
-        outlier[replicates.rows[~replicates.outlier]] = False
+        outlier[replicates.rows[~replicates.outlier(criteria)]] = False
     return outlier

@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.noise_floor import repeat_scatter
 from compd.model.deltas import Deltas, split_by_port, sum_deltas
 from compd.model.effect import FittedEffect
@@ -34,7 +35,11 @@ class Uncertainty(NamedTuple):
         return np.asarray(np.hypot(self.gauges_um, self.parameters_um))
 
 
-def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
+def gauge_noise(
+    aligned: AlignedRecording,
+    from_repeats: bool = True,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> GaugeNoise:
     """Of each gauge: its scatter within visits, but at least the uncertainty of its last digit; else that alone.
 
     from_repeats : False where the machine moves within a visit, so that the gauges' scatter is no noise.
@@ -46,7 +51,9 @@ def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNo
     for port in GAUGE_PORTS:
         values_um = {"scale": rows.scale_mm, "joint": rows.joint_mm, "frame": rows.frame_mm}[port] * UM_PER_MM
         by_step = np.array([_step(column) for column in values_um[usable].T]) * PER_STEP
-        scatter = repeat_scatter(values_um, usable, recording.visit) if from_repeats and values_um.size else None
+        scatter = None
+        if from_repeats and values_um.size:
+            scatter = repeat_scatter(values_um, usable, recording.visit, criteria)
         repeated |= scatter is not None
         noise_mm[port] = (by_step if scatter is None else np.maximum(scatter.by_axis_um, by_step)) / UM_PER_MM
     how = "scatter of the gauges within visits" if repeated else "the gauges' last digits alone: a lower bound"

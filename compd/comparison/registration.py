@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.comparison.outliers import OUTLIER_SIGMAS
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.robust import LEAST_SIGMA, robust_sigma
 
 # Converges in three or four rounds: each drops the rows that the last one shows to be outliers.
@@ -38,7 +38,11 @@ class Registration(NamedTuple):
         return np.asarray(measured_mm @ self.rotation.T + self.translation_mm)
 
 
-def register(measured_mm: FloatArray, predicted_M_mm: FloatArray) -> Registration | None:
+def register(
+    measured_mm: FloatArray,
+    predicted_M_mm: FloatArray,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> Registration | None:
     """The rigid motion that lays points (N, 3) over predicted ones (N, 3), by least squares without outliers.
 
     Rows that are nan on either side are left out. None where fewer than three rows are left: nothing fixes a frame.
@@ -51,7 +55,7 @@ def register(measured_mm: FloatArray, predicted_M_mm: FloatArray) -> Registratio
             return None
         registration = _rigid_motion(measured_mm[use], predicted_M_mm[use])
         distance_mm = np.linalg.norm(predicted_M_mm - registration.into_M(measured_mm), axis=1)
-        limit_mm = OUTLIER_SIGMAS * float(robust_sigma(distance_mm[use][:, None])[0])
+        limit_mm = criteria.outlier_sigmas * float(robust_sigma(distance_mm[use][:, None])[0])
         near = known & (distance_mm <= max(limit_mm, LEAST_SIGMA))
         if (near == use).all():
             break

@@ -20,18 +20,9 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import cluster_std, neighbour_blocks
 from compd.comparison.covariates import Covariate, covariates
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.noise_floor import NoiseFloor
 
-# A trend that explains less of a coordinate's variation than this is not worth a sentence.
-LEAST_EXPLAINED = 0.05
-# Significance: the largest p-value of a trend, after correction for the number of tests.
-SIGNIFICANCE = 0.01
-# A coordinate whose mean square is within this factor of the floor's has nothing to explain.
-QUIET = 1.2
-# Covariates whose correlation is above this cannot be told apart: all of them are named.
-COLLINEAR = 0.95
-# A part of the workspace in which the error is this many times larger than at the other end is worth naming.
-MUCH_LARGER = 1.4
 # Trends per coordinate, and collinear covariates per trend: more are noise in a report.
 PER_COORDINATE = 2
 MOST_COLLINEAR = 4
@@ -101,7 +92,12 @@ class Trend:
 
 
 def find_trends(
-    aligned: AlignedRecording, residual_um: FloatArray, links_um: FloatArray | None, used: BoolArray, floor: NoiseFloor
+    aligned: AlignedRecording,
+    residual_um: FloatArray,
+    links_um: FloatArray | None,
+    used: BoolArray,
+    floor: NoiseFloor,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> tuple[Trend, ...]:
     """The trends of all coordinates, the one that explains most (in um^2) first.
 
@@ -119,12 +115,12 @@ def find_trends(
     tests = len(coordinates) * len(all_covariates)
     trends: list[tuple[float, Trend]] = []
     for label, values, floor_um in coordinates:
-        if np.mean(values[used] ** 2) <= QUIET * floor_um**2:
+        if np.mean(values[used] ** 2) <= criteria.quiet_floor_ratio * floor_um**2:
             continue
         link = int(label.removeprefix("link ")) if label.startswith("link") else 0
         candidates = [covariate for covariate in all_covariates if not link or covariate.link in (0, link)]
-        largest_at = _largest_at(aligned, values, used)
-        trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at)
+        largest_at = _largest_at(aligned, values, used, criteria.location_ratio)
+        trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at, criteria)
     trends.sort(key=lambda pair: -pair[0])
     return _without_weaker_links([trend for _, trend in trends])
 
@@ -158,6 +154,7 @@ def _coordinate_trends(
     block: IntArray,
     tests: int,
     largest_at: str,
+    criteria: ComparisonCriteria,
 ) -> list[tuple[float, Trend]]:
     """One coordinate's offset and trends, each with the squares (um^2) that it explains.
 
@@ -169,17 +166,17 @@ def _coordinate_trends(
     count = int(used.sum())
     std = cluster_std(np.ones(count), rest[used], block[used], dof=count)
     p = _p_value(mean / std, len(np.unique(block[used])), tests) if std > 0 else 1.0
-    if p < SIGNIFICANCE and mean**2 > LEAST_EXPLAINED * mean_square:
+    if p < criteria.trend_p_value and mean**2 > criteria.trend_share * mean_square:
         trends.append((mean**2, Trend(label, None, "", mean, mean**2 / mean_square, p)))
     total = float(np.mean(rest[used] ** 2))
     for _ in range(PER_COORDINATE):
         lines = [_fit_line(covariate, rest, used, block) for covariate in candidates]
         best = max(lines, key=lambda line: line.explained, default=None)
         left = float(np.mean(rest[used] ** 2))
-        if best is None or best.explained * left < LEAST_EXPLAINED * total:
+        if best is None or best.explained * left < criteria.trend_share * total:
             break
         p = _p_value(best.t, best.clusters, tests)
-        if p >= SIGNIFICANCE:
+        if p >= criteria.trend_p_value:
             break
         explained = best.explained * left / total
         covariate = best.covariate
@@ -187,7 +184,7 @@ def _coordinate_trends(
         collinear = tuple(
             other.name
             for other in candidates
-            if other is not covariate and _correlation(covariate, other, used) > COLLINEAR
+            if other is not covariate and _correlation(covariate, other, used) > criteria.collinear_correlation
         )[:MOST_COLLINEAR]
         trend = Trend(label, covariate.name, covariate.unit, slope, explained, p, collinear, largest_at)
         trends.append((explained * total, trend))
@@ -240,9 +237,9 @@ def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> flo
     return float(abs(np.corrcoef(a, b)[0, 1]))
 
 
-def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray) -> str:
+def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, least_ratio: float) -> str:
     """The third of the workspace, or of the recording, in which the error is much larger than in the opposite third."""
-    largest, text = MUCH_LARGER, ""
+    largest, text = least_ratio, ""
     places = {"time": aligned.recording.time_s}
     places |= dict(zip("xyz", aligned.rows.tip_M_mm.T, strict=True))
     for name, place in places.items():

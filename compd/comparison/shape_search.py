@@ -1,65 +1,88 @@
-"""Fitting an effect with what it is not linear in: a time constant, a period, an exponent."""
+"""Fitting an effect with a nonlinear constant: a time constant, a period, an exponent.
+
+An effect is linear in its parameters only for given nonlinear constants (its shape). Variable projection: for each
+value of the constant all parameters are fitted (`fit`), and the loss that is left is a function of the constant
+alone. It is evaluated on the effect's grid, and one continuous constant is then refined between the neighbours of
+the best grid point by Brent's method.
+
+Source: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413 (separable least squares).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import FitResult, fit, initial_effect
-from compd.comparison.outliers import OUTLIER_SIGMAS
 from compd.model.effect import ConstantValues, Effect, FittedEffect
 
-# A searched constant is known well enough when it moves the error by less than its own standard error: 1 % is.
+# A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
 FINE = 0.01
 
 
-def search_constants(
-    aligned: AlignedRecording, model: Sequence[FittedEffect], effect: Effect, sigma_um: FloatArray
-) -> FitResult:
-    """Fit `effect` jointly with the model: every shape on its grid, then between the best and its neighbours.
+class _Trial(NamedTuple):
+    """A fit with one shape, and its loss in um^2."""
 
-    sigma_um : (m,) weights.  The standard errors do not know of the search.
+    shape: ConstantValues
+    loss: float
+    result: FitResult
+
+
+def search_constants(
+    aligned: AlignedRecording,
+    model: Sequence[FittedEffect],
+    effect: Effect,
+    sigma_um: FloatArray,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> FitResult:
+    """Fit `effect` jointly with the effects of the model, and search its nonlinear constants.
+
+    sigma_um : (m,) standard deviation of each coordinate's noise, as weights of `fit`.
+    The loss is the mean squared residual, in which no row counts more than an outlier's limit: which rows are
+    outliers differs from fit to fit. The standard errors of the result do not include the search.
+
     Raises CompdError as `fit` does.
     """
     links = aligned.rows.links
     shapes = effect.constant_grid(aligned.rows)
     if len(shapes) == 1:
-        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um)
-    without = fit(aligned, model, sigma_um)
-    limit = (OUTLIER_SIGMAS * without.rms_um) ** 2
+        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um, criteria)
+    limit_um2 = (criteria.outlier_sigmas * fit(aligned, model, sigma_um, criteria).rms_um) ** 2
 
-    def tried(shape: ConstantValues) -> tuple[float, FitResult]:
-        found = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um)
-        known = np.isfinite(found.residual_um).all(axis=1)
-        # gross rows count as much as a gross row can, whichever each fit calls so
-        return float(np.mean(np.minimum(found.residual_um[known] ** 2, limit))), found
+    def trial(shape: ConstantValues) -> _Trial:
+        result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um, criteria)
+        known = np.isfinite(result.residual_um).all(axis=1)
+        return _Trial(shape, float(np.mean(np.minimum(result.residual_um[known] ** 2, limit_um2))), result)
 
-    results = [tried(shape) for shape in shapes]
-    best = min(range(len(shapes)), key=lambda k: results[k][0])
-    loss, found = results[best]
-    searched = [one for one in effect.constants if not one.choice and len({shape[one.name] for shape in shapes}) > 1]
-    if len(searched) != 1:
-        return found
-    name = searched[0].name
+    best = min((trial(shape) for shape in shapes), key=lambda candidate: candidate.loss)
+    continuous = [
+        constant.name
+        for constant in effect.constants
+        if not constant.choice and len({shape[constant.name] for shape in shapes}) > 1
+    ]
+    if len(continuous) != 1:
+        return best.result
+    (name,) = continuous
     grid = sorted({shape[name] for shape in shapes})
-    place = grid.index(shapes[best][name])
+    place = grid.index(best.shape[name])
     low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
-    logarithmic = low > 0
+    logarithmic = low > 0  # time constants and periods span decades
 
-    def value(x: float) -> float:
-        return float(np.exp(x)) if logarithmic else x
+    def with_constant(x: float) -> ConstantValues:
+        return {**best.shape, name: float(np.exp(x)) if logarithmic else x}
 
-    ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
     refined = minimize_scalar(
-        lambda x: tried({**shapes[best], name: value(x)})[0],
-        bounds=ends,
+        lambda x: trial(with_constant(x)).loss,
+        bounds=(np.log(low), np.log(high)) if logarithmic else (low, high),
         method="bounded",
         options={"xatol": FINE if logarithmic else FINE * (high - low)},
     )
-    if refined.fun < loss:
-        found = tried({**shapes[best], name: value(float(refined.x))})[1]
-    return found
+    if refined.fun < best.loss:
+        return trial(with_constant(float(refined.x))).result
+    return best.result

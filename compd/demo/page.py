@@ -13,7 +13,7 @@ from rich.table import Table as TerminalTable
 
 from compd.arrays import rms
 from compd.demo.session import KINDS, DemoSession
-from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
+from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 from compd.units import UM_PER_MM
 
 LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}
@@ -139,7 +139,7 @@ def _errors(session: DemoSession) -> Figure:
             mode="lines+markers",
             line={"color": KIND_COLOURS[kind]},
         )
-    return styled(figure, "time since the start, s", "tip error, um")
+    return style_figure(figure, "time since the start, s", "tip error, um")
 
 
 def _sources(session: DemoSession) -> Figure:
@@ -162,7 +162,7 @@ def _sources(session: DemoSession) -> Figure:
                     hovertemplate=f"{source}, link {link + 1}: %{{y:.2f}} um",
                 )
             )
-    return styled(figure, "time since the start, s", "correction, um")
+    return style_figure(figure, "time since the start, s", "correction, um")
 
 
 def _frame(session: DemoSession) -> Figure:
@@ -181,12 +181,14 @@ def _frame(session: DemoSession) -> Figure:
             mode="lines",
             line={"color": COLOURS[colour]},
         )
-    return styled(figure, "time since the start, s", "displacement of {B}, um")
+    return style_figure(figure, "time since the start, s", "displacement of {B}, um")
 
 
 def _ages(session: DemoSession) -> Figure:
     ages = [message["age_s"] * 1e3 for message in session.setpoints if "age_s" in message]
-    return styled(Figure(Histogram(x=ages, marker_color=COLOURS["plain"])), "age of the oldest gauge, ms", "setpoints")
+    return style_figure(
+        Figure(Histogram(x=ages, marker_color=COLOURS["plain"])), "age of the oldest gauge, ms", "setpoints"
+    )
 
 
 def _spread(session: DemoSession) -> Figure:
@@ -202,4 +204,4 @@ def _spread(session: DemoSession) -> Figure:
             )
         )
     figure.update_yaxes(type="log", dtick=1)
-    return styled(figure, "", "tip error, um")
+    return style_figure(figure, "", "tip error, um")

@@ -1,4 +1,4 @@
-"""Every effect of the library with the reason why it is named, or why not."""
+"""Every effect of the library with its status, and the reason why it is named or not."""
 
 from __future__ import annotations
 
@@ -7,63 +7,68 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.selection import cost, explained_fraction, numbers, untestable
-from compd.diagnosis.subset_search import Contest, Entry
-from compd.diagnosis.verdict import CandidateResult, DiagnosisStep, Status
+from compd.diagnosis.selection import estimate_parameters, explained_fraction, is_undetermined, penalty
+from compd.diagnosis.subset_search import Subset, SubsetSearch
+from compd.diagnosis.verdict import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 
 
-def judged(
-    bench: DiagnosisProblem, contest: Contest, steps: Sequence[DiagnosisStep], chance: Mapping[str, float]
+def candidate_results(
+    problem: DiagnosisProblem, search: SubsetSearch, steps: Sequence[DiagnosisStep], p_values: Mapping[str, float]
 ) -> tuple[CandidateResult, ...]:
-    """The best first; then those that could not be tried.
+    """One result per effect, tried alone at its best nonlinear constants: the best first, then those not testable.
 
-    chance : by effect, that noise alone looks as good, corrected for all that were tried.
+    steps : the effects that were named.  p_values : by effect, corrected for all that were tried.
     """
-    found = [
-        _alone(bench, contest, entry, steps, chance.get(name, float("nan")))
-        for name, entry in contest.best_variant.items()
-        if not contest.candidates[entry.members[0]].described
+    results = [
+        _result_alone(problem, search, subset, steps, p_values.get(name, float("nan")))
+        for name, subset in search.best_variants.items()
+        if not search.candidates[subset.members[0]].is_empirical
     ]
-    names = dict.fromkeys(one.name for one in contest.candidates if not one.described)
-    found += [
-        CandidateResult(
-            name, "not_testable", "acts in one session or sector only: what it does there predicts no other"
-        )
-        for name in names
-        if name not in contest.best_variant
-    ]
-    found += [CandidateResult(name, "not_testable", why) for name, why in bench.pool.untestable.items()]
-    return tuple(found)
+    names = dict.fromkeys(candidate.name for candidate in search.candidates if not candidate.is_empirical)
+    why = "acts in one session or sector only: what it does there predicts no other"
+    results += [CandidateResult(name, "not_testable", why) for name in names if name not in search.best_variants]
+    results += [CandidateResult(name, "not_testable", reason) for name, reason in problem.pool.untestable.items()]
+    return tuple(results)
 
 
-def _alone(
-    bench: DiagnosisProblem, contest: Contest, entry: Entry, steps: Sequence[DiagnosisStep], chance: float
+def _result_alone(
+    problem: DiagnosisProblem, search: SubsetSearch, subset: Subset, steps: Sequence[DiagnosisStep], p_value: float
 ) -> CandidateResult:
-    (k,) = entry.members
-    candidate = contest.candidates[k]
-    theta, covariance = contest.fitted(entry.members)[0]
-    shown = tuple(numbers(candidate.effect, bench.aligned.rows.links, theta, covariance))
-    phi = explained_fraction(contest.base, entry.loss)
-    rms_um = bench.before.floor.um * float(np.sqrt(max(entry.loss, 0.0)))
-    named = [one.effect.id for one in steps]
-    rival_of = [one.effect.id for one in steps if candidate.name in [rival.name for rival in one.rivals]]
-    gain, worth = contest.base - entry.loss, cost(max(contest.base - 1.0, 0.0), candidate.price)
-    strange = [one for one in shown if not one.plausible]
+    """The result of one effect at its best nonlinear constants."""
+    candidate = search.candidates[subset.members[0]]
+    theta, covariance = search.estimates(subset.members)[0]
+    links = problem.aligned.rows.links
+    parameters = tuple(estimate_parameters(candidate.effect, links, theta, covariance, problem.criteria))
+    fraction = explained_fraction(search.baseline, subset.cv_loss)
+    rms_um = problem.comparison.floor.um * float(np.sqrt(max(subset.cv_loss, 0.0)))
+    factor = candidate.penalty_factor(problem.criteria)
+    needed_gain = penalty(max(search.baseline - 1.0, 0.0), problem.criteria, factor)
     status: Status
-    percent = f"{100 * max(phi, 0.0):.0f} %"
-    if candidate.name in named:
-        status, why = "explains", f"named, number {named.index(candidate.name) + 1}"
-    elif rival_of:
-        status, why = "explains", f"as good as {rival_of[0]} on these rows; apart by {candidate.effect.separated_by}"
-    elif untestable(candidate.limits, np.sqrt(np.diag(covariance))):
+    if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
+        status, why = "explains", named
+    elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
-    elif gain < worth:
-        status, why = "no_gain", f"takes {percent} of the error away: not worth a name"
-    elif strange:
-        values = ", ".join(f"{one.name} = {one.value:.3g} {one.unit}" for one in strange[:3])
-        status, why = "partial", f"only with implausible numbers: {values}"
-    elif named:
+    elif search.baseline - subset.cv_loss < needed_gain:
+        status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
+    elif implausible := [parameter for parameter in parameters if not parameter.plausible]:
+        status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
+    elif steps:
         status, why = "partial", "nothing more beside what is named"
     else:
         status, why = "partial", f"leaves {rms_um:.2g} um: a likeness, not the cause"
-    return CandidateResult(candidate.name, status, why, rms_um, phi, chance, shown)
+    return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
+
+
+def _reason_of_explaining(name: str, separated_by: str, steps: Sequence[DiagnosisStep]) -> str | None:
+    """Why an effect explains the recording: it is named, or a rival of one that is; None where it is neither."""
+    for number, step in enumerate(steps, start=1):
+        if step.effect.id == name:
+            return f"named, number {number}"
+    for step in steps:
+        if name in [rival.name for rival in step.rivals]:
+            return f"as good as {step.effect.id} on these rows; apart by {separated_by}"
+    return None
+
+
+def _values(parameters: Sequence[ParameterEstimate]) -> str:
+    return ", ".join(f"{parameter.name} = {parameter.value:.3g} {parameter.unit}" for parameter in parameters)

@@ -1,4 +1,4 @@
-"""What may be missing from the model: each effect of the library, or a description, as columns of the prediction."""
+"""What may be missing from the model: effects of the library, or empirical terms, as columns of the prediction."""
 
 from __future__ import annotations
 
@@ -9,102 +9,98 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.selection import CONTRADICTION_COSTS, DESCRIPTION_COSTS
+from compd.diagnosis.criteria import Criteria
 from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
-# A candidate whose columns are unknown in more rows than this would cost all others those rows.
-MOST_EMPTY = 0.1
-# A column that moves the tip by less than this at the end of its plausible range does nothing on these rows.
-LEAST_UM = 1e-3
-# The best of ten values of a constant fits by chance as two fitted numbers do (log 10 = 2.3), of two values as one.
-SEARCH_COUNTS = 2
-CHOICE_COUNTS = 1
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect with one choice of its shape constants.
+    """One effect at one choice of its nonlinear constants.
 
-    name : the effect's id; variants of one effect share it.
-    columns_um : (N, m, P) by how many um each fitted number moves the prediction.
-    limits : (P, 2) plausible range of each fitted number; infinite where nothing is known of it.
-    searched : how many fitted numbers the search for its shape constants is worth.
+    name : the effect's id, which variants of one effect share; of an empirical term, its covariate and form.
+    columns_um : (N, m, P) by how many um each parameter moves the prediction.
+    limits : (P, 2) plausible range of each parameter; infinite where nothing is known of it.
+    searched_parameters : for how many parameters the search for its nonlinear constants counts.
     """
 
     name: str
     effect: Effect
-    shape: ConstantValues
+    constants: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
-    searched: int
+    searched_parameters: int
 
     @property
     def largest(self) -> FloatArray:
-        """(P,) the largest plausible size of each fitted number."""
+        """(P,) the largest plausible size of each parameter."""
         return np.asarray(np.abs(self.limits).max(axis=1))
 
     @property
-    def described(self) -> bool:
-        """Whether it is a description and no cause."""
+    def is_empirical(self) -> bool:
+        """Whether it describes without naming a cause: no parameter has a plausible range."""
         return bool(np.isinf(self.limits).all())
 
     @property
-    def price(self) -> float:
-        """By how much more than another effect it must explain to be believed."""
-        if self.described:
-            return DESCRIPTION_COSTS
-        return CONTRADICTION_COSTS if self.effect.registration else 1.0
+    def parameter_count(self) -> int:
+        """Fitted parameters, and what the search for constants counts for."""
+        return int(self.columns_um.shape[2]) + self.searched_parameters
 
-    @property
-    def numbers(self) -> int:
-        """How many numbers it takes to describe it."""
-        return int(self.columns_um.shape[2]) + self.searched
+    def penalty_factor(self, criteria: Criteria) -> float:
+        """How many times the gain of another effect it must gain to be believed."""
+        if self.is_empirical:
+            return criteria.description_factor
+        return criteria.contradiction_factor if self.effect.registration else 1.0
 
 
 @dataclass(frozen=True)
-class Pool:
-    """Candidates, and the effects that these rows cannot test: id -> why."""
+class CandidatePool:
+    """Candidates, and the effects that this recording cannot test: id -> why."""
 
     candidates: tuple[Candidate, ...]
     untestable: Mapping[str, str] = field(default_factory=dict)
 
 
-def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> Pool:
-    """Every effect that is not `present` in the model, at every choice of its shape constants."""
-    found: list[Candidate] = []
+def library_pool(
+    aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str], criteria: Criteria
+) -> CandidatePool:
+    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
+    candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
     usable, _ = aligned.usable
     for effect in effects:
         if effect.id in present:
             continue
-        why = _lacks(effect, aligned)
-        if why:
-            untestable[effect.id] = why
+        reason = _missing_inputs(effect, aligned)
+        if reason:
+            untestable[effect.id] = reason
             continue
-        shapes = effect.constant_grid(aligned.rows)
-        searched = sum(
-            CHOICE_COUNTS if constant.choice else SEARCH_COUNTS
+        grid = effect.constant_grid(aligned.rows)
+        searched_parameters = sum(
+            criteria.choice_parameters if constant.choice else criteria.searched_constant_parameters
             for constant in effect.constants
-            if len({shape[constant.name] for shape in shapes}) > 1
+            if len({constants[constant.name] for constants in grid}) > 1
         )
-        variants = [_candidate(effect, shape, aligned, searched) for shape in shapes]
-        why = _silent(variants, usable)
-        if why:
-            untestable[effect.id] = why
+        variants = [_candidate(effect, constants, aligned, searched_parameters) for constants in grid]
+        reason = _reason_for_no_motion(variants, usable, criteria)
+        if reason:
+            untestable[effect.id] = reason
         else:
-            found += variants
-    return Pool(tuple(found), untestable)
+            candidates += variants
+    return CandidatePool(tuple(candidates), untestable)
 
 
-def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording, searched: int) -> Candidate:
+def _candidate(
+    effect: Effect, constants: ConstantValues, aligned: AlignedRecording, searched_parameters: int
+) -> Candidate:
     limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
-    return Candidate(effect.id, effect, shape, aligned.columns(effect, shape) * UM_PER_MM, limits, searched)
+    columns_um = aligned.columns(effect, constants) * UM_PER_MM
+    return Candidate(effect.id, effect, constants, columns_um, limits, searched_parameters)
 
 
-def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
-    """What it needs and does not get, in words; "" where it has everything."""
+def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
+    """What the effect needs and the recording has not, in words; "" where it has everything."""
     if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
     if aligned.model is None and effect.live:
@@ -112,12 +108,12 @@ def _lacks(effect: Effect, aligned: AlignedRecording) -> str:
     return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
 
 
-def _silent(variants: Sequence[Candidate], usable: BoolArray) -> str:
-    """Why none of an effect's variants does anything on the usable rows; "" where one does."""
-    columns = np.concatenate([one.columns_um[usable] * one.largest for one in variants], axis=2)
-    empty = float(np.mean(~np.isfinite(columns).all(axis=(1, 2))))
-    if empty > MOST_EMPTY:
+def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray, criteria: Criteria) -> str:
+    """Why none of an effect's variants moves the prediction on the usable rows; "" where one does."""
+    columns_um = np.concatenate([variant.columns_um[usable] * variant.largest for variant in variants], axis=2)
+    empty = float(np.mean(~np.isfinite(columns_um).all(axis=(1, 2))))
+    if empty > criteria.most_empty:
         return f"what it needs is empty in {100 * empty:.0f} % of the rows"
-    if np.nanmax(np.abs(columns), initial=0.0) < LEAST_UM:
+    if np.nanmax(np.abs(columns_um), initial=0.0) < criteria.least_motion_um:
         return "what drives it stayed at its reference value: vary it"
     return ""

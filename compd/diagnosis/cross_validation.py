@@ -1,4 +1,4 @@
-"""What cross-validation leaves out: whole sessions, and whole sectors of the workspace; never half a point."""
+"""How rows are divided for cross-validation: by whole sessions, and by whole sectors of the workspace."""
 
 from __future__ import annotations
 
@@ -6,57 +6,57 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.diagnosis.criteria import Criteria
 from compd.recording.recording import BLOCKS
 
-# Fewer sessions than this leave too little to learn from when one is left out: blocks of time instead.
-FEWEST_SESSIONS = 3
-# Sectors of the workspace, about the vertical through its middle; rows of one point stay together.
-SECTORS = 5
 
+def row_splits(aligned: AlignedRecording, criteria: Criteria) -> tuple[IntArray, ...]:
+    """Splits of the N rows, each (N,) the fold of each row, numbered from 0.
 
-def schemes(aligned: AlignedRecording) -> tuple[IntArray, ...]:
-    """Ways to divide the rows, each (N,) numbered from 0: by session (or time), and by place where points are known.
-
-    An effect has to prove itself in each: left-out sessions test its weather, left-out sectors its geometry, which
-    neighbouring points would praise wrongly (they leak).
+    By session (or time), and by sector where nominal points are known. Sessions that are left out test what an effect
+    says of the weather, sectors what it says of the geometry. Repeats of one point never lie in two folds: they would
+    let a fit predict its own noise (leakage; Roberts et al., Ecography 40 (2017) 913: block cross-validation).
     """
-    found = [_by_session(aligned)]
-    by_place = _by_sector(aligned)
-    if by_place is not None:
-        found.append(by_place)
-    return tuple(found)
+    splits = [_split_by_session(aligned, criteria.fewest_sessions)]
+    by_sector = _split_by_sector(aligned, criteria.sectors)
+    if by_sector is not None:
+        splits.append(by_sector)
+    return tuple(splits)
 
 
-def _by_session(aligned: AlignedRecording) -> IntArray:
+def _split_by_session(aligned: AlignedRecording, fewest_sessions: int) -> IntArray:
+    """(N,) sessions; with too few of them, blocks of time, repeats of one visit in the same."""
     recording = aligned.recording
     fold = recording.fold
-    if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
+    if len(np.unique(fold[fold >= 0])) < fewest_sessions:
         fold = np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows
         if recording.visit is not None:
-            # repeats of one visit stay together
-            first = np.unique(recording.visit, return_index=True, return_inverse=True)
-            fold = np.where(recording.visit >= 0, fold[first[1]][first[2]], fold)
+            _, first_row, visit = np.unique(recording.visit, return_index=True, return_inverse=True)
+            fold = np.where(recording.visit >= 0, fold[first_row][visit], fold)
     return np.asarray(np.unique(fold, return_inverse=True)[1], dtype=np.int64)
 
 
-def _by_sector(aligned: AlignedRecording) -> IntArray | None:
-    """Sectors with equally many points; None where the tip or its points are not known or too few."""
-    point, tip = aligned.recording.point, aligned.rows.tip_M_mm
-    known = np.isfinite(tip).all(axis=1)
+def _split_by_sector(aligned: AlignedRecording, sectors: int) -> IntArray | None:
+    """(N,) sectors about the vertical through the middle of the workspace, with equally many points each.
+
+    None where the tip or its nominal points are not known, or where there are fewer than two points per sector.
+    """
+    point, tip_M_mm = aligned.recording.point, aligned.rows.tip_M_mm
+    known = np.isfinite(tip_M_mm).all(axis=1)
     if point is None or not known.any():
         return None
-    names, inverse = np.unique(point, return_inverse=True)
-    if len(names) < 2 * SECTORS:
+    points, index = np.unique(point, return_inverse=True)
+    if len(points) < 2 * sectors:
         return None
-    middle = tip[known].mean(axis=0)
-    azimuth_rad = np.array([_azimuth(tip[known & (inverse == k)] - middle) for k in range(len(names))])
-    sector = np.empty(len(names), dtype=np.int64)
-    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(len(names)) * SECTORS // len(names)
-    return sector[inverse]
+    middle = tip_M_mm[known].mean(axis=0)
+    azimuth_rad = np.array([_azimuth_rad(tip_M_mm[known & (index == k)] - middle) for k in range(len(points))])
+    sector = np.empty(len(points), dtype=np.int64)
+    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(len(points)) * sectors // len(points)
+    return sector[index]
 
 
-def _azimuth(from_middle_mm: FloatArray) -> float:
-    """Of one point's rows, -pi to pi; that of a point without a place is 0."""
+def _azimuth_rad(from_middle_mm: FloatArray) -> float:
+    """Mean azimuth of one point's rows (R, 3), -pi to pi; of a point without rows 0."""
     if not len(from_middle_mm):
         return 0.0
     x, y, _ = from_middle_mm.mean(axis=0)

@@ -1,4 +1,4 @@
-"""Which physical effect is missing: from a recording and a model to a verdict with its evidence."""
+"""Which physical effect a model lacks: from a recording and a model to a verdict with its evidence."""
 
 from __future__ import annotations
 
@@ -11,26 +11,30 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.shape_search import search_constants
-from compd.diagnosis.candidate_results import judged
+from compd.diagnosis.candidate_results import candidate_results
 from compd.diagnosis.candidates import library_pool
-from compd.diagnosis.empirical_search import EmpiricalFinding, Rest, held_out_losses, ranked, together
-from compd.diagnosis.explanation import Explanation, Progress, explain, held_block
-from compd.diagnosis.measurement_programmes import limits_of
-from compd.diagnosis.next_measurement import plan
-from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.rivals import rivals
-from compd.diagnosis.selection import MOST_LEFT, at_floor, cost, explained_fraction, numbers
-from compd.diagnosis.significance import Projection, chances
-from compd.diagnosis.subset_search import Contest, Members
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.empirical_findings import Remainder, find_pair, rank_findings
+from compd.diagnosis.empirical_search import cv_losses_beside
+from compd.diagnosis.explanation import Explanation, Progress, explain
+from compd.diagnosis.measurement_programmes import recorded_limits
+from compd.diagnosis.next_measurement import plan_measurement
+from compd.diagnosis.problem import DiagnosisProblem, build_problem, screen_outliers
+from compd.diagnosis.rivals import find_rivals
+from compd.diagnosis.selection import estimate_parameters, explained_fraction, is_at_floor, penalty
+from compd.diagnosis.significance import OrthogonalComplement, p_values
+from compd.diagnosis.subset_search import SubsetSearch
 from compd.diagnosis.unmodelled import with_disturbances
-from compd.diagnosis.verdict import Diagnosis, DiagnosisStep, Verdict
+from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, Verdict
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 
-# Gross rows and the best explanation depend on one another: so often they are looked at again.
+# Outliers and the best explanation depend on one another: so often both are determined at most.
 ROUNDS = 3
 # Rows of the next measurement that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
 NEXT_ROWS = 12
+# Covariates that the proposal of a next measurement names.
+NEXT_COVARIATES = 2
 
 
 def diagnose(
@@ -38,139 +42,180 @@ def diagnose(
     fitted: Sequence[FittedEffect],
     covariance: FloatArray | None,
     effects: Sequence[Effect],
-    progress: Progress = lambda said: None,
+    progress: Progress = lambda status: None,
+    criteria: Criteria = Criteria(),
 ) -> Diagnosis:
     """Learn which effects the model lacks on this recording.
 
-    fitted, covariance : the model's effects, refitted along.  effects : the library.  progress : told what begins.
+    The residual is explained by the fewest effects that predict rows which were left out; what no effect explains is
+    described by the covariates that it follows. Effects that are named are then fitted on the forward model.
+
+    fitted, covariance : the model's effects and the joint covariance of their parameters, None where not known; they
+        are refitted along.
+    effects : the library.
+    progress : called with a text when a stage begins.
+    criteria : thresholds of the verdict.
+
     Raises CompdError as `compare` does.
+
+    Example::
+
+        diagnosis = diagnose(aligned, (), None, list(load_library().values()))
+        diagnosis.verdict  # "identified"
+        [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
     progress("comparing the model with the recording")
-    before = compare(aligned, fitted, covariance)
+    before = compare(aligned, fitted, covariance, criteria.comparison)
     progress("what each effect would do")
-    pool = library_pool(aligned, effects, [one.effect.id for one in fitted])
-    bench = DiagnosisProblem(before, pool)
-    found = explain(bench, progress)
+    pool = library_pool(aligned, effects, [effect.effect.id for effect in fitted], criteria)
+    problem = build_problem(before, pool, criteria)
+    explanation = explain(problem, progress)
     for _ in range(ROUNDS - 1):
-        outlier = bench.outliers_beside(found.members, found.contest)
-        if (outlier == bench.outlier).all():
+        outlier = screen_outliers(problem, [explanation.search.candidates[k] for k in explanation.members])
+        if (outlier == problem.outlier).all():
             break
-        bench = DiagnosisProblem(before, pool, outlier)
-        found = explain(bench, progress)
+        problem = build_problem(before, pool, criteria, outlier)
+        explanation = explain(problem, progress)
     progress("fitting on the real forward model")
-    return _diagnosis(bench, found, covariance)
+    return _diagnosis(problem, explanation, covariance)
 
 
-def _diagnosis(bench: DiagnosisProblem, found: Explanation, covariance: FloatArray | None) -> Diagnosis:
-    contest, aligned, before = found.contest, bench.aligned, bench.before
-    effects = _worth_naming(found)
-    chance = _chances(contest, effects)
-    current, joint = before.fitted, covariance
+def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
+    """Fit the effects that are worth naming, and state the verdict with its evidence."""
+    search, aligned, before, criteria = explanation.search, problem.aligned, problem.comparison, problem.criteria
+    effects = _effects_to_name(explanation, criteria)
+    p_value_by_effect = _p_values(search, effects)
+    fitted, joint_covariance = before.fitted, covariance
     for number, k in enumerate(effects, start=1):
-        result = search_constants(aligned, current, contest.candidates[k].effect, bench.sigma_um)
+        result = search_constants(aligned, fitted, search.candidates[k].effect, problem.sigma_um, criteria.comparison)
         if number == len(effects):
-            result = with_disturbances(result, aligned, bench.sigma_um, bench.pool.candidates)
-        current, joint = result.fitted, result.covariance
-    after = compare(aligned, current, joint) if effects else before
-    quiet = not found.described and at_floor(after.floor_ratio, contest.base - 1.0 if effects else 0.0)
-    steps = _steps(bench, found, effects, current[len(before.fitted) :], chance, quiet)
-    candidates = judged(bench, contest, steps, chance)
-    depends = () if quiet else _depends(bench, found, effects)
-    verdict: Verdict = "unexplained"
-    if quiet:
-        ambiguous = any(step.rivals for step in steps)
-        verdict = "adequate" if not steps else "ambiguous" if ambiguous else "identified"
-    elif not depends and not steps and all(one.status in ("not_testable", "no_gain") for one in candidates):
-        verdict = "not_testable" if any(one.status == "not_testable" for one in candidates) else "unexplained"
-    diagnosis = Diagnosis(verdict, before, after, steps, candidates, depends)
-    return replace(diagnosis, next_measurement=_next(bench, diagnosis))
+            result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
+        fitted, joint_covariance = result.fitted, result.covariance
+    after = compare(aligned, fitted, joint_covariance, criteria.comparison) if effects else before
+    explained = search.baseline - 1.0 if effects else 0.0
+    at_floor = not explanation.is_empirical and is_at_floor(after.floor_ratio, criteria, explained)
+    new = fitted[len(before.fitted) :]
+    steps = _steps(problem, search, effects, new, p_value_by_effect, with_rivals=at_floor)
+    candidates = candidate_results(problem, search, steps, p_value_by_effect)
+    depends_on = () if at_floor else _depends_on(problem, explanation, effects)
+    verdict = _verdict(steps, candidates, depends_on, at_floor)
+    diagnosis = Diagnosis(verdict, before, after, steps, candidates, depends_on)
+    return replace(diagnosis, next_measurement=_next_measurement(problem, diagnosis))
 
 
-def _worth_naming(found: Explanation) -> Members:
-    """The effects of the best set; none where they leave much that nothing describes either: a likeness, no cause."""
-    contest, effects = found.contest, found.effects
-    if not effects or found.described:
+def _verdict(
+    steps: Sequence[DiagnosisStep],
+    candidates: Sequence[CandidateResult],
+    depends_on: Sequence[EmpiricalFinding],
+    at_floor: bool,
+) -> Verdict:
+    """The verdict; at_floor : whether the model with the steps' effects leaves nothing worth a name."""
+    if at_floor:
+        if not steps:
+            return "adequate"
+        return "ambiguous" if any(step.rivals for step in steps) else "identified"
+    statuses = {candidate.status for candidate in candidates}
+    if not depends_on and not steps and statuses <= {"not_testable", "no_gain"} and "not_testable" in statuses:
+        return "not_testable"
+    return "unexplained"
+
+
+def _effects_to_name(explanation: Explanation, criteria: Criteria) -> tuple[int, ...]:
+    """The effects of the best subset; none where they leave much that nothing describes: similarity, no cause."""
+    search, effects = explanation.search, explanation.effects
+    if not effects or explanation.is_empirical:
         return effects
-    loss = contest.entries([effects])[0].loss
-    enough = explained_fraction(contest.base, loss) >= 1 - 2 * MOST_LEFT
-    return effects if enough or at_floor(loss, contest.base - 1.0) else ()
+    loss = search.evaluate([effects])[0].cv_loss
+    enough = explained_fraction(search.baseline, loss) >= 1 - criteria.most_unexplained
+    return effects if enough or is_at_floor(loss, criteria, search.baseline - 1.0) else ()
 
 
 def _steps(
-    bench: DiagnosisProblem,
-    found: Explanation,
-    effects: Members,
+    problem: DiagnosisProblem,
+    search: SubsetSearch,
+    effects: tuple[int, ...],
     fitted: Sequence[FittedEffect],
-    chance: Mapping[str, float],
-    quiet: bool,
+    p_value_by_effect: Mapping[str, float],
+    *,
+    with_rivals: bool,
 ) -> tuple[DiagnosisStep, ...]:
-    """One effect after another, with what each adds. Rivals are looked for where the end is at the floor."""
-    contest, noise_um = found.contest, bench.before.floor.um
-    steps, left = [], contest.base
-    for place, one in enumerate(fitted):
-        loss = contest.entries([effects[: place + 1]])[0].loss
-        known = numbers(one.effect, bench.aligned.rows.links, one.theta, one.covariance)
-        others = rivals(contest, effects, place) if quiet else ()
-        phi = explained_fraction(left, loss)
+    """One effect after another, with what each adds to those before it."""
+    steps, loss_before = [], search.baseline
+    for place, effect in enumerate(fitted):
+        loss = search.evaluate([effects[: place + 1]])[0].cv_loss
+        links = problem.aligned.rows.links
+        parameters = estimate_parameters(effect.effect, links, effect.theta, effect.covariance, problem.criteria)
         steps.append(
-            DiagnosisStep(one, others, noise_um * float(np.sqrt(loss)), phi, chance[one.effect.id], tuple(known))
+            DiagnosisStep(
+                fitted=effect,
+                rivals=find_rivals(search, effects, place) if with_rivals else (),
+                heldout_rms_um=problem.comparison.floor.um * float(np.sqrt(loss)),
+                explained_fraction=explained_fraction(loss_before, loss),
+                p_value=p_value_by_effect[effect.effect.id],
+                parameters=tuple(parameters),
+            )
         )
-        left = loss
+        loss_before = loss
     return tuple(steps)
 
 
-def _depends(bench: DiagnosisProblem, found: Explanation, effects: Members) -> tuple[EmpiricalFinding, ...]:
-    """What the rest follows, one line per covariate; two covariates together first, where one is not enough."""
-    contest, searched = found.contest, found.searched
-    if not searched:
+def _depends_on(
+    problem: DiagnosisProblem, explanation: Explanation, effects: tuple[int, ...]
+) -> tuple[EmpiricalFinding, ...]:
+    """What the rest follows, one finding per covariate; first a pair of covariates where one is not enough."""
+    search, fits, criteria = explanation.search, explanation.fits, problem.criteria
+    if not fits:
         return ()
-    held = held_block(contest, effects)
-    rest = Rest(
-        bench.evidence,
-        held,
-        contest.entries([effects])[0].loss if effects else contest.base,
-        bench.before.floor.um,
-        cost(contest.base - 1.0),
-        bench.aligned.rows.links,
+    nuisance = search.nuisance_with(effects)
+    remainder = Remainder(
+        data=replace(problem.data, nuisance=nuisance),
+        loss=search.evaluate([effects])[0].cv_loss if effects else search.baseline,
+        noise_um=problem.comparison.floor.um,
+        least_gain=penalty(search.baseline - 1.0, criteria),
+        links=problem.aligned.rows.links,
     )
-    losses = held_out_losses(bench.evidence, held, searched)
-    lines = ranked(rest, searched, losses)
-    if not lines or at_floor(float(np.nanmin(losses))):
-        return lines
-    return (*together(rest, searched, float(np.nanmin(losses))), *lines)
+    losses = cv_losses_beside(nuisance, problem.data, fits, criteria)
+    findings = rank_findings(remainder, fits, losses, criteria)
+    if not findings or is_at_floor(float(np.nanmin(losses)), criteria):
+        return findings
+    return (*find_pair(remainder, fits, float(np.nanmin(losses)), criteria), *findings)
 
 
-def _chances(contest: Contest, effects: Members) -> dict[str, float]:
-    """Each effect's chance to look as good by noise alone, corrected for all of them and their shape constants."""
-    beside = Projection(contest.evidence.always.values)
-    values = [beside(one) for one in contest.values]
-    y = beside(contest.evidence.y)
-    chosen = list(effects) or [one.members[0] for one in contest.singles[:1]]
-    left = Projection(np.concatenate([values[k] for k in chosen], axis=2))(y) if chosen else y
-    names = list(dict.fromkeys(one.name for one in contest.candidates if not one.described))
-    families = [[v for v, c in zip(values, contest.candidates, strict=True) if c.name == name] for name in names]
-    return dict(zip(names, chances(families, y, left, contest.evidence.group).tolist(), strict=True))
+def _p_values(search: SubsetSearch, effects: tuple[int, ...]) -> dict[str, float]:
+    """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
+
+    The noise is what the named effects leave; where none is named, what the best candidate leaves.
+    """
+    complement = OrthogonalComplement(search.data.nuisance.values)
+    columns = [complement(values) for values in search.values]
+    y = complement(search.data.y)
+    explaining = list(effects) or [subset.members[0] for subset in search.singles[:1]]
+    noise = OrthogonalComplement(np.concatenate([columns[k] for k in explaining], axis=2))(y) if explaining else y
+    names = list(dict.fromkeys(candidate.name for candidate in search.candidates if not candidate.is_empirical))
+    families = [
+        [values for values, candidate in zip(columns, search.candidates, strict=True) if candidate.name == name]
+        for name in names
+    ]
+    return dict(zip(names, p_values(families, y, noise, search.data.block).tolist(), strict=True))
 
 
-def _next(bench: DiagnosisProblem, diagnosis: Diagnosis) -> list[dict[str, object]]:
-    """Rows that tell the first rivals apart; for the unexplained, what to vary."""
+def _next_measurement(problem: DiagnosisProblem, diagnosis: Diagnosis) -> list[dict[str, object]]:
+    """Rows that tell the first rivals apart; where nothing explains the residual, what to vary."""
+    aligned, model, criteria = problem.aligned, problem.comparison.fitted, problem.criteria.comparison
     for step in diagnosis.steps:
-        if step.rivals and bench.aligned.model is not None:
-            rival = bench.pool.candidates[step.rivals[0].member]
+        if step.rivals and aligned.model is not None:
+            rival = problem.pool.candidates[step.rivals[0].member]
             try:
-                other = search_constants(bench.aligned, bench.before.fitted, rival.effect, bench.sigma_um).fitted[-1]
-                pair = (step.fitted, other)
-                return [
-                    *plan(
-                        bench.aligned, bench.before.fitted, pair, bench.sigma_um, limits_of(bench.aligned), NEXT_ROWS
-                    ).rows
-                ]
+                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um, criteria).fitted[-1]
+                pair = (step.fitted, fitted_rival)
+                limits = recorded_limits(aligned)
+                return list(plan_measurement(aligned, model, pair, problem.sigma_um, limits, NEXT_ROWS).rows)
             except CompdError as error:
                 return [{"measure": step.effect.separated_by, "why": str(error.problems[0].what)}]
     return [
         {
-            "measure": f"vary {one.covariate} alone, everything else as it is, at three places and back again",
-            "why": f"the rest follows it ({one.form}, at the {one.port})",
+            "measure": f"vary {finding.covariate} alone, everything else as it is, at three places and back again",
+            "why": f"the rest follows it ({finding.form}, at the {finding.port})",
         }
-        for one in diagnosis.depends_on[:2]
+        for finding in diagnosis.depends_on[:NEXT_COVARIATES]
     ]

@@ -1,286 +1,158 @@
-"""What a residual depends on: every covariate at every port in every form, judged on rows that were left out."""
+"""The search for empirical terms: every covariate at every port in every form, each at its best nonlinear constant."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.diagnosis.candidates import SEARCH_COUNTS, Candidate
-from compd.diagnosis.empirical_terms import EmpiricalTerm, descriptions, finer
-from compd.diagnosis.regression import Block, Evidence, sums
-from compd.diagnosis.selection import PER_NUMBER
-from compd.diagnosis.significance import Projection, chances
-from compd.diagnosis.whitening import Whitening
+from compd.diagnosis.candidates import Candidate
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.empirical_terms import EmpiricalTerm, empirical_terms
+from compd.diagnosis.problem import DiagnosisProblem
+from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
+from compd.diagnosis.significance import OrthogonalComplement
 from compd.model.effect import Effect
 
-# Places between neighbours of a grid that are tried for a step, a knee or a period.
-FINER = 9
-# A direction with a smaller share of what a description explains is left out of the proposal.
-LEAST_SHARE = 0.03
-# Descriptions that are judged on left-out rows, of those that explain most where they were fitted.
+# Values between neighbours of a grid that are tried for a step, a knee or a period.
+REFINED_VALUES = 9
+REFINED_FORMS = ("step", "knee", "periodic")
+# Terms that are tried on rows left out, of those that explain most where they were fitted.
 PROMISING = 60
-# A number more must explain so much of what is above the floor: a curve fits a line's noise a little better, and
-# that of a covariate which only goes along. Between forms of one covariate less will do.
-PLAIN_SHARE = 0.01
-FORM_SHARE = 0.002
-# Two covariates must take away so much of what the best one alone leaves above the floor.
-LEAST_MORE = 0.5
-# So many are computed at once: a balance of memory and overhead.
-TOGETHER = 64
-# A chance above this is no finding.
-SIGNIFICANT = 0.05
+# Terms that are computed at once: a balance of memory and overhead.
+BATCH = 64
 
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalFit:
-    """A description at one value of its shape constant: values (R, m, P) whitened, on the rows of the evidence."""
+    """An empirical term at one value of its nonlinear constant, whitened.
 
-    description: EmpiricalTerm
+    effect : the term's formula.  constant : the value; None for a term without one.
+    values : (R, m, P) columns in standard deviations of the noise, on the rows of the problem.
+    searched_parameters : for how many parameters the search for the constant counts.
+    """
+
+    term: EmpiricalTerm
     effect: Effect
     constant: float | None
     values: FloatArray
+    searched_parameters: int
 
     @property
-    def numbers(self) -> int:
-        """How many it takes, its constant with them."""
-        return int(self.values.shape[2]) + SEARCH_COUNTS * (self.constant is not None)
+    def parameter_count(self) -> int:
+        """Fitted parameters, and what the search for the constant counts for."""
+        return int(self.values.shape[2]) + self.searched_parameters
 
     @property
-    def block(self) -> Block:
-        """Of its numbers nothing is known."""
-        return Block(self.values, np.full(self.values.shape[2], np.inf))
+    def regressors(self) -> Regressors:
+        """The columns; nothing is known of their parameters."""
+        return Regressors(self.values, np.full(self.values.shape[2], np.inf))
 
     def candidate(self, columns_um: FloatArray) -> Candidate:
-        """As a competitor of the library's effects."""
-        name = f"{self.description.covariate} {self.description.form}"
-        shape = {self.description.constant: self.constant} if self.constant is not None else {}
+        """The term as a competitor of the library's effects; columns_um (N, m, P) on all rows."""
+        name = f"{self.term.covariate} {self.term.form}"
         limits = np.tile([-np.inf, np.inf], (columns_um.shape[2], 1))
-        return Candidate(name, self.effect, shape, columns_um, limits, SEARCH_COUNTS * len(shape))
+        constants = self.term.constant_values(self.constant)
+        return Candidate(name, self.effect, constants, columns_um, limits, self.searched_parameters)
 
 
-@dataclass(frozen=True)
-class EmpiricalFinding:
-    """One thing that the residual follows.
+class EmpiricalSearch:
+    """Every empirical term on the rows of a problem, at every value of its nonlinear constant."""
 
-    explained_fraction : of what is above the noise, on rows that were left out.
-    formula_effects : ready to paste; the first is the largest.  numbers : their fitted numbers.
-    beside : another covariate that is needed along with it.
-    """
-
-    covariate: str
-    form: str
-    port: str
-    p_adjusted: float
-    explained_fraction: float
-    heldout_rms_um: float
-    formula_effects: tuple[dict[str, Any], ...]
-    numbers: tuple[dict[str, float], ...]
-    beside: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """The keys of the verdict's `depends_on`."""
-        return {
-            "covariate": self.covariate,
-            "form": self.form,
-            "port": self.port,
-            "p_adjusted": self.p_adjusted,
-            "explained_fraction": self.explained_fraction,
-            "heldout_rms_um": self.heldout_rms_um,
-            "formula_effect": self.formula_effects[0],
-            "formula_effects": list(self.formula_effects),
-            "fitted": list(self.numbers),
-            "beside": list(self.beside),
-            "note": "a description, not a cause",
-        }
-
-
-class Everything:
-    """Every description on a recording, at every value of its shape constant, as one table of columns."""
-
-    def __init__(self, whiten: Whitening) -> None:
-        self._whiten = whiten
-        by_size: dict[int, list[EmpiricalFit]] = {}
-        for description in descriptions(whiten.aligned):
-            effect = description.effect()
-            for constant in description.grid or (None,):
-                values = whiten(whiten.columns_um(description, effect, constant))
+    def __init__(self, problem: DiagnosisProblem) -> None:
+        self._problem = problem
+        self._fits_by_size: dict[int, list[EmpiricalFit]] = {}
+        for term in empirical_terms(problem.aligned, problem.criteria):
+            effect = term.effect()
+            searched = problem.criteria.searched_constant_parameters if term.constant else 0
+            for constant in term.grid or (None,):
+                values = self._columns(term, effect, constant)
                 if np.isfinite(values).all() and values.any():
-                    by_size.setdefault(values.shape[2], []).append(EmpiricalFit(description, effect, constant, values))
-        self._by_size = by_size
+                    fit = EmpiricalFit(term, effect, constant, values, searched)
+                    self._fits_by_size.setdefault(values.shape[2], []).append(fit)
 
-    def best(self, y: FloatArray, basis: FloatArray) -> list[EmpiricalFit]:
-        """Each description at its best constant beside `basis` (R, m, Q), the PROMISING ones that explain most of y.
+    def best_fits(self, nuisance: FloatArray) -> list[EmpiricalFit]:
+        """The PROMISING terms that explain most of the residual beside nuisance columns (R, m, Q), the best first.
 
-        Steps, knees and periods are then looked for more finely.
+        Each is at its best constant; steps, knees and periods are then refined between the values of the grid.
         """
-        beside = Projection(basis)
-        left = beside(y)
+        complement = OrthogonalComplement(nuisance)
+        residual = complement(self._problem.data.y)
         best: dict[EmpiricalTerm, tuple[float, EmpiricalFit]] = {}
-        for members in self._by_size.values():
-            for one, explained in zip(members, _explained(members, left, beside).tolist(), strict=True):
-                if one.description not in best or explained > best[one.description][0]:
-                    best[one.description] = explained, one
-        order = sorted(best.values(), key=lambda pair: -pair[0])[:PROMISING]
-        return [self._finer(one, left, beside) for _, one in order]
+        for fits in self._fits_by_size.values():
+            for fit, explained in zip(fits, _explained_squares(fits, residual, complement).tolist(), strict=True):
+                if fit.term not in best or explained > best[fit.term][0]:
+                    best[fit.term] = explained, fit
+        promising = sorted(best.values(), key=lambda pair: -pair[0])[:PROMISING]
+        return [self._refined(fit, residual, complement) for _, fit in promising]
 
-    def _finer(self, one: EmpiricalFit, left: FloatArray, beside: Projection) -> EmpiricalFit:
-        if one.constant is None or one.description.form not in ("step", "knee", "periodic"):
-            return one
-        around = [one]
-        for value in finer(one.description, one.constant, FINER):
-            values = self._whiten(self._whiten.columns_um(one.description, one.effect, value))
-            around.append(replace(one, constant=value, values=values))
-        return around[int(np.argmax(_explained(around, left, beside)))]
+    def _refined(self, fit: EmpiricalFit, residual: FloatArray, complement: OrthogonalComplement) -> EmpiricalFit:
+        if fit.constant is None or fit.term.form not in REFINED_FORMS:
+            return fit
+        fits = [fit]
+        for constant in fit.term.refined_grid(fit.constant, REFINED_VALUES):
+            values = self._columns(fit.term, fit.effect, constant)
+            fits.append(replace(fit, constant=constant, values=values))
+        return fits[int(np.argmax(_explained_squares(fits, residual, complement)))]
 
-
-def _explained(members: Sequence[EmpiricalFit], left: FloatArray, beside: Projection) -> FloatArray:
-    """(K,) squares that each explains; all have equally many columns."""
-    found = []
-    for begin in range(0, len(members), TOGETHER):
-        columns = np.concatenate([one.values for one in members[begin : begin + TOGETHER]], axis=2)
-        size = members[0].values.shape[2]
-        before = (columns**2).sum(axis=(0, 1)).reshape(-1, size)
-        flat = beside(columns).reshape(left.size, -1)
-        score = (flat.T @ left.ravel()).reshape(-1, size)
-        each = flat.reshape(left.size, -1, size).transpose(1, 0, 2)
-        gram = each.transpose(0, 2, 1) @ each
-        # what the basis explains to one part in 1e6 is not this description's
-        gram += np.eye(size) * (1e-6 * before[:, :, None] + 1e-12)
-        found.append((score * np.linalg.solve(gram, score[:, :, None])[:, :, 0]).sum(axis=1))
-    return np.concatenate(found)
+    def _columns(self, term: EmpiricalTerm, effect: Effect, constant: float | None) -> FloatArray:
+        """(R, m, P) whitened columns of a term."""
+        return self._problem.whiten(term.columns_um(self._problem.aligned, effect, constant))
 
 
-def held_out_losses(evidence: Evidence, basis: Block, searched: Sequence[EmpiricalFit]) -> FloatArray:
-    """(K,) mean square left in left-out rows by `basis` and each description, in squares of the noise."""
-    total, places = sums(replace(evidence, always=basis), [one.block for one in searched])
-    held = np.arange(basis.values.shape[2])
-    counts = np.array([total.learnable(place) for place in places])
-    return total.held_out([np.concatenate([held, place]) for place in places], counts)
+def _explained_squares(
+    fits: Sequence[EmpiricalFit], residual: FloatArray, complement: OrthogonalComplement
+) -> FloatArray:
+    """(K,) sum of squares of a residual (R, m) that each fit explains; all have equally many columns.
 
-
-def by_covariate(losses: FloatArray, searched: Sequence[EmpiricalFit], left: float) -> list[int]:
-    """The best description of each covariate that can be tested, the best covariate first.
-
-    left : mean square without any of them.
+    What the nuisance columns explain of a fit's columns to one part in 1e6 is held by a ridge and explains nothing.
     """
-    known = [k for k in range(len(searched)) if np.isfinite(losses[k])]
-    best: dict[str, int] = {}
-    for share in (PLAIN_SHARE, FORM_SHARE):  # the second, of the covariates in the order of the first
-        price = PER_NUMBER + share * max(left - 1.0, 0.0)
-        found: dict[str, int] = {}
-        for k in sorted(known, key=lambda k: losses[k] + price * searched[k].numbers):
-            found.setdefault(searched[k].description.covariate, k)
-        best = {name: found[name] for name in best} if best else found
-    return list(best.values())
+    explained = []
+    size = fits[0].values.shape[2]
+    for begin in range(0, len(fits), BATCH):
+        columns = np.concatenate([fit.values for fit in fits[begin : begin + BATCH]], axis=2)
+        squares = (columns**2).sum(axis=(0, 1)).reshape(-1, size)
+        flat = complement(columns).reshape(residual.size, -1)
+        score = (flat.T @ residual.ravel()).reshape(-1, size)
+        by_fit = flat.reshape(residual.size, -1, size).transpose(1, 0, 2)
+        gram = by_fit.transpose(0, 2, 1) @ by_fit
+        gram += np.eye(size) * (1e-6 * squares[:, :, None] + 1e-12)
+        explained.append((score * np.linalg.solve(gram, score[:, :, None])[:, :, 0]).sum(axis=1))
+    return np.concatenate(explained)
 
 
-class Rest(NamedTuple):
-    """What is to be described: the evidence beside `held` (R, m, Q), which leaves `left`, held out.
+def cv_losses_beside(
+    nuisance: Regressors, data: RegressionData, fits: Sequence[EmpiricalFit], criteria: Criteria
+) -> FloatArray:
+    """(K,) cross-validated loss of the nuisance columns with each fit, in squares of the noise floor.
 
-    noise_um : the floor.  least_gain : what is worth a line, in squares of the noise.  links : of the machine.
+    nan where no split can test a fit.
     """
-
-    evidence: Evidence
-    held: Block
-    left: float
-    noise_um: float
-    least_gain: float
-    links: int
-
-    def rms_um(self, loss: float) -> float:
-        """Per coordinate, from a mean square in squares of the noise."""
-        return self.noise_um * float(np.sqrt(max(loss, 0.0)))
-
-    def explained(self, loss: float) -> float:
-        """Share of what is above the noise."""
-        return float(min((self.left - loss) / max(self.left - 1.0, self.left - loss), 1.0))
+    equations, indices = normal_equations(replace(data, nuisance=nuisance), [fit.regressors for fit in fits])
+    nuisance_index = np.arange(nuisance.values.shape[2])
+    testable = np.array([equations.testable_splits(index, criteria.most_in_one_fold) for index in indices])
+    return equations.cv_losses([np.concatenate([nuisance_index, index]) for index in indices], testable)
 
 
-def ranked(rest: Rest, searched: Sequence[EmpiricalFit], losses: FloatArray) -> tuple[EmpiricalFinding, ...]:
-    """One entry per covariate, the one that explains most first; only those that explain enough not to be chance."""
-    first = by_covariate(losses, searched, rest.left)
-    if not first:
-        return ()
-    order = [*first, *(k for k in range(len(searched)) if np.isfinite(losses[k]) and k not in first)]
-    chance = _chances(rest, [[searched[k]] for k in order])
-    by_place = dict(zip(order, chance, strict=True))
-    return tuple(
-        _dependence(rest, [searched[k]], by_place[k], float(losses[k]))
-        for k in first
-        if rest.left - losses[k] >= rest.least_gain and by_place[k] <= SIGNIFICANT
-    )
+def best_by_covariate(
+    losses: FloatArray, fits: Sequence[EmpiricalFit], loss_without: float, criteria: Criteria
+) -> list[int]:
+    """Places of the best fit of each covariate that can be tested, the best covariate first.
 
-
-def together(rest: Rest, searched: Sequence[EmpiricalFit], alone: float) -> tuple[EmpiricalFinding, ...]:
-    """The two descriptions that explain most together, where that is much more than the best one does alone.
-
-    alone : mean square that the best one leaves.
+    losses : (K,) cross-validated, of each fit.  loss_without : without any of them.
+    Covariates are compared by their loss with `term_share` for each parameter, forms of one with `form_share`.
     """
-    pairs = [
-        (a, b)
-        for a, b in combinations(range(len(searched)), 2)
-        if searched[a].description.covariate != searched[b].description.covariate
-    ]
-    total, places = sums(replace(rest.evidence, always=rest.held), [one.block for one in searched])
-    held = np.arange(rest.held.values.shape[2])
-    learnable = np.array([total.learnable(place) for place in places])
-    sets = [np.concatenate([held, places[a], places[b]]) for a, b in pairs]
-    losses = total.held_out(sets, np.array([learnable[a] & learnable[b] for a, b in pairs]))
-    if not np.isfinite(losses).any():
-        return ()
-    best = int(np.nanargmin(losses))
-    pair = [searched[k] for k in pairs[best]]
-    excess = max(float(losses[best]) - 1.0, 0.0)
-    if alone - losses[best] < rest.least_gain or alone - 1.0 < excess / (1 - LEAST_MORE):
-        return ()
-    chance = _chances(rest, [pair])[0]
-    return (_dependence(rest, pair, chance, float(losses[best])),) if chance <= SIGNIFICANT else ()
+    testable = [k for k in range(len(fits)) if np.isfinite(losses[k])]
 
+    def first_by_covariate(share: float) -> dict[str, int]:
+        per_parameter = criteria.gain_per_parameter + share * max(loss_without - 1.0, 0.0)
+        best: dict[str, int] = {}
+        for k in sorted(testable, key=lambda k: losses[k] + per_parameter * fits[k].parameter_count):
+            best.setdefault(fits[k].term.covariate, k)
+        return best
 
-def _chances(rest: Rest, families: Sequence[Sequence[EmpiricalFit]]) -> list[float]:
-    """Of each family's columns together; the first is taken to be the explanation when the noise is flipped."""
-    beside = Projection(rest.held.values)
-    columns = [beside(np.concatenate([one.values for one in family], axis=2)) for family in families]
-    y = beside(rest.evidence.y)
-    left = Projection(columns[0])(y)
-    found: list[float] = chances([[one] for one in columns], y, left, rest.evidence.group).tolist()
-    return found
-
-
-def _dependence(rest: Rest, described: Sequence[EmpiricalFit], chance: float, loss: float) -> EmpiricalFinding:
-    """With the numbers fitted on all rows, and the directions that matter; the first covariate is the larger part."""
-    total, places = sums(replace(rest.evidence, always=rest.held), [one.block for one in described])
-    theta, _, _ = total.fitted(np.concatenate([np.arange(rest.held.values.shape[2]), *places]))
-    parts: list[tuple[float, str, dict[str, Any], dict[str, float]]] = []
-    for one, place in zip(described, places, strict=True):
-        names = [column.name for column in one.effect.columns(rest.links)]
-        for number, axis in enumerate(one.description.axes):
-            here = slice(number * len(names), (number + 1) * len(names))
-            values = theta[place][here]
-            numbers = dict(zip(names, values.tolist(), strict=True))
-            sizes = {
-                parameter.name: max(abs(v) for n, v in numbers.items() if n.split("_")[0] == parameter.name)
-                for parameter in one.effect.parameters
-            }
-            power = float(((one.values[:, :, here] @ values) ** 2).sum())
-            declared = one.description.declaration(axis, one.constant, sizes)
-            parts.append((power, one.description.covariate, declared, numbers))
-    parts.sort(key=lambda part: -part[0])
-    kept = [part for part in parts if part[0] >= LEAST_SHARE * sum(part[0] for part in parts)]
-    main = next(one for one in described if one.description.covariate == parts[0][1]).description
-    return EmpiricalFinding(
-        main.covariate,
-        main.form,
-        main.port,
-        chance,
-        rest.explained(loss),
-        rest.rms_um(loss),
-        tuple(part[2] for part in kept),
-        tuple(part[3] for part in kept),
-        tuple(one.description.covariate for one in described if one.description.covariate != main.covariate),
-    )
+    order = first_by_covariate(criteria.term_share)
+    best_forms = first_by_covariate(criteria.form_share)
+    return [best_forms[covariate] for covariate in order]

@@ -1,20 +1,17 @@
-"""The best explanation of a residual: effects of the library against descriptions of what it follows."""
+"""The best explanation of a residual: effects of the library in competition with empirical terms."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from compd.diagnosis.empirical_search import EmpiricalFit, Everything, by_covariate, held_out_losses
+from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, best_by_covariate, cv_losses_beside
 from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.regression import Block
-from compd.diagnosis.rivals import simplest
-from compd.diagnosis.selection import at_floor
-from compd.diagnosis.subset_search import Contest, Members
+from compd.diagnosis.rivals import simplify
+from compd.diagnosis.selection import is_at_floor
+from compd.diagnosis.subset_search import SubsetSearch
 
-# Descriptions that compete with the library's effects: of the best so many covariates, beside each basis.
+# Empirical terms that compete with the library's effects: of so many covariates, the best beside each basis.
 COMPETING = 4
 
 Progress = Callable[[str], None]
@@ -22,68 +19,68 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """The best set of candidates.
+    """The best subset of candidates.
 
-    contest : library and descriptions together.  members : the set.  effects : the library's among them, the one
-    that explains most first.  searched : descriptions at their best beside the effects, the promising ones.
+    search : the subset search in which it won, over the library and the competing terms.
+    members : the subset.  effects : the library's effects in it, the one that explains most first.
+    fits : the promising empirical terms beside the effects; empty where none was needed.
     """
 
-    contest: Contest
-    members: Members
-    effects: Members
-    searched: tuple[EmpiricalFit, ...]
+    search: SubsetSearch
+    members: tuple[int, ...]
+    effects: tuple[int, ...]
+    fits: tuple[EmpiricalFit, ...]
 
     @property
-    def described(self) -> bool:
-        """Whether it takes a description: then something acts that the library does not have."""
+    def is_empirical(self) -> bool:
+        """Whether it takes an empirical term: something acts that the library does not have."""
         return len(self.effects) < len(self.members)
 
 
-def explain(bench: DiagnosisProblem, progress: Progress) -> Explanation:
-    """Effects alone first; then effects and descriptions on equal terms, but for what a description costs."""
+def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
+    """Search the library alone; where that leaves more than the floor, the library together with empirical terms.
+
+    A subset of effects and terms wins by the same criteria; terms have the larger penalty. Of an explanation by
+    effects alone each is then replaced by a simpler one that does as well.
+    """
+    criteria, data = problem.criteria, problem.data
     progress("every effect, every pair, the best triples, on rows left out")
-    library = Contest(bench.evidence, bench.pool.candidates, bench.values)
-    chosen = library.best()
-    if not chosen.members and at_floor(library.base):
+    library = SubsetSearch(data, problem.pool.candidates, problem.values, criteria)
+    library_best = library.best_subset()
+    if not library_best.members and is_at_floor(library.baseline, criteria):
         return Explanation(library, (), (), ())
     progress("every covariate, lag, direction and time")
-    everything = Everything(bench.whiten)
-    competing: dict[object, EmpiricalFit] = {}
-    searched: list[EmpiricalFit] = []
-    for basis in dict.fromkeys([(), chosen.members[:1], chosen.members]):
-        held = held_block(library, basis)
-        searched = everything.best(bench.evidence.y, held.values)
-        losses = held_out_losses(bench.evidence, held, searched)
-        for k in by_covariate(losses, searched, library.base)[:COMPETING]:
-            about = searched[k].description
-            competing[about.covariate, about.form, about.port, about.per_link] = searched[k]
-    descriptions = list(competing.values())
-    columns_um = [bench.whiten.columns_um(one.description, one.effect, one.constant) for one in descriptions]
+    empirical = EmpiricalSearch(problem)
+    competing: dict[tuple[str, str, str, bool], EmpiricalFit] = {}
+    fits: list[EmpiricalFit] = []
+    for basis in dict.fromkeys([(), library_best.members[:1], library_best.members]):
+        nuisance = library.nuisance_with(basis)
+        fits = empirical.best_fits(nuisance.values)
+        losses = cv_losses_beside(nuisance, data, fits, criteria)
+        for k in best_by_covariate(losses, fits, library.baseline, criteria)[:COMPETING]:
+            term = fits[k].term
+            competing[term.covariate, term.form, term.port, term.per_link] = fits[k]
     progress("effects against descriptions")
-    contest = Contest(
-        bench.evidence,
-        [*bench.pool.candidates, *(one.candidate(um) for one, um in zip(descriptions, columns_um, strict=True))],
-        [*bench.values, *(one.values for one in descriptions)],
+    competitors = [
+        fit.candidate(fit.term.columns_um(problem.aligned, fit.effect, fit.constant)) for fit in competing.values()
+    ]
+    search = SubsetSearch(
+        data,
+        [*problem.pool.candidates, *competitors],
+        [*problem.values, *(fit.values for fit in competing.values())],
+        criteria,
     )
-    best = contest.best()
-    if not any(contest.candidates[k].described for k in best.members):
-        best = simplest(contest, best)
-    effects = tuple(k for k in best.members if not contest.candidates[k].described)
-    return Explanation(contest, best.members, _by_weight(contest, effects), tuple(searched))
+    best = search.best_subset()
+    if not any(search.candidates[k].is_empirical for k in best.members):
+        best = simplify(search, best)
+    effects = tuple(k for k in best.members if not search.candidates[k].is_empirical)
+    return Explanation(search, best.members, _order_by_gain(search, effects), tuple(fits))
 
 
-def held_block(contest: Contest, members: Members) -> Block:
-    """What every fit holds, and some candidates, as one block."""
-    always = contest.evidence.always
-    values = [always.values, *(contest.values[k] for k in members)]
-    largest = [always.largest, *(contest.candidates[k].largest for k in members)]
-    return Block(np.concatenate(values, axis=2), np.concatenate(largest))
-
-
-def _by_weight(contest: Contest, members: Members) -> Members:
-    """The one first that alone leaves least, then the one that beside it leaves least."""
-    order: Members = ()
+def _order_by_gain(search: SubsetSearch, members: tuple[int, ...]) -> tuple[int, ...]:
+    """First the one that alone leaves least, then the one that beside it leaves least (forward selection)."""
+    order: tuple[int, ...] = ()
     while len(order) < len(members):
-        rest = [k for k in members if k not in order]
-        order = min(contest.entries([(*order, k) for k in rest]), key=lambda one: one.loss).members
+        extended = search.evaluate([(*order, k) for k in members if k not in order])
+        order = min(extended, key=lambda subset: subset.cv_loss).members
     return order

@@ -1,4 +1,4 @@
-"""A sealed recording: looked at once, at the end, with what was learned elsewhere; nothing is fitted on it."""
+"""Holdout recordings: compared once, at the end, with what was learned elsewhere; nothing is fitted on them."""
 
 from __future__ import annotations
 
@@ -12,21 +12,25 @@ from compd.diagnosis.verdict import Diagnosis
 
 @dataclass(frozen=True, eq=False)
 class Holdout:
-    """before, after : against the model as it was, and with the effects that the diagnosis found."""
+    """A recording that took no part in a diagnosis.
+
+    before, after : against the model as it was, and with the effects that the diagnosis found, parameters as fitted
+    elsewhere.
+    """
 
     before: Comparison
     after: Comparison
 
     @property
-    def said(self) -> str:
-        """A sentence for a person."""
+    def summary(self) -> str:
+        """The result in a sentence."""
         return (
             f"Sealed until now, {self.after.aligned.recording.path}: {self.before.rms_um:.3g} um -> "
             f"{self.after.rms_um:.3g} um, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left)."
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Beside the verdict's own keys."""
+        """One entry of `sealed`, beside the verdict's own keys."""
         return {
             "recording": str(self.after.aligned.recording.path),
             "sha256": self.after.aligned.recording.sha256,
@@ -37,6 +41,13 @@ class Holdout:
         }
 
 
-def opened(found: Diagnosis, aligned: AlignedRecording) -> Holdout:
-    """The diagnosis on a recording that it has not seen. Raises CompdError where that lacks what an effect needs."""
-    return Holdout(compare(aligned, found.before.fitted), compare(aligned, found.after.fitted))
+def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout:
+    """Compare a holdout recording with the model before and after a diagnosis.
+
+    Raises CompdError where the recording lacks what an effect needs.
+    """
+    before, after = (
+        compare(aligned, comparison.fitted, criteria=comparison.criteria)
+        for comparison in (diagnosis.before, diagnosis.after)
+    )
+    return Holdout(before, after)

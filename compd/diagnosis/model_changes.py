@@ -1,4 +1,4 @@
-"""Changing a model, one step at a time: add, remove, fit, undo; each step is kept in the model file."""
+"""Changes of a model file, one step at a time: add, remove, refit, undo; the file keeps every step."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from compd.comparison.compare import Comparison, compare
 from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates import library_pool
+from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effect import Effect
 from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
 @dataclass(frozen=True)
 class Change:
-    """The model after a step, and the recording against it before and after."""
+    """A model after a step, and the recording compared with the model before and after it."""
 
     file: ModelFile
     before: Comparison
@@ -28,11 +29,12 @@ class Change:
 
 
 def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording, date: str) -> Change:
-    """Add an effect and fit all effects together; its shape constants are searched.
+    """Add an effect and fit all effects together; its nonlinear constants are searched.
 
+    declared : how the file declares the effect.  date : of the step, as it is to be written.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
     """
-    if any(one.effect.id == effect.id for one in file.fitted):
+    if effect.id in [fitted.effect.id for fitted in file.fitted]:
         raise StateError(
             Problem(
                 where=f"effect {effect.id}",
@@ -41,81 +43,87 @@ def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: Aligned
             )
         )
     before = compare(aligned, file.fitted, file.covariance)
-    found = search_constants(aligned, file.fitted, effect, before.floor.by_axis_um)
-    return _change(replace(file, declared=(*file.declared, declared)), file, found, before, "add", effect.id, date)
+    result = search_constants(aligned, file.fitted, effect, before.floor.by_axis_um)
+    extended = replace(file, declared=(*file.declared, declared))
+    return _change(extended, file, result, before, "add", effect.id, date)
 
 
 def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str) -> Change:
-    """Take an effect out and fit the others again. Raises StateError where the model has it not."""
-    names = [one.effect.id for one in file.fitted]
-    if effect_id not in names:
+    """Take an effect out and fit the others again. Raises StateError where the model has no such effect."""
+    ids = [fitted.effect.id for fitted in file.fitted]
+    if effect_id not in ids:
         raise StateError(
             Problem(
                 where=f"effect {effect_id}",
                 what="is not in the model",
-                allowed=", ".join(names) or "the model has none",
+                allowed=", ".join(ids) or "the model has none",
             )
         )
-    k = names.index(effect_id)
+    k = ids.index(effect_id)
     before = compare(aligned, file.fitted, file.covariance)
-    found = fit(aligned, file.fitted[:k] + file.fitted[k + 1 :], before.floor.by_axis_um)
-    rest = replace(file, declared=file.declared[:k] + file.declared[k + 1 :])
-    return _change(rest, file, found, before, "remove", effect_id, date)
+    result = fit(aligned, file.fitted[:k] + file.fitted[k + 1 :], before.floor.by_axis_um)
+    reduced = replace(file, declared=file.declared[:k] + file.declared[k + 1 :])
+    return _change(reduced, file, result, before, "remove", effect_id, date)
 
 
 def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
-    """Fit all effects again, shape constants as they are. Raises StateError where there are none."""
+    """Fit all effects again from zero, nonlinear constants as they are. Raises StateError where there are none."""
     if not file.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, file.fitted, file.covariance)
-    found = fit(aligned, [_afresh(one, aligned.rows.links) for one in file.fitted], before.floor.by_axis_um)
-    return _change(file, file, found, before, "fit", "", date)
+    unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in file.fitted]
+    result = fit(aligned, unfitted, before.floor.by_axis_um)
+    return _change(file, file, result, before, "fit", "", date)
 
 
 def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
-    """The model before its last standing step; the ledger keeps both. Raises StateError where there is none."""
+    """The model before its last step that is not undone yet; the file keeps the step and its undoing.
+
+    where : the file, for messages. Raises StateError where there is no step to undo.
+    """
     standing = [k for k, step in enumerate(stored.steps) if step.kind != "undo" and not step.undone]
     if not standing:
         raise StateError(Problem(where=where, what="has no step to undo"))
     last = stored.steps[standing[-1]]
     steps = list(stored.steps)
     steps[standing[-1]] = replace(last, undone=True)
-    taken_back = ModelStep(
-        "undo",
-        last.effect,
-        date,
-        last.recording,
-        last.sha256,
-        last.rms_after_um,
-        last.rms_before_um,
-        last.noise_floor_um,
-        {},
+    undoing = ModelStep(
+        kind="undo",
+        effect=last.effect,
+        date=date,
+        recording=last.recording,
+        sha256=last.sha256,
+        rms_before_um=last.rms_after_um,
+        rms_after_um=last.rms_before_um,
+        noise_floor_um=last.noise_floor_um,
+        replaced={},
     )
-    return StoredModel(stored.machine, last.replaced, (*steps, taken_back), stored.geometry)
-
-
-def _afresh(one: FittedEffect, links: int) -> FittedEffect:
-    return initial_effect(one.effect, one.constants, links)
+    return StoredModel(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
 
 
 def _change(
-    file: ModelFile, old: ModelFile, found: FitResult, before: Comparison, kind: Kind, effect: str, date: str
+    file: ModelFile, old: ModelFile, result: FitResult, before: Comparison, kind: Kind, effect_id: str, date: str
 ) -> Change:
+    """Write the result of a fit and the step that led to it into the file, standard errors with disturbances.
+
+    file : with its declarations after the step.  old : the file before it.
+    """
     aligned = before.aligned
-    others = library_pool(aligned, list(load_library().values()), [one.effect.id for one in found.fitted])
-    found = with_disturbances(found, aligned, before.floor.by_axis_um, others.candidates)
-    after = compare(aligned, found.fitted, found.covariance)
-    recording = aligned.recording
+    criteria = Criteria()
+    fitted_ids = [fitted.effect.id for fitted in result.fitted]
+    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria)
+    result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
+    after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(
-        kind,
-        effect,
-        date,
-        recording.path.name,
-        recording.sha256,
-        before.rms_um,
-        after.rms_um,
-        after.floor.um,
-        old.state(aligned.rows.links),
+        kind=kind,
+        effect=effect_id,
+        date=date,
+        recording=aligned.recording.path.name,
+        sha256=aligned.recording.sha256,
+        rms_before_um=before.rms_um,
+        rms_after_um=after.rms_um,
+        noise_floor_um=after.floor.um,
+        replaced=old.state(aligned.rows.links),
     )
-    changed = replace(file, fitted=found.fitted, covariance=np.asarray(found.covariance), steps=(*old.steps, step))
+    changed = replace(file, fitted=result.fitted, covariance=np.asarray(result.covariance), steps=(*old.steps, step))
     return Change(changed, before, after)

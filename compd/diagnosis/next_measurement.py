@@ -1,4 +1,4 @@
-"""The next measurement: rows on which two rivals part, chosen one programme after another."""
+"""The next measurement: the rows that tell two rivals apart best, by T-optimal experimental design."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.measurement_programmes import ProgrammeLimits, Segment, rows_of, segments
-from compd.diagnosis.regression import solve
+from compd.comparison.least_squares import solve_ridge
+from compd.diagnosis.measurement_programmes import Programme, ProgrammeLimits, observe_programmes, programmes
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
@@ -22,16 +22,17 @@ from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file
 from compd.units import UM_PER_MM
 
-# Rows of one purpose teach less and less; what was measured already keeps its weight.
+# Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
 RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """Rows to measure: name -> values; what for; by how much the rivals will differ.
+    """Rows to measure.
 
-    separation : of each rival from the other after the measurement, in standard deviations of the noise, whole plan;
-    before : the same on the recording alone.
+    rivals : ids of the two effects.  rows : each column name -> value, in the columns of a recording.
+    separation : by how much the nearer rival will differ from the other on the recording and these rows together, in
+    standard deviations of the noise (root of the sum over all rows).  before : the same on the recording alone.
     """
 
     rivals: tuple[str, str]
@@ -40,34 +41,58 @@ class MeasurementPlan:
     before: float
 
     def write_to(self, stream: TextIO) -> None:
-        """As CSV."""
+        """Write the rows as CSV."""
         stream.write(plan_text(self.rows))
 
     def write(self, path: Path) -> None:
-        """As CSV. Raises RecordingError where it cannot be written."""
+        """Write the rows as CSV. Raises RecordingError where the file cannot be written."""
         write_plan_file(path, self.rows)
 
 
-class _Parting:
-    """One rival's effect, and how well the other can imitate it on all rows so far: least squares that grow."""
+class _ProgrammeSums(NamedTuple):
+    """What each of K programmes adds to a rival's refit: normal (K, p, p), score (K, p), square (K,)."""
 
-    def __init__(self, truth: FloatArray, imitation: FloatArray) -> None:
-        self.normal = imitation.T @ imitation
-        self.score = imitation.T @ truth
-        self.square = float(truth @ truth)
-
-    def left(self, normal: FloatArray, score: FloatArray, square: FloatArray) -> FloatArray:
-        """(K,) squares that cannot be imitated after adding each of K programmes."""
-        total = self.normal + normal
-        right = self.score + score
-        ridge = np.broadcast_to(RIDGE * np.diag(self.normal) + 1e-12, right.shape)
-        return np.asarray(self.square + square - (right * solve(total, right, ridge)).sum(axis=-1))
-
-    def add(self, normal: FloatArray, score: FloatArray, square: float) -> None:
-        self.normal, self.score, self.square = self.normal + normal, self.score + score, self.square + square
+    normal: FloatArray
+    score: FloatArray
+    square: FloatArray
 
 
-def plan(
+class _RivalRefit:
+    """Least squares of one effect's prediction by its rival's columns, on rows that grow by programmes.
+
+    With y what the effect predicts and A the columns of the rival and of the model, A^T A, A^T y and y^T y are kept.
+    """
+
+    def __init__(self, predicted: FloatArray, rival_columns: FloatArray) -> None:
+        """predicted : (n,).  rival_columns : (n, p)."""
+        self._normal = rival_columns.T @ rival_columns
+        self._score = rival_columns.T @ predicted
+        self._square = float(predicted @ predicted)
+
+    def discrepancy(self) -> float:
+        """Sum of squares that the rival cannot imitate."""
+        theta = solve_ridge(self._normal, self._score, self._ridge)
+        return self._square - float(self._score @ theta)
+
+    def discrepancies_with(self, sums: _ProgrammeSums) -> FloatArray:
+        """(K,) the same after adding each of K programmes."""
+        normal = self._normal + sums.normal
+        score = self._score + sums.score
+        theta = solve_ridge(normal, score, np.broadcast_to(self._ridge, score.shape))
+        return np.asarray(self._square + sums.square - (score * theta).sum(axis=-1))
+
+    def add(self, sums: _ProgrammeSums, k: int) -> None:
+        """Add the rows of programme k."""
+        self._normal = self._normal + sums.normal[k]
+        self._score = self._score + sums.score[k]
+        self._square = self._square + float(sums.square[k])
+
+    @property
+    def _ridge(self) -> FloatArray:
+        return np.asarray(RIDGE * np.diag(self._normal) + 1e-12)
+
+
+def plan_measurement(
     aligned: AlignedRecording,
     model: Sequence[FittedEffect],
     pair: tuple[FittedEffect, FittedEffect],
@@ -75,11 +100,28 @@ def plan(
     limits: ProgrammeLimits,
     rows: int,
 ) -> MeasurementPlan:
-    """The rows that separate two fitted rivals best, greedily: each programme adds most per row to the worse direction.
+    """The rows on which two fitted rivals differ most, however the other one is refitted.
 
-    model : the model's own effects, fitted along.  sigma_um : (m,) noise.  rows : how many may be measured.
-    (T-optimality: Atkinson and Fedorov, Biometrika 62 (1975) 57: the rival is refitted on every trial.)
-    Raises RecordingError where nothing can be planned.
+    The criterion is T-optimality (Atkinson and Fedorov, Biometrika 62 (1975) 57): with the prediction of rival 1 as
+    the truth, the sum of squares that rival 2 leaves with its best parameters, in variances of the noise, ::
+
+        T_12 = min_theta  sum_i |eta_1(x_i) - A_2(x_i) theta|^2 / sigma^2
+
+    and likewise T_21. The parameters of the model's effects are refitted along, and the recording's rows count. Where
+    a D-optimal design would make the parameters of one effect most precise, this one makes the wrong effect fail.
+    Programmes are added one at a time (the sequential construction of optimal designs: Fedorov, Theory of Optimal
+    Experiments (1972)), each the one that adds most per row to the smaller of the two; what a programme that was
+    chosen n times already adds counts 1 / (n + 1) of it, so that different programmes are taken.
+
+    model : the model's own effects.  pair : the rivals, fitted on the recording.  sigma_um : (m,) noise.
+    rows : how many may be measured at most.
+
+    Raises RecordingError for an external model, and where a place within the limits cannot be reached.
+
+    Example::
+
+        plan = plan_measurement(aligned, (), (spring, contact), sigma_um, recorded_limits(aligned), rows=30)
+        plan.before, plan.separation  # by how many standard deviations the two differ, before and after
     """
     if aligned.model is None:
         raise RecordingError(
@@ -89,87 +131,120 @@ def plan(
                 next_step="write a machine configuration",
             )
         )
-    links = aligned.rows.links
-    names = list(dict.fromkeys(name for one in pair for name in needed_quantities(one.effect, links)))
-    programmes = [one for one in segments(aligned, limits, names) if len(one) <= rows]
-    fresh = rows_of(aligned.model, aligned.rows.constants, programmes, aligned)
-    ports = {port for one in (*model, *pair) for port in one.effect.ports}
-    by = sensitivities(aligned.model, fresh, ports)
-
-    def of(one: FittedEffect) -> FloatArray:
-        basis, _ = one.effect.basis(fresh, one.constants, None)
-        found = effect_sensitivity(one.effect, fresh, basis, by)
-        return (
-            (found.link_length if aligned.of_links else found.tip)[:, list(aligned.axes)]
-            * UM_PER_MM
-            / sigma_um[:, None]
-        )
-
-    usable, _ = aligned.usable
-    old = [aligned.columns(one.effect, one.constants) * UM_PER_MM / sigma_um[:, None] for one in (*model, *pair)]
-    good = usable & np.all([np.isfinite(one).all(axis=(1, 2)) for one in old], axis=0)
-    new = [of(one) for one in (*model, *pair)]
-    ends = np.cumsum([0, *(len(one) for one in programmes)])
-    partings, steps = [], []
-    for a, b in ((len(model), len(model) + 1), (len(model) + 1, len(model))):
-        theta = (*model, *pair)[a].theta
-        others = [*range(len(model)), b]
-        held = np.concatenate([old[k][good] for k in others], axis=2).reshape(-1, sum(old[k].shape[2] for k in others))
-        partings.append(_Parting((old[a][good] @ theta).ravel(), held))
-        truth = new[a] @ theta
-        imitation = np.concatenate([new[k] for k in others], axis=2)
-        steps.append(_by_programme(truth, imitation, ends))
-    before = np.sqrt(max(min(parting.square - _explained(parting) for parting in partings), 0.0))
-    chosen: list[int] = []
-    length = np.diff(ends)
-    reached = np.array([parting.square - _explained(parting) for parting in partings])
-    while length.min() <= rows - sum(length[k] for k in chosen):
-        left = np.stack([parting.left(*step) for parting, step in zip(partings, steps, strict=True)])
-        gain = np.min(left - reached[:, None], axis=0) / length
-        gain[length > rows - sum(length[k] for k in chosen)] = -np.inf
-        gain[chosen] /= 1.0 + np.array([chosen.count(k) for k in chosen])
-        best = int(np.argmax(gain))
-        chosen.append(best)
-        for parting, (normal, score, square) in zip(partings, steps, strict=True):
-            parting.add(normal[best], score[best], float(square[best]))
-        reached = left[:, best]
-    order = sorted(set(chosen))
-    listed = [row for k in order for _ in range(chosen.count(k)) for row in _rows(programmes[k], fresh, ends[k], names)]
-    numbered = tuple({"row": number, **row} for number, row in enumerate(listed, start=1))
+    names = list(
+        dict.fromkeys(name for effect in pair for name in needed_quantities(effect.effect, aligned.rows.links))
+    )
+    possible = [programme for programme in programmes(aligned, limits, names) if len(programme) <= rows]
+    observations = observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
+    lengths = np.array([len(programme) for programme in possible])
+    ends = np.cumsum([0, *lengths])
+    refits, sums = _rival_refits(aligned, model, pair, sigma_um, observations, ends)
+    before = np.sqrt(max(min(refit.discrepancy() for refit in refits), 0.0))
+    chosen, discrepancy = _choose(refits, sums, lengths, rows)
+    planned = [
+        row
+        for k in sorted(set(chosen))
+        for _ in range(chosen.count(k))
+        for row in _rows_to_set(possible[k], observations, ends[k], names)
+    ]
     return MeasurementPlan(
-        (pair[0].effect.id, pair[1].effect.id), numbered, float(np.sqrt(max(reached.min(), 0.0))), float(before)
+        rivals=(pair[0].effect.id, pair[1].effect.id),
+        rows=tuple({"row": number, **row} for number, row in enumerate(planned, start=1)),
+        separation=float(np.sqrt(max(discrepancy, 0.0))),
+        before=float(before),
     )
 
 
-def _explained(parting: _Parting) -> float:
-    ridge = RIDGE * np.diag(parting.normal) + 1e-12
-    return float(parting.score @ solve(parting.normal, parting.score, ridge))
+def _rival_refits(
+    aligned: AlignedRecording,
+    model: Sequence[FittedEffect],
+    pair: tuple[FittedEffect, FittedEffect],
+    sigma_um: FloatArray,
+    observations: Observations,
+    ends: IntArray,
+) -> tuple[list[_RivalRefit], list[_ProgrammeSums]]:
+    """Each rival refitted to the other on the recording, and what each programme adds to that.
+
+    observations : rows of all programmes.  ends : (K + 1,) of each programme among them.
+    """
+    effects = (*model, *pair)
+    recorded = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM / sigma_um[:, None] for effect in effects]
+    usable, _ = aligned.usable
+    known = usable & np.all([np.isfinite(values).all(axis=(1, 2)) for values in recorded], axis=0)
+    new = _columns_on(aligned, observations, effects, sigma_um)
+    refits, sums = [], []
+    for truth, rival in ((len(model), len(model) + 1), (len(model) + 1, len(model))):
+        theta = effects[truth].theta
+        fitted = [*range(len(model)), rival]
+        rival_columns = np.concatenate([recorded[k][known] for k in fitted], axis=2)
+        refits.append(
+            _RivalRefit((recorded[truth][known] @ theta).ravel(), rival_columns.reshape(-1, rival_columns.shape[2]))
+        )
+        sums.append(_programme_sums(new[truth] @ theta, np.concatenate([new[k] for k in fitted], axis=2), ends))
+    return refits, sums
 
 
-def _by_programme(
-    truth: FloatArray, imitation: FloatArray, ends: np.ndarray[Any, Any]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Each programme's part of the normal equations: (K, p, p), (K, p), (K,)."""
+def _columns_on(
+    aligned: AlignedRecording, observations: Observations, effects: Sequence[FittedEffect], sigma_um: FloatArray
+) -> list[FloatArray]:
+    """(R, m, P) of each effect: whitened columns on rows that were not measured yet."""
+    assert aligned.model is not None
+    by_port = sensitivities(aligned.model, observations, {port for effect in effects for port in effect.effect.ports})
+    whitened = []
+    for effect in effects:
+        basis, _ = effect.effect.basis(observations, effect.constants, None)
+        predicted = effect_sensitivity(effect.effect, observations, basis, by_port)
+        measured = (predicted.link_length if aligned.of_links else predicted.tip)[:, list(aligned.axes)]
+        whitened.append(measured * UM_PER_MM / sigma_um[:, None])
+    return whitened
+
+
+def _programme_sums(predicted: FloatArray, rival_columns: FloatArray, ends: IntArray) -> _ProgrammeSums:
+    """Sums over the rows of each programme of predicted (R, m) and rival_columns (R, m, p)."""
     normal, score, square = [], [], []
     for begin, end in pairwise(ends):
-        A = imitation[begin:end].reshape(-1, imitation.shape[2])
-        y = truth[begin:end].ravel()
+        A = rival_columns[begin:end].reshape(-1, rival_columns.shape[2])
+        y = predicted[begin:end].ravel()
         normal.append(A.T @ A)
         score.append(A.T @ y)
         square.append(y @ y)
-    return np.stack(normal), np.stack(score), np.array(square)
+    return _ProgrammeSums(np.stack(normal), np.stack(score), np.array(square))
 
 
-def _rows(one: Segment, fresh: Observations, begin: int, names: Sequence[str]) -> list[dict[str, Any]]:
-    """What a person sets, row by row, in the columns of a recording where there are such."""
+def _choose(
+    refits: Sequence[_RivalRefit], sums: Sequence[_ProgrammeSums], lengths: IntArray, rows: int
+) -> tuple[list[int], float]:
+    """Programmes in the order in which they are chosen, and the smaller discrepancy with all of them."""
+    chosen: list[int] = []
+    reached = np.array([refit.discrepancy() for refit in refits])
+    while lengths.min() <= (rows_left := rows - sum(lengths[k] for k in chosen)):
+        discrepancies = np.stack([refit.discrepancies_with(parts) for refit, parts in zip(refits, sums, strict=True)])
+        gain_per_row = np.min(discrepancies - reached[:, None], axis=0) / lengths
+        gain_per_row[lengths > rows_left] = -np.inf
+        gain_per_row[chosen] /= 1.0 + np.array([chosen.count(k) for k in chosen])
+        best = int(np.argmax(gain_per_row))
+        chosen.append(best)
+        for refit, parts in zip(refits, sums, strict=True):
+            refit.add(parts, best)
+        reached = discrepancies[:, best]
+    return chosen, float(reached.min())
+
+
+def _rows_to_set(
+    programme: Programme, observations: Observations, begin: int, names: Sequence[str]
+) -> list[dict[str, Any]]:
+    """What a person sets in each row of a programme, by column of the plan's file.
+
+    begin : the programme's first row among the observations.  names : quantities to be set.
+    """
     return [
         plan_row(
-            one.purpose,
-            one.time_s[k],
-            one.tip_M_mm[k],
-            {name: fresh.quantities[name][begin + k] for name in names},
-            fresh.direction[begin + k],
-            np.abs(fresh.velocity_mm_per_s[begin + k]).max(),
+            programme.purpose,
+            programme.time_s[k],
+            programme.tip_M_mm[k],
+            {name: observations.quantities[name][begin + k] for name in names},
+            observations.direction[begin + k],
+            np.abs(observations.velocity_mm_per_s[begin + k]).max(),
         )
-        for k in range(len(one))
+        for k in range(len(programme))
     ]

@@ -1,7 +1,8 @@
-"""What the rows say for and against a set of candidates: whitened least squares, fitted here and tested there.
+"""Whitened least squares with a ridge from plausible ranges, and losses on folds that the fit has not seen.
 
-Everything is linear in the fitted numbers to within 1e-5 (the effects are small), so that sums of products over each
-fold answer every question about any set; the real forward model is asked again when numbers are stated.
+The prediction is linear in the parameters to within 1e-5, the effects being small. All questions about any set of
+candidates are therefore answered from sums of products over each fold (normal equations), without another pass over
+the rows; the forward model itself is fitted again only for the effects that are named.
 """
 
 from __future__ import annotations
@@ -14,183 +15,191 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.least_squares import ridge_inverse, solve_ridge
 
-# A fold that holds more than this share of what a candidate does cannot be predicted from the others.
-MOST_IN_ONE_FOLD = 0.9
-# For numbers of which nothing is known: in units of the column's own size, next to nothing.
+# Ridge of a parameter without a plausible range, as a share of its column's sum of squares: conditioning alone.
 LEAST_RIDGE = 1e-9
-# Sets are solved together in batches of about so many numbers of normal equations.
+# Sets of columns are solved in batches of about so many elements of normal equations.
 BATCH = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """Some columns, whitened: values (R, m, P) in standard deviations of the noise, largest (P,) as in a Candidate."""
+class Regressors:
+    """Columns of a linear model on R rows with m coordinates each.
+
+    values : (R, m, P) by how many standard deviations of the noise each parameter moves the prediction.
+    largest : (P,) largest plausible size of each parameter; inf where nothing is known of it.
+    """
 
     values: FloatArray
     largest: FloatArray
 
     @cached_property
     def ridge(self) -> FloatArray:
-        """(P,) what a plausible range says: one measurement of nought with the range as its standard deviation.
+        """(P,) ridge of each parameter: 1 / largest^2 + LEAST_RIDGE |column|^2.
 
-        It bounds what the rows do not determine and is felt nowhere else.
+        The plausible range counts as one measurement of zero with the range as its standard deviation. It bounds what
+        the rows do not determine, and is negligible against what they do.
         """
-        size = (self.values**2).sum(axis=(0, 1))
-        return np.asarray(1.0 / self.largest**2 + LEAST_RIDGE * size + 1e-300)
+        sum_of_squares = (self.values**2).sum(axis=(0, 1))
+        return np.asarray(1.0 / self.largest**2 + LEAST_RIDGE * sum_of_squares + 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """R rows of m coordinates, whitened: the residual in standard deviations of the noise.
+class RegressionData:
+    """The residual that candidates are to explain, whitened, and how its rows are divided.
 
-    y : (R, m).  folds : schemes, each (R,) numbered from 0.  group : (R,) neighbouring rows that may hang together.
-    always : what every fit holds: the model's own numbers, and the instrument's frame.
+    y : (R, m) residual in standard deviations of the noise.
+    splits : each (R,), the fold of each row, numbered from 0.
+    block : (R,) block of neighbouring rows within which residuals may be correlated, numbered from 0.
+    nuisance : columns of what every fit contains: the effects of the model, and the instrument's frame.
     """
 
     y: FloatArray
-    folds: tuple[IntArray, ...]
-    group: IntArray
-    always: Block
+    splits: tuple[IntArray, ...]
+    block: IntArray
+    nuisance: Regressors
 
     @property
-    def numbers(self) -> int:
-        """Measured values."""
+    def value_count(self) -> int:
+        """Number of measured values, R m."""
         return int(self.y.size)
 
-    def sums(self, columns: FloatArray, others: FloatArray) -> FloatArray:
-        """(F, P, Q) products of columns (R, m, P) and (R, m, Q), summed over each fold of each scheme in turn."""
-        found = []
-        for fold in self.folds:
-            for k in range(int(fold.max()) + 1):
-                rows = fold == k
-                found.append(columns[rows].reshape(-1, columns.shape[2]).T @ others[rows].reshape(-1, others.shape[2]))
-        return np.stack(found)
-
     @cached_property
-    def scheme(self) -> IntArray:
-        """(F,) the scheme of each fold, in the order of `sums`."""
-        return np.concatenate([np.full(int(fold.max()) + 1, k) for k, fold in enumerate(self.folds)])
+    def split_of_fold(self) -> IntArray:
+        """(F,) to which split each fold belongs; the folds of all splits one after the other."""
+        return np.concatenate([np.full(int(fold.max()) + 1, number) for number, fold in enumerate(self.splits)])
 
     @cached_property
     def squares(self) -> FloatArray:
-        """(F,) the residual's squares in each fold."""
-        return self.sums(self.y[:, :, None], self.y[:, :, None])[:, 0, 0]
+        """(F,) sum of squares of the residual in each fold."""
+        return self.products(self.y[:, :, None], self.y[:, :, None])[:, 0, 0]
+
+    def products(self, columns: FloatArray, others: FloatArray) -> FloatArray:
+        """(F, P, Q) products of columns (R, m, P) and others (R, m, Q), summed over the rows of each fold."""
+        sums = []
+        for fold in self.splits:
+            for k in range(int(fold.max()) + 1):
+                rows = fold == k
+                sums.append(columns[rows].reshape(-1, columns.shape[2]).T @ others[rows].reshape(-1, others.shape[2]))
+        return np.stack(sums)
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
-    """Everything about some columns that least squares needs, by fold: gram (F, C, C), score (F, C), ridge (C,)."""
+class NormalEquations:
+    """Normal equations of C columns on each of F folds: all that least squares on any of the columns needs.
 
-    evidence: Evidence
+    gram : (F, C, C) A_f^T A_f.  score : (F, C) A_f^T y_f.  ridge : (C,) lambda, once per fit.
+
+    Without fold f of a split, the parameters are::
+
+        theta_f = (sum_{g != f} A_g^T A_g + diag(lambda))^-1  sum_{g != f} A_g^T y_g
+
+    and the loss on the fold that was left out is |y_f - A_f theta_f|^2, which the sums give as::
+
+        y_f^T y_f - 2 theta_f^T A_f^T y_f + theta_f^T A_f^T A_f theta_f
+
+    (Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 3.4.1 ridge regression and
+    7.10 cross-validation.) An example, one column without noise, four rows in two folds::
+
+        data = RegressionData(y, (np.array([0, 0, 1, 1]),), np.arange(4), Regressors(np.zeros((4, 1, 0)), np.zeros(0)))
+        equations, (index,) = normal_equations(data, [Regressors(column, np.array([np.inf]))])
+        equations.cv_losses([index], np.array([[True]]))  # about 0.0: each fold predicts the other
+    """
+
+    data: RegressionData
     gram: FloatArray
     score: FloatArray
     ridge: FloatArray
 
-    def held_out(self, sets: Sequence[IntArray], counts: BoolArray) -> FloatArray:
-        """(S,) mean square left in rows that were left out, in squares of the noise, for sets of columns.
+    def testable_splits(self, index: IntArray, most_in_one_fold: float) -> BoolArray:
+        """(splits,) whether no fold of a split holds more than a share of the columns' sum of squares.
 
-        counts : (S, schemes) whether a scheme counts for a set; nan where none does. What is compared is the gain
-        over no candidate, so that schemes that do not count do no harm.
+        What acts in one fold alone cannot be learned from the others. Each column counts in units of its ridge.
         """
-        found = np.full(len(sets), np.nan)
-        size = np.array([len(one) for one in sets])
-        for p in np.unique(size):
-            members = np.flatnonzero(size == p)
-            step = max(1, BATCH // (len(self.gram) * max(int(p), 1) ** 2))
-            for begin in range(0, len(members), step):
-                part = members[begin : begin + step]
-                found[part] = self._held_out(np.stack([sets[k] for k in part]), counts[part])
-        return found
+        size = (self.gram[:, index, index] / self.ridge[index]).sum(axis=1)
+        split = self.data.split_of_fold
+        shares = [size[split == k].max() / max(size[split == k].sum(), 1e-300) for k in range(split.max() + 1)]
+        return np.array(shares) <= most_in_one_fold
 
-    def learnable(self, index: IntArray) -> BoolArray:
-        """(schemes,) whether the columns' work is spread over the folds, so that each can be predicted from others."""
-        work = (self.gram[:, index, index] / self.ridge[index]).sum(axis=1)
-        scheme = self.evidence.scheme
-        shares = [work[scheme == k].max() / max(work[scheme == k].sum(), 1e-300) for k in range(scheme.max() + 1)]
-        return np.array(shares) <= MOST_IN_ONE_FOLD
+    def cv_losses(self, sets: Sequence[IntArray], testable: BoolArray) -> FloatArray:
+        """(S,) cross-validated loss of each set of columns: mean square per value on rows that were left out.
+
+        testable : (S, splits) which splits count for a set. The loss is that of the nuisance columns, averaged over
+        all splits, less the gain over them, averaged over the splits that count; nan where none counts.
+        """
+        losses = np.full(len(sets), np.nan)
+        sizes = np.array([len(index) for index in sets])
+        for size in np.unique(sizes):
+            places = np.flatnonzero(sizes == size)
+            step = max(1, BATCH // (len(self.gram) * max(int(size), 1) ** 2))
+            for begin in range(0, len(places), step):
+                batch = places[begin : begin + step]
+                losses[batch] = self._cv_losses_of_one_size(np.stack([sets[k] for k in batch]), testable[batch])
+        return losses
+
+    def _cv_losses_of_one_size(self, index: IntArray, testable: BoolArray) -> FloatArray:
+        gain_by_fold = self.nuisance_fold_losses - self.fold_losses(index)
+        split = self.data.split_of_fold
+        gain = np.stack([gain_by_fold[:, split == k].sum(axis=1) for k in range(split.max() + 1)], axis=1)
+        counted = np.where(testable, gain, 0.0).sum(axis=1)
+        mean = counted / np.maximum(testable.sum(axis=1), 1) / self.data.value_count
+        return np.asarray(np.where(testable.any(axis=1), self.nuisance_cv_loss - mean, np.nan))
 
     def fold_losses(self, index: IntArray) -> FloatArray:
-        """(S, F) squares left in each fold by the numbers learned from the scheme's other folds; index (S, p)."""
-        evidence = self.evidence
+        """(S, F) sum of squares left in each fold by parameters learned from the split's other folds; index (S, p)."""
         gram = self.gram[:, index[:, :, None], index[:, None, :]].swapaxes(0, 1)  # (S, F, p, p)
         score = self.score[:, index].swapaxes(0, 1)
-        found = np.empty(gram.shape[:2])
-        for k in range(len(evidence.folds)):
-            folds = evidence.scheme == k
+        losses = np.empty(gram.shape[:2])
+        for k in range(len(self.data.splits)):
+            folds = self.data.split_of_fold == k
             normal = gram[:, folds].sum(axis=1, keepdims=True) - gram[:, folds]
             right = score[:, folds].sum(axis=1, keepdims=True) - score[:, folds]
-            theta = solve(normal, right, self.ridge[index][:, None])
-            left = evidence.squares[folds] - 2 * (theta * score[:, folds]).sum(axis=2)
-            found[:, folds] = left + np.einsum("sfp,sfpq,sfq->sf", theta, gram[:, folds], theta)
-        return found
+            theta = solve_ridge(normal, right, self.ridge[index][:, None])
+            left = self.data.squares[folds] - 2 * (theta * score[:, folds]).sum(axis=2)
+            losses[:, folds] = left + np.einsum("sfp,sfpq,sfq->sf", theta, gram[:, folds], theta)
+        return losses
 
-    def theta_by_fold(self, index: IntArray, scheme: int) -> FloatArray:
-        """(folds of the scheme, p) numbers learned from the scheme's other folds."""
-        folds = self.evidence.scheme == scheme
+    def theta_by_fold(self, index: IntArray, split: int) -> FloatArray:
+        """(folds of the split, p) parameters learned from the split's other folds."""
+        folds = self.data.split_of_fold == split
         gram = self.gram[folds][:, index[:, None], index]
         score = self.score[folds][:, index]
-        return solve(
+        return solve_ridge(
             gram.sum(axis=0) - gram, score.sum(axis=0) - score, np.broadcast_to(self.ridge[index], score.shape)
         )
 
-    def _held_out(self, index: IntArray, counts: BoolArray) -> FloatArray:
-        saved = self.base_losses - self.fold_losses(index)
-        scheme = self.evidence.scheme
-        gain = np.stack([saved[:, scheme == k].sum(axis=1) for k in range(scheme.max() + 1)], axis=1)
-        mean = np.where(counts, gain, 0.0).sum(axis=1) / np.maximum(counts.sum(axis=1), 1) / self.evidence.numbers
-        return np.asarray(np.where(counts.any(axis=1), self.base - mean, np.nan))
-
     @cached_property
-    def base_losses(self) -> FloatArray:
-        """(F,) what is left in each fold without any candidate."""
-        return np.asarray(self.fold_losses(np.arange(self.evidence.always.values.shape[2])[None])[0])
+    def nuisance_fold_losses(self) -> FloatArray:
+        """(F,) sum of squares left in each fold by the nuisance columns alone."""
+        return np.asarray(self.fold_losses(np.arange(self.data.nuisance.values.shape[2])[None])[0])
 
     @property
-    def base(self) -> float:
-        """Mean square left without any candidate, held out, averaged over the schemes."""
-        return float(self.base_losses.sum()) / (len(self.evidence.folds) * self.evidence.numbers)
+    def nuisance_cv_loss(self) -> float:
+        """Cross-validated loss of the nuisance columns alone, averaged over the splits."""
+        return float(self.nuisance_fold_losses.sum()) / (len(self.data.splits) * self.data.value_count)
 
-    def fitted(self, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
-        """Numbers (p,), their covariance (p, p) at unit noise, and the mean square left, on all rows."""
-        scheme = self.evidence.scheme == 0
-        normal = self.gram[scheme][:, index[:, None], index].sum(axis=0)
-        score = self.score[scheme][:, index].sum(axis=0)
-        inverse = _inverse(normal, self.ridge[index])
-        theta = inverse @ score
-        left = float(self.evidence.squares[scheme].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
-        return theta, inverse, left / self.evidence.numbers
+    def estimate(self, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
+        """Parameters (p,) fitted on all rows, their covariance (p, p) at unit noise, and the mean square left."""
+        folds = self.data.split_of_fold == 0
+        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
+        score = self.score[folds][:, index].sum(axis=0)
+        covariance = ridge_inverse(normal, self.ridge[index])
+        theta = covariance @ score
+        left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
+        return theta, covariance, left / self.data.value_count
 
 
-def sums(evidence: Evidence, blocks: Sequence[Block]) -> tuple[Sums, list[IntArray]]:
-    """The sums of `always` and the blocks, and where each block's columns are among them."""
-    every = [evidence.always, *blocks]
-    columns = np.concatenate([block.values for block in every], axis=2)
-    ends = np.cumsum([block.values.shape[2] for block in every])
-    places = [np.arange(a, b) for a, b in pairwise(ends)]
-    found = Sums(
-        evidence,
-        evidence.sums(columns, columns),
-        evidence.sums(columns, evidence.y[:, :, None])[:, :, 0],
-        np.concatenate([block.ridge for block in every]),
+def normal_equations(data: RegressionData, candidates: Sequence[Regressors]) -> tuple[NormalEquations, list[IntArray]]:
+    """Normal equations of the nuisance columns and all candidates, and the index of each candidate's columns."""
+    blocks = [data.nuisance, *candidates]
+    columns = np.concatenate([block.values for block in blocks], axis=2)
+    ends = np.cumsum([block.values.shape[2] for block in blocks])
+    indices = [np.arange(begin, end) for begin, end in pairwise(ends)]
+    equations = NormalEquations(
+        data,
+        data.products(columns, columns),
+        data.products(columns, data.y[:, :, None])[:, :, 0],
+        np.concatenate([block.ridge for block in blocks]),
     )
-    return found, places
-
-
-def solve(normal: FloatArray, right: FloatArray, ridge: FloatArray) -> FloatArray:
-    """(..., p) ridge least squares from normal equations (..., p, p), (..., p), ridge (..., p)."""
-    p = normal.shape[-1]
-    if p == 0:
-        return right
-    held = normal + ridge[..., None] * np.eye(p)
-    size = np.sqrt(np.diagonal(held, axis1=-2, axis2=-1))
-    scaled = held / (size[..., :, None] * size[..., None, :]) + 1e-11 * np.eye(p)
-    return np.asarray(np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size)
-
-
-def _inverse(normal: FloatArray, ridge: FloatArray) -> FloatArray:
-    p = len(normal)
-    held = normal + ridge * np.eye(p)
-    size = np.sqrt(np.diagonal(held))
-    scaled = held / np.outer(size, size) + 1e-11 * np.eye(p)
-    return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
+    return equations, indices

@@ -1,4 +1,4 @@
-"""By chance? Every candidate's score beside the scores that noise with the same coherence would have got."""
+"""How probable a candidate's score is by noise alone: max-T test with a wild (sign-flip) bootstrap over blocks."""
 
 from __future__ import annotations
 
@@ -8,57 +8,76 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 
-# 1 / (FLIPS + 1) is the smallest chance that can be stated.
-FLIPS = 999
+# Resamples: 1 / (SIGN_FLIPS + 1) is the smallest p-value that can be stated.
+SIGN_FLIPS = 999
 SEED = 20260
 
 
-class Projection:
-    """Takes from columns what others (R, m, Q) explain."""
+class OrthogonalComplement:
+    """Projection on what `columns` (R, m, Q) do not explain, by least squares on all rows: I - Q Q^T.
 
-    def __init__(self, others: FloatArray) -> None:
-        self._q, _ = np.linalg.qr(others.reshape(others.shape[0] * others.shape[1], others.shape[2]))
+    What is left of a residual and of a candidate's columns gives the candidate's part in a joint fit (Frisch, Waugh,
+    Econometrica 1 (1933) 387; Lovell, J. Am. Stat. Assoc. 58 (1963) 993).
+    """
 
-    def __call__(self, columns: FloatArray) -> FloatArray:
-        """(R, m, P), or (R, m)."""
-        flat = columns.reshape(len(self._q), -1)
-        return np.asarray((flat - self._q @ (self._q.T @ flat)).reshape(columns.shape))
+    def __init__(self, columns: FloatArray) -> None:
+        self._q, _ = np.linalg.qr(columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2]))
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """The projection of (R, m, P) or (R, m)."""
+        flat = values.reshape(len(self._q), -1)
+        return np.asarray((flat - self._q @ (self._q.T @ flat)).reshape(values.shape))
 
 
-def chances(families: Sequence[Sequence[FloatArray]], y: FloatArray, left: FloatArray, group: IntArray) -> FloatArray:
-    """(K,) chance that noise alone would let the best of all families look as good as each does; searches included.
+def p_values(families: Sequence[Sequence[FloatArray]], y: FloatArray, noise: FloatArray, block: IntArray) -> FloatArray:
+    """(K,) probability that noise alone lets the best of all K families score as high as each family does.
 
-    families : K lists of a candidate's variants, each (R, m, P), projected on what every fit holds.
-    y : (R, m) whitened residual, projected likewise.  left : what the best fit leaves of it: flipped is the noise,
-    not the effect, so that an effect that acts in few blocks can be proven.  group : (R,) blocks that are flipped
-    whole, by which rows that hang together stay together.
-    Max-T: each family's best variant, in standard deviations of its own chance distribution, against the maximum over
-    all families. (Wild bootstrap: Cameron, Gelbach, Miller 2008; maximum: Westfall and Young 1993.)
+    The score of a candidate A (R, m, P) is the sum of squares that it explains, |A A^+ y|^2, that of a family its
+    best variant's. Its distribution under noise is sampled by flipping the signs of whole blocks of the noise, by
+    which rows that are correlated stay together (wild cluster bootstrap: Cameron, Gelbach, Miller, Review of Economics
+    and Statistics 90 (2008) 414). Scores are standardized by that distribution, and each is compared with the maximum
+    over all families in the same resample::
+
+        t_k = (score_k - mean_b score_kb) / std_b score_kb
+        p_k = (1 + #{b : max_j t_jb >= t_k}) / (SIGN_FLIPS + 1)
+
+    which controls the probability of even one false finding among all that were tried, nonlinear constants included
+    (max-T: Westfall and Young, Resampling-Based Multiple Testing (1993); Romano and Wolf, Econometrica 73 (2005)
+    1237).
+
+    families : each a list of variants of one candidate, (R, m, P), orthogonal to the nuisance columns.
+    y : (R, m) whitened residual, orthogonal likewise.
+    noise : (R, m) what the best explanation leaves of y. It is flipped in place of y, so that an effect which acts in
+        few blocks can still be proven.
+    block : (R,) block of each row, numbered from 0.
+
+    For example, of two candidates of which the first is in the residual::
+
+        p_values([[first], [second]], y, OrthogonalComplement(first)(y), block)  # array([0.001, 0.6])
     """
     if not families:
         return np.zeros(0)
     rng = np.random.default_rng(SEED)
-    blocks = int(group.max()) + 1
-    signs = rng.choice((-1.0, 1.0), (FLIPS, blocks))
-    found = np.empty((FLIPS + 1, len(families)))
+    signs = rng.choice((-1.0, 1.0), (SIGN_FLIPS, int(block.max()) + 1))
+    scores = np.empty((SIGN_FLIPS + 1, len(families)))
     for k, variants in enumerate(families):
-        found[:, k] = np.max([_scores(columns, y, left, group, signs) for columns in variants], axis=0)
-    by_chance = found[1:]
-    spread = np.maximum(by_chance.std(axis=0), 1e-12)
-    standing = (found - by_chance.mean(axis=0)) / spread
-    largest = standing[1:].max(axis=1)
-    return np.asarray((1 + (largest[:, None] >= standing[0]).sum(axis=0)) / (FLIPS + 1))
+        scores[:, k] = np.max([_scores(columns, y, noise, block, signs) for columns in variants], axis=0)
+    by_noise = scores[1:]
+    spread = np.maximum(by_noise.std(axis=0), 1e-12)
+    standardized = (scores - by_noise.mean(axis=0)) / spread
+    largest = standardized[1:].max(axis=1)
+    return np.asarray((1 + (largest[:, None] >= standardized[0]).sum(axis=0)) / (SIGN_FLIPS + 1))
 
 
-def _scores(columns: FloatArray, y: FloatArray, left: FloatArray, group: IntArray, signs: FloatArray) -> FloatArray:
-    """(FLIPS + 1,) squares explained of y, then of `left` with its blocks' signs flipped."""
+def _scores(columns: FloatArray, y: FloatArray, noise: FloatArray, block: IntArray, signs: FloatArray) -> FloatArray:
+    """(SIGN_FLIPS + 1,) sum of squares explained of y, then of the noise with the signs of its blocks flipped."""
     flat = columns.reshape(-1, columns.shape[2])
     values, vectors = np.linalg.eigh(flat.T @ flat)
-    good = values > 1e-9 * max(float(values.max()), 1e-300)
-    if not good.any():
+    determined = values > 1e-9 * max(float(values.max()), 1e-300)
+    if not determined.any():
         return np.zeros(len(signs) + 1)
-    unit = columns @ (vectors[:, good] / np.sqrt(values[good]))
-    rows = np.einsum("rmp,rm->rp", unit, left)
-    by_block = np.stack([np.bincount(group, column, minlength=signs.shape[1]) for column in rows.T], axis=1)
-    score = np.einsum("rmp,rm->p", unit, y)
+    orthonormal = columns @ (vectors[:, determined] / np.sqrt(values[determined]))
+    by_row = np.einsum("rmp,rm->rp", orthonormal, noise)
+    by_block = np.stack([np.bincount(block, column, minlength=signs.shape[1]) for column in by_row.T], axis=1)
+    score = np.einsum("rmp,rm->p", orthonormal, y)
     return np.concatenate([[float(score @ score)], ((signs @ by_block) ** 2).sum(axis=1)])

@@ -1,4 +1,4 @@
-"""Which few candidates explain the residual: every one, every pair, the best triples, each on rows left out."""
+"""Best-subset selection: every candidate, every pair and the best triples, compared on rows that were left out."""
 
 from __future__ import annotations
 
@@ -11,160 +11,201 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.diagnosis.candidates import Candidate
-from compd.diagnosis.regression import Block, Evidence, Sums, sums
-from compd.diagnosis.selection import cost, plausible, untestable
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.regression import NormalEquations, RegressionData, Regressors, normal_equations
+from compd.diagnosis.selection import is_plausible, is_undetermined, penalty
 
-# Pairs that are extended to triples, and sets that are looked at for a plausible one.
+# Pairs that are extended to triples: all triples of 50 candidates would be 20,000.
 BEST_PAIRS = 15
-
-# What a member must take away of the error that is above the floor without it.
-LEAST_REMOVED = 0.6
-
-Members = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A set of candidates: loss, the mean square it leaves in left-out rows, in squares of the floor."""
+class Subset:
+    """Candidates by their place in the search, and the cross-validated loss that they leave.
 
-    members: Members
-    loss: float
+    cv_loss : mean square per value on rows that were left out, in squares of the noise floor.
+    """
+
+    members: tuple[int, ...]
+    cv_loss: float
 
 
-class Contest:
-    """Candidates against each other on one residual."""
+class SubsetSearch:
+    """Selects the few candidates that explain one residual.
 
-    def __init__(self, evidence: Evidence, candidates: Sequence[Candidate], values: Sequence[FloatArray]) -> None:
-        """values : each candidate's columns (R, m, P), whitened, on the evidence's rows."""
-        self.evidence, self.candidates, self.values = evidence, tuple(candidates), tuple(values)
-        blocks = [Block(v, c.largest) for v, c in zip(values, candidates, strict=True)]
-        self.sums: Sums
-        self.sums, self._places = sums(evidence, blocks)
-        self._held = np.arange(evidence.always.values.shape[2])
-        self._learnable = np.array([self.sums.learnable(place) for place in self._places]).reshape(
-            len(candidates), len(evidence.folds)
-        )
+    The best subset S minimizes the cross-validated loss and a penalty for each member::
+
+        L(S) + sum_{k in S} penalty_k,    penalty_k = factor_k max(least_gain, form_error (L(0) - 1))
+
+    among the subsets whose parameters are all plausible and whose members are all needed. Subsets of three and fewer
+    are searched exhaustively, but for triples, which extend the best pairs alone. (Best-subset selection with a
+    penalty on size: Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 3.3.1, 7.10.)
+
+    Example::
+
+        search = SubsetSearch(data, pool.candidates, values, Criteria())
+        [search.name(k) for k in search.best_subset().members]  # ["link_elasticity", "scale_expansion"]
+    """
+
+    def __init__(
+        self,
+        data: RegressionData,
+        candidates: Sequence[Candidate],
+        values: Sequence[FloatArray],
+        criteria: Criteria,
+    ) -> None:
+        """values : columns (R, m, P) of each candidate, whitened, on the rows of the data."""
+        self.data, self.candidates, self.values, self.criteria = data, tuple(candidates), tuple(values), criteria
+        regressors = [Regressors(v, candidate.largest) for v, candidate in zip(values, candidates, strict=True)]
+        self.equations: NormalEquations
+        self.equations, self._indices = normal_equations(data, regressors)
+        self._nuisance_index = np.arange(data.nuisance.values.shape[2])
+        self._testable = np.array(
+            [self.equations.testable_splits(index, criteria.most_in_one_fold) for index in self._indices]
+        ).reshape(len(candidates), len(data.splits))
 
     @property
-    def base(self) -> float:
-        """Mean square left by no candidate."""
-        return self.sums.base
-
-    def index(self, members: Members) -> IntArray:
-        """Columns of a set among the sums."""
-        return np.concatenate([self._held, *(self._places[k] for k in members)]).astype(np.int64)
-
-    def entries(self, sets: Sequence[Members]) -> list[Entry]:
-        """Sets that can be tested, with their losses."""
-        if not sets:
-            return []
-        counts = np.array([self._learnable[list(one)].all(axis=0) for one in sets])  # of no member: all
-        losses = self.sums.held_out([self.index(one) for one in sets], counts)
-        return [Entry(one, float(loss)) for one, loss in zip(sets, losses, strict=True) if np.isfinite(loss)]
-
-    @cached_property
-    def singles(self) -> list[Entry]:
-        """Every candidate alone, the best first."""
-        found = self.entries([(k,) for k in range(len(self.candidates))])
-        return sorted(found, key=lambda one: one.loss)
-
-    @cached_property
-    def best_variant(self) -> dict[str, Entry]:
-        """Each effect's best choice of shape constants, alone."""
-        found: dict[str, Entry] = {}
-        for one in self.singles:
-            found.setdefault(self.name(one.members[0]), one)
-        return found
+    def baseline(self) -> float:
+        """Cross-validated loss without any candidate, L(0)."""
+        return self.equations.nuisance_cv_loss
 
     def name(self, member: int) -> str:
-        """The effect's id."""
+        """The id of a candidate's effect."""
         return self.candidates[member].name
 
+    def evaluate(self, subsets: Sequence[tuple[int, ...]]) -> list[Subset]:
+        """Cross-validated losses; subsets that no split can test are left out."""
+        if not subsets:
+            return []
+        testable = np.array([self._testable[list(members)].all(axis=0) for members in subsets])  # of no member: all
+        losses = self.equations.cv_losses([self._index(members) for members in subsets], testable)
+        return [
+            Subset(members, float(loss)) for members, loss in zip(subsets, losses, strict=True) if np.isfinite(loss)
+        ]
+
     @cached_property
-    def sets(self) -> list[Entry]:
+    def singles(self) -> list[Subset]:
+        """Every candidate alone, the best first."""
+        return sorted(self.evaluate([(k,) for k in range(len(self.candidates))]), key=lambda subset: subset.cv_loss)
+
+    @cached_property
+    def best_variants(self) -> dict[str, Subset]:
+        """By effect, its best choice of nonlinear constants, alone."""
+        variants: dict[str, Subset] = {}
+        for subset in self.singles:
+            variants.setdefault(self.name(subset.members[0]), subset)
+        return variants
+
+    @cached_property
+    def subsets(self) -> list[Subset]:
         """Singles, pairs, and triples that extend the best pairs."""
-        everyone = [entry.members[0] for entry in self.singles]
-        pairs = self.entries([(a, b) for a, b in combinations(everyone, 2) if self.name(a) != self.name(b)])
-        pairs.sort(key=lambda one: one.loss)
+        singles = [subset.members[0] for subset in self.singles]
+        pairs = self.evaluate([(a, b) for a, b in combinations(singles, 2) if self.name(a) != self.name(b)])
+        pairs.sort(key=lambda subset: subset.cv_loss)
         triples = {
             tuple(sorted((*pair.members, k)))
             for pair in pairs[:BEST_PAIRS]
-            for k in everyone
-            if self.name(k) not in [self.name(one) for one in pair.members]
+            for k in singles
+            if self.name(k) not in [self.name(member) for member in pair.members]
         }
-        return [*self.singles, *pairs, *self.entries(sorted(triples))]
+        return [*self.singles, *pairs, *self.evaluate(sorted(triples))]
 
-    def score(self, entry: Entry) -> float:
-        """What it leaves and what its members cost; least is best."""
-        explained = max(self.base - 1.0, 0.0)
-        return entry.loss + sum(cost(explained, self.candidates[k].price) for k in entry.members)
+    def penalized_loss(self, subset: Subset) -> float:
+        """The subset's loss and its members' penalties: what the best subset minimizes."""
+        explained = max(self.baseline - 1.0, 0.0)
+        return subset.cv_loss + sum(
+            penalty(explained, self.criteria, self.candidates[k].penalty_factor(self.criteria)) for k in subset.members
+        )
 
-    def best(self) -> Entry:
-        """The best plausible set of which every member is needed; the empty one where nothing is worth its cost."""
-        nothing = Entry((), self.base)
-        ranked = sorted([nothing, *self.sets], key=self.score)
-        return next((one for one in ranked if self.is_plausible(one.members) and self._needs_all(one)), nothing)
+    def best_subset(self) -> Subset:
+        """The best plausible subset of which every member is needed; the empty one where none is worth its penalty."""
+        empty = Subset((), self.baseline)
+        ranked = sorted([empty, *self.subsets], key=self.penalized_loss)
+        acceptable = (
+            subset for subset in ranked if self.is_plausible(subset.members) and self._needs_every_member(subset)
+        )
+        return next(acceptable, empty)
 
-    def _needs_all(self, entry: Entry) -> bool:
+    def _needs_every_member(self, subset: Subset) -> bool:
         """Whether each member takes away most of what is above the floor without it.
 
-        A wrong form leaves a rest that flexible effects nibble at; a cause that is really there removes it.
+        An effect of a wrong form leaves a rest that flexible effects reduce a little; the cause itself removes it.
+        Beside others, an effect must also gain a penalty times the root of its number of parameters.
         """
-        without = [tuple(one for one in entry.members if one != k) for k in entry.members]
-        losses = np.array([one.loss for one in self.entries(without)])
-        if len(losses) < len(without):
+        rests = self.evaluate([tuple(k for k in subset.members if k != member) for member in subset.members])
+        losses = np.array([rest.cv_loss for rest in rests])
+        if len(losses) < len(subset.members):
             return False
-        excess = max(entry.loss - 1.0, 0.0)
-        if (losses - 1.0 < excess / (1 - LEAST_REMOVED)).any():
+        excess = max(subset.cv_loss - 1.0, 0.0)
+        if (losses - 1.0 < excess / (1 - self.criteria.least_removed)).any():
             return False
-        numbers = np.array([self.candidates[k].numbers for k in entry.members])
-        enough = losses - entry.loss >= cost(self.base - 1.0) * np.sqrt(numbers)
-        return len(losses) < 2 or bool(enough.all())
+        parameter_counts = np.array([self.candidates[k].parameter_count for k in subset.members])
+        needed_gain = penalty(self.baseline - 1.0, self.criteria) * np.sqrt(parameter_counts)
+        return len(losses) < 2 or bool((losses - subset.cv_loss >= needed_gain).all())
 
-    def fitted(self, members: Members) -> list[tuple[FloatArray, FloatArray]]:
-        """Each member's numbers and covariance, fitted together on all rows."""
-        index = self.index(members)
-        theta, covariance, left = self.sums.fitted(index)
+    def estimates(self, members: tuple[int, ...]) -> list[tuple[FloatArray, FloatArray]]:
+        """Parameters (P,) and covariance (P, P) of each member, fitted together on all rows.
+
+        The covariance is scaled by the mean square left where that is above the noise floor.
+        """
+        theta, covariance, left = self.equations.estimate(self._index(members))
         covariance = covariance * max(left, 1.0)
-        found, begin = [], len(self._held)
+        estimates, begin = [], len(self._nuisance_index)
         for k in members:
-            end = begin + len(self._places[k])
-            found.append((theta[begin:end], covariance[begin:end, begin:end]))
+            end = begin + len(self._indices[k])
+            estimates.append((theta[begin:end], covariance[begin:end, begin:end]))
             begin = end
-        return found
+        return estimates
 
-    def is_plausible(self, members: Members) -> bool:
-        """Whether every number is plausible, and at least one of each member's is known."""
-        for k, (theta, covariance) in zip(members, self.fitted(members), strict=True):
+    def is_plausible(self, members: tuple[int, ...]) -> bool:
+        """Whether every parameter is plausible, and at least one of each member's is determined."""
+        for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
             candidate = self.candidates[k]
-            if candidate.described:
+            if candidate.is_empirical:
                 continue
-            limits = candidate.limits
             std = np.sqrt(np.diag(covariance))
-            if not all(plausible(tuple(one), float(t), float(s)) for one, t, s in zip(limits, theta, std, strict=True)):
-                return False
-            if untestable(limits, std):
+            for limits, value, error in zip(candidate.limits, theta, std, strict=True):
+                if not is_plausible(tuple(limits), float(value), float(error), self.criteria):
+                    return False
+            if is_undetermined(candidate.limits, std):
                 return False
         return True
 
-    def row_losses(self, members: Members) -> FloatArray:
-        """(R,) squares left in each row by numbers learned without its fold, averaged over the schemes."""
-        index = self.index(members)
-        columns = np.concatenate([self.evidence.always.values, *(self.values[k] for k in members)], axis=2)
-        found = np.zeros(len(self.evidence.y))
-        counts = np.asarray(self._learnable[list(members)].all(axis=0))
-        for scheme, fold in enumerate(self.evidence.folds):
-            theta = self.sums.theta_by_fold(index, scheme)
+    def excess_loss(self, members: tuple[int, ...], than: tuple[int, ...]) -> tuple[float, float]:
+        """By how much more a subset leaves than another on rows left out, and the standard error of that; per value.
+
+        The standard error is from sums over the B blocks of rows, within which residuals may be correlated::
+
+            std = sqrt(B / (B - 1) sum_b (d_b - mean d)^2),  d_b = sum of the differences in block b
+        """
+        difference = self._row_losses(members) - self._row_losses(than)
+        by_block = np.bincount(self.data.block, difference)
+        count = len(by_block)
+        spread = float(np.sqrt(count / max(count - 1, 1) * ((by_block - by_block.mean()) ** 2).sum()))
+        return float(by_block.sum()) / self.data.value_count, spread / self.data.value_count
+
+    def nuisance_with(self, members: tuple[int, ...]) -> Regressors:
+        """The nuisance columns and those of some candidates."""
+        nuisance = self.data.nuisance
+        values = [nuisance.values, *(self.values[k] for k in members)]
+        largest = [nuisance.largest, *(self.candidates[k].largest for k in members)]
+        return Regressors(np.concatenate(values, axis=2), np.concatenate(largest))
+
+    def _index(self, members: tuple[int, ...]) -> IntArray:
+        """Columns of a subset among the normal equations, the nuisance columns first."""
+        return np.concatenate([self._nuisance_index, *(self._indices[k] for k in members)]).astype(np.int64)
+
+    def _row_losses(self, members: tuple[int, ...]) -> FloatArray:
+        """(R,) squares left in each row by parameters learned without its fold, averaged over the splits that count."""
+        index = self._index(members)
+        columns = np.concatenate([self.data.nuisance.values, *(self.values[k] for k in members)], axis=2)
+        losses = np.zeros(len(self.data.y))
+        testable = np.asarray(self._testable[list(members)].all(axis=0))
+        for split, fold in enumerate(self.data.splits):
+            if not testable[split]:
+                continue
+            theta = self.equations.theta_by_fold(index, split)
             for k in range(int(fold.max()) + 1):
                 rows = fold == k
-                if counts[scheme]:
-                    found[rows] += ((self.evidence.y[rows] - columns[rows] @ theta[k]) ** 2).sum(axis=1)
-        return found / max(int(counts.sum()), 1)
-
-    def excess(self, members: Members, than: Members) -> tuple[float, float]:
-        """By how much more a set leaves than another, and its standard error, from blocks of rows; per number."""
-        difference = self.row_losses(members) - self.row_losses(than)
-        blocks = np.bincount(self.evidence.group, difference)
-        count = len(blocks)
-        spread = float(np.sqrt(count / max(count - 1, 1) * ((blocks - blocks.mean()) ** 2).sum()))
-        return float(blocks.sum()) / self.evidence.numbers, spread / self.evidence.numbers
+                losses[rows] += ((self.data.y[rows] - columns[rows] @ theta[k]) ** 2).sum(axis=1)
+        return losses / max(int(testable.sum()), 1)

@@ -1,4 +1,4 @@
-"""What a machine's small disturbances, too small to be named, do to fitted numbers: a part of their standard errors."""
+"""Unmodelled disturbances as a part of standard errors: effects too small to be named still move fitted parameters."""
 
 from __future__ import annotations
 
@@ -11,53 +11,69 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import FitResult
+from compd.comparison.least_squares import normal_inverse
 from compd.diagnosis.candidates import Candidate
+from compd.diagnosis.criteria import Criteria
 from compd.units import UM_PER_MM
 
-# Always there, in standard deviations of the noise, rms per coordinate: two of a fifth of the floor.
-DISTURBANCE = 0.2
-DISTURBANCES = 2
-# Columns that differ from others by less than this share of their size are the same.
-INDISTINCT = 1e-10
+# Combinations of scaled columns with a smaller singular value are undetermined: conditioning alone.
+RANK_CUT = 1e-5
 
 
 def with_disturbances(
-    found: FitResult, aligned: AlignedRecording, sigma_um: FloatArray, candidates: Sequence[Candidate]
+    result: FitResult,
+    aligned: AlignedRecording,
+    sigma_um: FloatArray,
+    candidates: Sequence[Candidate],
+    criteria: Criteria,
 ) -> FitResult:
-    """The fit with wider standard errors: by how much its numbers move when two other effects act a little.
+    """The fit with the covariance that unnamed effects of the library add to its parameters.
 
-    sigma_um : (m,) noise.  candidates : the library.
-    Every other effect is as likely, and every of its columns in equal parts; a number's error by the noise alone
-    would be too small where an unnamed disturbance looks like the effect. (GUM, 4.3: an error of which only the
-    size is known is an uncertainty all the same.)
+    A residual at the noise floor still hides effects that are too small to be found. One that looks like a fitted
+    effect moves its parameters, and the noise alone says nothing of that. An error of which only the size is known is
+    an uncertainty all the same (GUM, 4.3: type B). `disturbances` effects, each equally likely to be any of the K
+    that are not fitted, act with an rms of `disturbance` standard deviations of the noise, spread evenly and
+    independently over their own columns. With the whitened columns A of the fit and B_k of effect k, each of its p_k
+    columns scaled to an rms of 1, the added covariance is::
+
+        disturbances disturbance^2 / K  sum_k  A^+ B_k B_k^T A^+T / p_k
+
+    where A^+ = (A^T A)^-1 A^T is what least squares makes of an error of the prediction (GUM, 5.1.2).
+
+    sigma_um : (m,) standard deviation of the noise.  candidates : the library's, of which the first variant of each
+    effect counts.
+
+    Example: where the only other effect has the same form as the fitted one, the standard error grows by as much of
+    the parameter as moves the prediction by 0.2 sqrt(2) = 0.28 standard deviations of the noise (rms), however many
+    rows there are.
     """
-    taken = {one.effect.id for one in found.fitted}
+    fitted_ids = {fitted.effect.id for fitted in result.fitted}
     others: dict[str, FloatArray] = {}
-    for one in candidates:
-        if one.name not in taken and one.name not in others:
-            others[one.name] = _whitened(one.columns_um, found, sigma_um)
-    if not others or not found.fitted:
-        return found
-    own = [aligned.columns(one.effect, one.constants) * UM_PER_MM for one in found.fitted]
-    G = _whitened(np.concatenate([*own, aligned.registration_columns * UM_PER_MM], axis=2), found, sigma_um)
-    size = np.linalg.norm(G, axis=0)
-    size[size == 0] = 1.0
-    inverse = np.linalg.pinv((G / size).T @ (G / size), rcond=INDISTINCT, hermitian=True)
-    total = np.zeros((G.shape[1], G.shape[1]))
+    for candidate in candidates:
+        if candidate.name not in fitted_ids and candidate.name not in others:
+            others[candidate.name] = _whitened(candidate.columns_um, result, sigma_um)
+    if not others or not result.fitted:
+        return result
+    own_um = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in result.fitted]
+    A = _whitened(np.concatenate([*own_um, aligned.registration_columns * UM_PER_MM], axis=2), result, sigma_um)
+    inverse = normal_inverse(A, RANK_CUT)
+    added = np.zeros((A.shape[1], A.shape[1]))
+    variance = criteria.disturbance**2 * criteria.disturbances
     for columns in others.values():
         rms = np.sqrt(np.mean(columns**2, axis=0))
-        acting = columns[:, rms > 0] / rms[rms > 0]
-        moved = inverse @ ((G / size).T @ acting) / size[:, None]
-        total += moved @ moved.T * (DISTURBANCE**2 * DISTURBANCES / max(acting.shape[1], 1) / len(others))
-    ends = np.cumsum([0, *(column.shape[2] for column in own)])
-    covariance = found.covariance + total[: ends[-1], : ends[-1]]
+        unit_columns = columns[:, rms > 0] / rms[rms > 0]
+        moved = inverse @ (A.T @ unit_columns)
+        added += moved @ moved.T * (variance / max(unit_columns.shape[1], 1) / len(others))
+    ends = np.cumsum([0, *(columns.shape[2] for columns in own_um)])
+    covariance = result.covariance + added[: ends[-1], : ends[-1]]
     fitted = tuple(
-        replace(one, covariance=covariance[a:b, a:b]) for one, (a, b) in zip(found.fitted, pairwise(ends), strict=True)
+        replace(effect, covariance=covariance[begin:end, begin:end])
+        for effect, (begin, end) in zip(result.fitted, pairwise(ends), strict=True)
     )
-    return replace(found, fitted=fitted, covariance=covariance)
+    return replace(result, fitted=fitted, covariance=covariance)
 
 
-def _whitened(columns_um: FloatArray, found: FitResult, sigma_um: FloatArray) -> FloatArray:
-    """(rows used x m, P); 0 where a candidate knows nothing."""
-    used = np.nan_to_num(columns_um[found.used] / sigma_um[:, None])
+def _whitened(columns_um: FloatArray, result: FitResult, sigma_um: FloatArray) -> FloatArray:
+    """(rows used x m, P) columns (N, m, P) in standard deviations of the noise; 0 where an effect is not known."""
+    used = np.nan_to_num(columns_um[result.used] / sigma_um[:, None])
     return used.reshape(-1, columns_um.shape[2])

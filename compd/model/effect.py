@@ -142,6 +142,7 @@ class Effect:
     basis : gives (N, size, P) with the ports' sizes one after the other on axis 1 and P fitted numbers, in mm (rad for
         directions) per unit of each number.
     remembers : a row's value depends on earlier rows; memory goes in and comes out.
+    follows_reading : what it adds depends on its comparators' own readings.
     registration : a rigid motion of the reference's whole frame, as laying two frames over one another takes away.
     """
 
@@ -158,6 +159,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    follows_reading: bool = False
     registration: bool = False
 
     @property

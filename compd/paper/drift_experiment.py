@@ -11,7 +11,7 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, styled
+from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
 from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
@@ -88,7 +88,7 @@ def panels(result: DriftResult) -> list[Panel]:
                     marker={"size": 4},
                     line={"color": COLOURS[KIND_COLOURS[kind]], "dash": dash},
                 )
-        return styled(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
+        return style_figure(figure, "time since switch-on, h", f"change of {' and '.join(axes)}, um", 380)
 
     warm = Figure()
     warm.add_scatter(x=result.time_h, y=result.frame_degC, mode="lines", line={"color": COLOURS["plain"]})
@@ -99,5 +99,9 @@ def panels(result: DriftResult) -> list[Panel]:
             "An axisymmetric frame would leave both at zero; here a cabinet stands beside one column.",
             change("xy"),
         ),
-        Panel("Temperature of the frame", "Mean of the columns.", styled(warm, "time since switch-on, h", "degC", 240)),
+        Panel(
+            "Temperature of the frame",
+            "Mean of the columns.",
+            style_figure(warm, "time since switch-on, h", "degC", 240),
+        ),
     ]

@@ -16,7 +16,7 @@ from compd.configuration import Configuration
 from compd.machine_builder import joint_weights
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, styled
+from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.causes.catalogue import build_cause
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import INTERFEROMETER_SIGMA_UM, noisy
@@ -174,11 +174,11 @@ def panels(result: LinkResult) -> list[Panel]:
         Panel(
             "Under external load",
             "Scale unit less interferometer, at 20 degC and after two hours beside a lamp.",
-            styled(load, "axial force of the link, N", "difference, um", 440),
+            style_figure(load, "axial force of the link, N", "difference, um", 440),
         ),
         Panel(
             "While the link warms up",
             "The same without load.",
-            styled(warmth, "temperature of the link, degC", "difference, um", 340),
+            style_figure(warmth, "temperature of the link, degC", "difference, um", 340),
         ),
     ]

@@ -12,7 +12,7 @@ from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, styled
+from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, ball_plate_mm, noisy
 from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
@@ -100,7 +100,7 @@ def panels(result: PlateResult) -> list[Panel]:
             "Each dot is one of the 136 pairs of balls, measured less certified. "
             "How much is gained depends on how much of the error is the joints'; of the paper's machine it is not "
             "known.",
-            styled(figure, "distance between balls, mm", "deflection, um", 440),
+            style_figure(figure, "distance between balls, mm", "deflection, um", 440),
         ),
     ]
 

@@ -8,33 +8,44 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure
 
+from compd.arrays import rms
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import covariates
-from compd.model_file import ModelFile, StoredModel, parameter_estimates
-from compd.report.figures import against, arrows, at_links, falling, histogram, switched_off, workspace
+from compd.model_file import ModelFile, parameter_estimates
+from compd.report.figures import (
+    plot_contributions,
+    plot_histogram,
+    plot_link_residuals,
+    plot_residual_vectors,
+    plot_workspace_map,
+)
 from compd.report.page import PageTable, Panel, write_page
+from compd.report.small_multiples import plot_residual_against
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
 
 
 def summary(comparisons: Sequence[Comparison]) -> PageTable:
     """Numbers of every recording side by side."""
-    head = ["", *(name_of(one) for one in comparisons)]
+    head = ["", *(name_of(comparison) for comparison in comparisons)]
     rows: list[list[str]] = [
-        ["residual, rms per coordinate", *(f"{one.rms_um:.3g} um" for one in comparisons)],
-        ["noise floor", *(f"{one.floor.um:.3g} um ({one.floor.source})" for one in comparisons)],
-        ["floor ratio, 1 = at the floor", *(f"{one.floor_ratio:.3g}" for one in comparisons)],
+        ["residual, rms per coordinate", *(f"{comparison.rms_um:.3g} um" for comparison in comparisons)],
+        ["noise floor", *(f"{comparison.floor.um:.3g} um ({comparison.floor.source})" for comparison in comparisons)],
+        ["floor ratio, 1 = at the floor", *(f"{comparison.floor_ratio:.3g}" for comparison in comparisons)],
     ]
-    labels = list(dict.fromkeys(label for one in comparisons for label in one.aligned.labels))
-    rows += [[f"{label}: rms / 95 % / largest", *(_axis(one, label) for one in comparisons)] for label in labels]
-    rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(one) for one in comparisons)])
-    sources = list(dict.fromkeys(name for one in comparisons for name in one.contributions))
-    rows += [[f"rms without {name}", *(_without(one, name) for one in comparisons)] for name in sources]
+    labels = list(dict.fromkeys(label for comparison in comparisons for label in comparison.aligned.labels))
     rows += [
-        ["prediction's own uncertainty", *(_uncertainty(one) for one in comparisons)],
-        ["rows used", *(str(int(one.used.sum())) for one in comparisons)],
-        ["rows beyond all noise", *(str(int(one.outlier.sum())) for one in comparisons)],
-        ["rows left out", *(str(sum(one.left_out.values())) for one in comparisons)],
+        [f"{label}: rms / 95 % / largest", *(_axis(comparison, label) for comparison in comparisons)]
+        for label in labels
+    ]
+    rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(comparison) for comparison in comparisons)])
+    sources = list(dict.fromkeys(name for comparison in comparisons for name in comparison.contributions))
+    rows += [[f"rms without {name}", *(_without(comparison, name) for comparison in comparisons)] for name in sources]
+    rows += [
+        ["prediction's own uncertainty", *(_uncertainty(comparison) for comparison in comparisons)],
+        ["rows used", *(str(int(comparison.used.sum())) for comparison in comparisons)],
+        ["rows beyond all noise", *(str(int(comparison.outlier.sum())) for comparison in comparisons)],
+        ["rows left out", *(str(sum(comparison.left_out.values())) for comparison in comparisons)],
     ]
     return PageTable(head, rows)
 
@@ -45,94 +56,63 @@ def name_of(comparison: Comparison) -> str:
     return f"{path.parent.name}/{path.name}"
 
 
-def nothing_found(one: Comparison) -> str:
+def no_trend_text(comparison: Comparison) -> str:
     """What to say where the residual follows nothing in a straight line."""
-    if one.at_floor:
+    if comparison.at_floor:
         return "nowhere: what is left is noise"
     return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
 
 
-def write_report(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
+def write_comparison_page(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
     """Write the page for one recording or more."""
     machine = comparisons[0].aligned.recording.machine
-    effects = ", ".join(one.effect.id for one in comparisons[0].fitted) or "none"
-    verdict = " ".join(f"{name_of(one)}: {one.verdict}" if len(comparisons) > 1 else one.verdict for one in comparisons)
+    effects = ", ".join(effect.effect.id for effect in comparisons[0].fitted) or "none"
+    verdict = " ".join(
+        f"{name_of(comparison)}: {comparison.verdict}" if len(comparisons) > 1 else comparison.verdict
+        for comparison in comparisons
+    )
     panels = [
         Panel("In numbers", "A rms is per coordinate: root of the mean over rows and axes.", summary(comparisons))
     ]
     if model is not None and model.fitted:
         numbers = _effects(model, comparisons[0])
         panels.append(Panel("The model's effects", "Fitted numbers with their standard errors.", numbers))
-    for one in comparisons:
-        panels += _panels(one, f"{name_of(one)}: " if len(comparisons) > 1 else "")
-    hashes = "; ".join(f"{name_of(one)} sha256 {one.aligned.recording.sha256}" for one in comparisons)
+    for comparison in comparisons:
+        panels += _panels(comparison, f"{name_of(comparison)}: " if len(comparisons) > 1 else "")
+    hashes = "; ".join(
+        f"{name_of(comparison)} sha256 {comparison.aligned.recording.sha256}" for comparison in comparisons
+    )
     write_page(path, f"Model and measurement: {machine}", verdict, panels, f"Effects in the model: {effects}. {hashes}")
 
 
-def write_ledger(path: Path, model: StoredModel) -> None:
-    """The picture of the falling error, and every step."""
-    steps = model.steps
-    labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
-    rms = [steps[0].rms_before_um, *(step.rms_after_um for step in steps)]
-    floors = [steps[0].noise_floor_um, *(step.noise_floor_um for step in steps)]
-    table = PageTable(LEDGER_HEAD, ledger_rows(model))
-    verdict = (
-        f"After {len(steps)} steps the residual is {rms[-1]:.3g} um; it was {rms[0]:.3g} um. "
-        f"Noise alone would be {floors[-1]:.3g} um."
-    )
-    panels = [
-        Panel(
-            "The falling error",
-            "Residual after each step, on the recording it was fitted on.",
-            falling(labels, rms, floors),
-        ),
-        Panel("Every step", "Each can be taken back with `compd effect undo`.", table),
-    ]
-    write_page(path, f"Ledger: {model.machine}", verdict, panels, "")
-
-
-LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
-
-
-def ledger_rows(model: StoredModel) -> list[list[str]]:
-    """One line per step."""
-    return [
-        [
-            str(k),
-            f"{step.kind} {step.effect}".rstrip() + (" (undone)" if step.undone else ""),
-            step.recording,
-            f"{step.rms_before_um:.3g}",
-            f"{step.rms_after_um:.3g}",
-            f"{step.noise_floor_um:.3g}",
-            step.date[:10],
-        ]
-        for k, step in enumerate(model.steps, start=1)
-    ]
-
-
-def _panels(one: Comparison, prefix: str) -> list[Panel]:
+def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
     """The panels of one recording: the same for every recording and model."""
-    found = {covariate.name: covariate for covariate in covariates(one.aligned)}
+    by_name = {covariate.name: covariate for covariate in covariates(comparison.aligned)}
 
-    def named(*begins: str) -> list[str]:
-        return [name for name in found if name.startswith(begins)]
+    def beginning_with(*begins: str) -> list[str]:
+        return [name for name in by_name if name.startswith(begins)]
 
     groups: dict[str, list[str]] = {
-        "time": ["time"] if "time" in found else [],
-        "temperature": named("temperature"),
-        "force": named("force"),
-        "direction": named("direction"),
-        "link length": named("length of"),
-        "x, y, z": [name for name in ("x", "y", "z") if name in found],
+        "time": ["time"] if "time" in by_name else [],
+        "temperature": beginning_with("temperature"),
+        "force": beginning_with("force"),
+        "direction": beginning_with("direction"),
+        "link length": beginning_with("length of"),
+        "x, y, z": [name for name in ("x", "y", "z") if name in by_name],
     }
     placed = {name for names in groups.values() for name in names}
-    groups["everything else measured"] = [name for name in found if name not in placed]
-    vectors, enlarged = arrows(one)
-    said = [finding.text for finding in one.trends] or [nothing_found(one)]
-    sentences = PageTable(("",), [[text] for text in said])
+    groups["everything else measured"] = [name for name in by_name if name not in placed]
+    vectors, enlarged = plot_residual_vectors(comparison)
+    sentences = [trend.text for trend in comparison.trends] or [no_trend_text(comparison)]
     panels = [
-        Panel("Where it fails", "One coordinate at a time, straight lines only: a first look.", sentences),
-        Panel("What each part does", "The error that is left with one part switched off.", switched_off(one)),
+        Panel(
+            "Where it fails",
+            "One coordinate at a time, straight lines only: a first look.",
+            PageTable(("",), [[text] for text in sentences]),
+        ),
+        Panel(
+            "What each part does", "The error that is left with one part switched off.", plot_contributions(comparison)
+        ),
         Panel(
             "Residual vectors",
             "Measured minus modelled at the tip"
@@ -140,62 +120,69 @@ def _panels(one: Comparison, prefix: str) -> list[Panel]:
             vectors,
         ),
         *(
-            Panel(f"Residual against {group}", HOW_TO_READ, against(one, [found[name] for name in names]))
+            Panel(
+                f"Residual against {group}",
+                HOW_TO_READ,
+                plot_residual_against(comparison, [by_name[name] for name in names]),
+            )
             for group, names in groups.items()
         ),
         Panel(
             "Residual pulled back to the links",
             "The errors of link lengths that would explain the residual at "
             "the tip: where one link stands out, look there.",
-            at_links(one),
+            plot_link_residuals(comparison),
         ),
-        Panel("Histogram against the noise floor", f"{one.floor.how[0].upper()}{one.floor.how[1:]}.", histogram(one)),
+        Panel(
+            "Histogram against the noise floor",
+            f"{comparison.floor.how[0].upper()}{comparison.floor.how[1:]}.",
+            plot_histogram(comparison),
+        ),
         Panel(
             "Map over the workspace",
             "Rms residual in cells of the workspace; white where nothing was measured.",
-            workspace(one),
+            plot_workspace_map(comparison),
         ),
-        Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(one)),
+        Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(comparison)),
     ]
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
 
 
-def _excluded(one: Comparison) -> PageTable:
-    rows = [[why, str(count)] for why, count in one.left_out.items()]
-    numbers = one.aligned.recording.row[one.outlier].tolist()
+def _excluded(comparison: Comparison) -> PageTable:
+    rows = [[reason, str(count)] for reason, count in comparison.left_out.items()]
+    numbers = comparison.aligned.recording.row[comparison.outlier].tolist()
     if numbers:
         shown = ", ".join(map(str, numbers[:40])) + (f" and {len(numbers) - 40} more" if len(numbers) > 40 else "")
         rows.append([f"beyond all noise: rows {shown}", str(len(numbers))])
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 
-def _effects(model: ModelFile, one: Comparison) -> PageTable:
+def _effects(model: ModelFile, comparison: Comparison) -> PageTable:
     rows = [
         [effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"]]
-        for effect, number in parameter_estimates(model.fitted, one.aligned.rows.links)
+        for effect, number in parameter_estimates(model.fitted, comparison.aligned.rows.links)
     ]
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 
 
-def _axis(one: Comparison, label: str) -> str:
-    if label not in one.aligned.labels:
+def _axis(comparison: Comparison, label: str) -> str:
+    if label not in comparison.aligned.labels:
         return "-"
-    size = np.abs(one.residual_um[one.used, one.aligned.labels.index(label)])
-    rms = float(np.sqrt(np.mean(size**2)))
-    return f"{rms:.3g} / {np.quantile(size, 0.95):.3g} / {size.max():.3g} um"
+    size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
+    return f"{rms(size):.3g} / {np.quantile(size, 0.95):.3g} / {size.max():.3g} um"
 
 
-def _distance(one: Comparison) -> str:
-    if one.aligned.of_links or len(one.aligned.labels) < 3:
+def _distance(comparison: Comparison) -> str:
+    if comparison.aligned.of_links or len(comparison.aligned.labels) < 3:
         return "-"
-    distance = one.distance_um[one.used]
-    return f"{np.sqrt(np.mean(distance**2)):.3g} / {np.quantile(distance, 0.95):.3g} / {distance.max():.3g} um"
+    distance = comparison.distance_um[comparison.used]
+    return f"{rms(distance):.3g} / {np.quantile(distance, 0.95):.3g} / {distance.max():.3g} um"
 
 
-def _without(one: Comparison, name: str) -> str:
-    return f"{one.contributions[name].without_rms_um:.3g} um" if name in one.contributions else "-"
+def _without(comparison: Comparison, name: str) -> str:
+    return f"{comparison.contributions[name].without_rms_um:.3g} um" if name in comparison.contributions else "-"
 
 
-def _uncertainty(one: Comparison) -> str:
-    total = float(np.sqrt(np.mean(one.uncertainty.total_um[one.used] ** 2)))
+def _uncertainty(comparison: Comparison) -> str:
+    total = rms(comparison.uncertainty.total_um[comparison.used])
     return "not known" if np.isnan(total) else f"{total:.2g} um"

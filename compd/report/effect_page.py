@@ -18,19 +18,19 @@ from compd.report.effect_signature import (
     WARMING_K,
     Curve,
     Signature,
-    signature,
+    compute_signature,
 )
-from compd.report.page import COLOURS, PageTable, Panel, styled, write_page
+from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 
 AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain"]}
 
 
-def write_signature(path: Path, effect: Effect, configuration: Configuration) -> None:
+def write_effect_page(path: Path, effect: Effect, configuration: Configuration) -> None:
     """Write the page. Raises CompdError where the machine lacks a setting that the effect needs."""
     model = build_model(configuration.geometry, configuration.wiring)
-    found = signature(effect, model, machine_details(configuration.geometry))
-    largest_um = float(np.linalg.norm(found.tip_um, axis=1).max())
-    numbers = ", ".join(f"{name} = {value}" for name, value in found.taken.items())
+    result = compute_signature(effect, model, machine_details(configuration.geometry))
+    largest_um = float(np.linalg.norm(result.tip_um, axis=1).max())
+    numbers = ", ".join(f"{name} = {value}" for name, value in result.parameters.items())
     verdict = (
         f"{effect.physics} With {numbers} it moves the tip of {configuration.machine} by up to {largest_um:.3g} um."
     )
@@ -39,25 +39,26 @@ def write_signature(path: Path, effect: Effect, configuration: Configuration) ->
         f"a force of {FORCE_N:g} N presses down, every link grows at {SPEED_MM_PER_S:g} mm/s."
     )
     panels = [
-        Panel("Over the workspace", f"Arrows: the tip's error, drawn large. {driven}", _arrows(found)),
-        *(Panel(f"Against {curve.label}", _where(curve), _curve(curve)) for curve in found.curves),
-        Panel("The effect", "As the library declares it.", _card(effect)),
+        Panel("Over the workspace", f"Arrows: the tip's error, drawn large. {driven}", _plot_arrows(result)),
+        *(Panel(f"Against {curve.label}", _place_text(curve), _plot_curve(curve)) for curve in result.curves),
+        Panel("The effect", "As the library declares it.", _declaration(effect)),
     ]
     write_page(path, f"{effect.id} on {configuration.machine}", verdict, panels, f"source: {effect.source}")
 
 
-def _where(curve: Curve) -> str:
+def _place_text(curve: Curve) -> str:
     if "machine zero" in curve.label:
         return "Error of the tip along a line through machine zero."
     x, y, _ = ASIDE_MM
     return f"Error of the tip at a place {x:g} mm in x and {y:g} mm in y from machine zero."
 
 
-def _arrows(found: Signature) -> Figure:
-    x, y, z = found.tip_mm.T
-    u, v, w = found.tip_um.T
-    size_um = np.linalg.norm(found.tip_um, axis=1)
-    hover = [f"({a:.1f}, {b:.1f}, {c:.1f}) um, {s:.2f} um" for (a, b, c), s in zip(found.tip_um, size_um, strict=True)]
+def _plot_arrows(result: Signature) -> Figure:
+    """The tip's error over the workspace, as cones at the places and in the direction of the error."""
+    x, y, z = result.tip_mm.T
+    u, v, w = result.tip_um.T
+    size_um = np.linalg.norm(result.tip_um, axis=1)
+    hover = [f"({a:.1f}, {b:.1f}, {c:.1f}) um, {s:.2f} um" for (a, b, c), s in zip(result.tip_um, size_um, strict=True)]
     figure = Figure()
     figure.add_trace(
         Scatter3d(
@@ -87,21 +88,26 @@ def _arrows(found: Signature) -> Figure:
             colorbar={"title": "um"},
         )
     )
-    styled(figure, "", "", 560)
+    style_figure(figure, "", "", 560)
     figure.update_layout(scene={f"{axis}axis_title": f"{axis} in {{M}}, mm" for axis in "xyz"} | {"aspectmode": "data"})
     return figure
 
 
-def _curve(curve: Curve) -> Figure:
+def _plot_curve(curve: Curve) -> Figure:
+    """The tip's error in x, y and z over what drives it."""
     figure = Figure()
     for axis, values in zip("xyz", curve.tip_um.T, strict=True):
         figure.add_trace(Scatter(x=curve.driven_by, y=values, name=axis, line={"color": AXIS_COLOURS[axis]}))
-    return styled(figure, curve.label, "error of the tip, um")
+    return style_figure(figure, curve.label, "error of the tip, um")
 
 
-def _card(effect: Effect) -> PageTable:
+def _declaration(effect: Effect) -> PageTable:
+    """The effect as the library declares it."""
     rows = [["equation", effect.equation], *([symbol, meaning] for symbol, meaning in effect.symbols.items())]
     numbers: list[Parameter | Constant] = [*effect.parameters, *effect.constants]
-    rows += [[f"{one.name}, {one.unit}", f"plausible {one.low:g} to {one.high:g}: {one.source}"] for one in numbers]
+    rows += [
+        [f"{number.name}, {number.unit}", f"plausible {number.low:g} to {number.high:g}: {number.source}"]
+        for number in numbers
+    ]
     rows += [["mistaken for", ", ".join(effect.mistaken_for) or "-"], ["separated by", effect.separated_by]]
     return PageTable(["", effect.id], rows)

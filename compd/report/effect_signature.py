@@ -67,37 +67,37 @@ class Curve(NamedTuple):
 
 
 class Signature(NamedTuple):
-    """tip_mm (M, 3) in {M}, and the tip's error there, tip_um (M, 3); curves; the numbers that were taken."""
+    """tip_mm (M, 3) in {M}, and the tip's error there, tip_um (M, 3); curves; parameter -> its value as text."""
 
     tip_mm: FloatArray
     tip_um: FloatArray
     curves: list[Curve]
-    taken: dict[str, str]
+    parameters: dict[str, str]
 
 
-def signature(effect: Effect, model: MachineModel, details: MachineDetails) -> Signature:
+def compute_signature(effect: Effect, model: MachineModel, details: MachineDetails) -> Signature:
     """Arrows and curves of one effect with parameters from the middle of their plausible range.
 
     Raises CompdError where this machine lacks what the effect needs (a plate thickness, revolute axes).
     """
     needed = needed_quantities(effect, model.links)
-    place = _Place(effect, model, details, needed)
-    lacking = unmet_needs(effect, place.rows(Drive(np.zeros((1, 3)))).available, model.links)
+    on_machine = _EffectOnMachine(effect, model, details, needed)
+    lacking = unmet_needs(effect, on_machine.rows(Drive(np.zeros((1, 3)))).available, model.links)
     if lacking:
         raise CompdError(lacking)
     across = np.linspace(-REACH_MM, REACH_MM, 5)
     grid = np.stack(np.meshgrid(across, across, [-HEIGHT_MM, 0.0, HEIGHT_MM], indexing="ij"), axis=-1).reshape(-1, 3)
     grid = grid[np.hypot(grid[:, 0], grid[:, 1]) <= 1.05 * REACH_MM]
-    curves = [Curve(label, values, place.tip_um(drive)) for label, values, drive in _drives(effect, needed)]
+    curves = [Curve(label, values, on_machine.tip_um(drive)) for label, values, drive in _drives(effect, needed)]
     return Signature(
         grid + model.zero.contact.tip_M_mm,
-        place.tip_um(Drive(grid, apart=True)),
+        on_machine.tip_um(Drive(grid, apart=True)),
         curves,
-        _taken(effect, place.fitted.constants),
+        _parameter_values(effect, on_machine.fitted.constants),
     )
 
 
-def middle(parameter: Parameter | Constant) -> float:
+def typical_value(parameter: Parameter | Constant) -> float:
     """A plausible value: half the range if it is symmetric, its geometric middle if it spans decades; of a choice the
     first."""
     if isinstance(parameter, Constant) and parameter.choice:
@@ -108,24 +108,27 @@ def middle(parameter: Parameter | Constant) -> float:
     return float(np.sqrt(low * high)) if low > 0 and high / low > 10 else (low + high) / 2
 
 
-def _taken(effect: Effect, shape: Mapping[str, float]) -> dict[str, str]:
-    numbers = {one.name: f"{middle(one):.3g} {one.unit}" for one in effect.parameters}
-    units = {one.name: one.unit for one in effect.constants}
-    return numbers | {name: f"{value:.3g} {units[name]}" for name, value in shape.items()}
+def _parameter_values(effect: Effect, shape: Mapping[str, float]) -> dict[str, str]:
+    values = {parameter.name: f"{typical_value(parameter):.3g} {parameter.unit}" for parameter in effect.parameters}
+    units = {constant.name: constant.unit for constant in effect.constants}
+    return values | {name: f"{value:.3g} {units[name]}" for name, value in shape.items()}
 
 
-class _Place:
+class _EffectOnMachine:
     """One effect on one machine."""
 
     def __init__(self, effect: Effect, model: MachineModel, details: MachineDetails, needed: Sequence[str]) -> None:
         self._model, self._needed = model, needed
         self._common = machine_constants(model, details)
         columns = effect.columns(model.links)
-        theta = np.array([column.parameter.to_theta(middle(column.parameter)) for column in columns])
+        theta = np.array([column.parameter.to_theta(typical_value(column.parameter)) for column in columns])
         if any(parameter.per == "link_axis" for parameter in effect.parameters):
             theta[1:] = 0.0  # all joints moved alike would only move the whole machine
         period = details.scale_signal_period_mm
-        shape = {one.name: period if one.setting and not np.isnan(period) else middle(one) for one in effect.constants}
+        shape = {
+            constant.name: period if constant.setting and not np.isnan(period) else typical_value(constant)
+            for constant in effect.constants
+        }
         self.fitted = FittedEffect(effect, theta, shape)
 
     def rows(self, drive: Drive) -> Observations:
@@ -175,11 +178,11 @@ def _value(name: str, drive: Drive) -> FloatArray:
 def _directions(scale_mm: FloatArray) -> FloatArray:
     """+1 or -1 as the rows follow one another; forwards before the first has moved."""
     motion = None
-    found = np.empty_like(scale_mm)
+    directions = np.empty_like(scale_mm)
     for row, scales in enumerate(scale_mm):
         motion = update_motion(motion, float(row), scales, np.zeros(0))
-        found[row] = np.where(motion.direction == 0, 1.0, motion.direction)
-    return found
+        directions[row] = np.where(motion.direction == 0, 1.0, motion.direction)
+    return directions
 
 
 def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray, Drive]]:
@@ -190,15 +193,15 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
     def spread(low: float, high: float) -> FloatArray:
         return np.linspace(low, high, count)
 
-    found: list[tuple[str, FloatArray, Drive]] = []
+    drives: list[tuple[str, FloatArray, Drive]] = []
     if "direction" in effect.needs:
         path = np.concatenate([spread(-40, 40), spread(40, -40), spread(-40, 40)])
         tips = np.outer(path, [1.0, 0.0, 0.0]) + ASIDE_MM
-        found.append(("x there and back, mm from the place", path, Drive(tips)))
+        drives.append(("x there and back, mm from the place", path, Drive(tips)))
     if effect.remembers and any(name.startswith("temperature") for name in needed):
         hours = spread(0, 6)
         warming = np.where(hours > 1.0, WARMING_K, 0.0)
-        found.append(
+        drives.append(
             (
                 "time, h; the temperature steps after one hour",
                 hours,
@@ -207,31 +210,31 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
         )
     elif any(name.startswith("temperature_plate") for name in needed):
         kelvin = spread(-1, 1)
-        found.append(("plate, top less bottom, K", kelvin, Drive(here, gradient_K=kelvin)))
+        drives.append(("plate, top less bottom, K", kelvin, Drive(here, gradient_K=kelvin)))
     elif any(name.startswith("temperature") for name in needed):
         kelvin = spread(-3, 3)
-        found.append(("temperature above 20 degC, K", kelvin, Drive(here, warming_K=kelvin)))
+        drives.append(("temperature above 20 degC, K", kelvin, Drive(here, warming_K=kelvin)))
     if "pressure_hPa" in needed:
         pressure = spread(980, 1040)
-        found.append(("pressure, hPa", pressure, Drive(here, pressure_hPa=pressure)))
+        drives.append(("pressure, hPa", pressure, Drive(here, pressure_hPa=pressure)))
     if "force" in effect.needs:
         force = spread(-100, 100)
-        found.append(("force along z, N", force, Drive(here, force_z_N=force)))
+        drives.append(("force along z, N", force, Drive(here, force_z_N=force)))
     if "motion" in effect.needs:
         speed = spread(-100, 100)
-        found.append(("speed of all links, mm/s", speed, Drive(here, speed_mm_per_s=speed)))
+        drives.append(("speed of all links, mm/s", speed, Drive(here, speed_mm_per_s=speed)))
     elif effect.needs == ("time",):
         hours = spread(0, 10)
-        found.append(("time, h", hours, Drive(here, time_s=hours * HOUR_S)))
-    if not effect.needs and effect.ports in (("joint",), ("frame",)):
+        drives.append(("time, h", hours, Drive(here, time_s=hours * HOUR_S)))
+    if effect.follows_reading:
         reading = spread(-0.02, 0.02)
         changed = Drive(here, joint_mm=reading) if effect.ports == ("joint",) else Drive(here, frame_mm=reading)
-        found.append(("reading of all comparators, mm", reading, changed))
+        drives.append(("reading of all comparators, mm", reading, changed))
     if any(constant.setting == "scale_signal_period_mm" for constant in effect.constants):
         short = spread(0, 0.06)
-        found.append(("z from the place, mm", short, Drive(here + np.outer(short, [0.0, 0.0, 1.0]))))
+        drives.append(("z from the place, mm", short, Drive(here + np.outer(short, [0.0, 0.0, 1.0]))))
     for axis, name in enumerate("xyz"):
         reach = spread(-REACH_MM, REACH_MM) if axis < 2 else spread(-HEIGHT_MM, HEIGHT_MM)
         if not effect.remembers:
-            found.append((f"{name} through machine zero, mm", reach, Drive(np.outer(reach, np.eye(3)[axis]))))
-    return found
+            drives.append((f"{name} through machine zero, mm", reach, Drive(np.outer(reach, np.eye(3)[axis]))))
+    return drives

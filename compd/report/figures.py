@@ -1,41 +1,26 @@
-"""The pictures of a comparison: the residual against everything, in space, at the links, and beside the noise floor."""
+"""Figures of a comparison: its residual in space, at the links, beside the noise floor, and without each source."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, rms
 from compd.comparison.compare import Comparison
-from compd.comparison.covariates import Covariate
-from compd.report.page import COLOURS, PageTable, styled
+from compd.report.page import COLOURS, PageTable, style_figure
+from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
+from compd.units import UM_PER_MM
 
-# More dots than this hide each other; means are always over all rows.
-DOTS = 500
+# More arrows than this hide each other.
 ARROWS = 400
-BINS = 12
+# Cells of the map along each axis.
 CELLS = 9
-COLUMNS = 3
 # The typical arrow is drawn as long as this share of the workspace.
 ARROW_SHARE = 0.12
-SERIES_COLOURS = (COLOURS["worst"], COLOURS["best"], COLOURS["plain"], COLOURS["middle"], "#cc79a7", "#56b4e9")
-NOT_RECORDED = PageTable(("",), [("not recorded, or it never changed",)])
 
 
-def thinned(rows: IntArray, most: int) -> IntArray:
-    """At most so many of the rows, evenly spread."""
-    return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)]
-
-
-def against(comparison: Comparison, columns: Sequence[Covariate]) -> Figure | PageTable:
-    """One small picture per covariate: dots, and each coordinate's mean in twelve classes of equally many rows."""
-    return small_multiples(comparison, columns, comparison.residual_um, comparison.aligned.labels, "residual, um")
-
-
-def at_links(comparison: Comparison) -> Figure | PageTable:
+def plot_link_residuals(comparison: Comparison) -> Figure | PageTable:
     """The residual as errors of the links' lengths, against each link's own length."""
     links_um = comparison.link_residual_um
     if links_um is None:
@@ -45,117 +30,28 @@ def at_links(comparison: Comparison) -> Figure | PageTable:
     rows = np.flatnonzero(comparison.used)
     for i in range(count):
         length_mm = comparison.aligned.rows.link_mm[:, i]
-        _dots_and_means(figure, (1, i + 1), length_mm, links_um[:, i], rows, f"link {i + 1}", SERIES_COLOURS[i], False)
+        add_dots_and_means(
+            figure, (1, i + 1), length_mm, links_um[:, i], rows, f"link {i + 1}", SERIES_COLOURS[i], False
+        )
         figure.update_xaxes(title_text="length, mm", row=1, col=i + 1)
-    return styled(figure, "length, mm", "error of length, um", 340).update_layout(margin={"t": 60})
+    return style_figure(figure, "length, mm", "error of length, um", 340).update_layout(margin={"t": 60})
 
 
-def small_multiples(
-    comparison: Comparison, columns: Sequence[Covariate], values_um: FloatArray, names: Sequence[str], label: str
-) -> Figure | PageTable:
-    """Pictures side by side with one common scale; NOT_RECORDED where there is no covariate that changes."""
-    used = np.flatnonzero(comparison.used)
-    shown = [one for one in columns if np.isfinite(one.values[used]).any() and np.nanstd(one.values[used]) > 0]
-    if not shown:
-        return NOT_RECORDED
-    lines = -(-len(shown) // COLUMNS)
-    across = min(COLUMNS, len(shown))
-    figure = make_subplots(
-        lines,
-        across,
-        shared_yaxes=True,
-        subplot_titles=[one.name for one in shown],
-        vertical_spacing=min(0.45 / lines, 0.3),
-        horizontal_spacing=0.04,
-    )
-    styled(figure, "", "", 80 + 240 * lines).update_layout(
-        legend={"y": 1 + 45 / (240 * lines), "itemsizing": "constant"}, margin={"t": 70}
-    )
-    for k, one in enumerate(shown):
-        place = (k // across + 1, k % across + 1)
-        for series, name in enumerate(names):
-            colour = SERIES_COLOURS[series % len(SERIES_COLOURS)]
-            _dots_and_means(figure, place, one.values, values_um[:, series], used, name, colour, k == 0)
-        figure.update_xaxes(title_text=_unit(one), title_standoff=4, row=place[0], col=place[1])
-        if place[1] == 1:
-            figure.update_yaxes(title_text=label, row=place[0], col=1)
-    return figure
-
-
-def _unit(one: Covariate) -> str:
-    if one.name.startswith("temperature"):
-        return "K" if " - " in one.name else "degC"
-    return one.unit if one.unit != "1" else "-1 = shortening, +1 = lengthening"
-
-
-def _dots_and_means(
-    figure: Figure,
-    place: tuple[int, int],
-    x: FloatArray,
-    y_um: FloatArray,
-    rows: IntArray,
-    name: str,
-    colour: str,
-    legend: bool,
-) -> None:
-    known = rows[np.isfinite(x[rows]) & np.isfinite(y_um[rows])]
-    dots = thinned(known, DOTS)
-    row, col = place
-    figure.add_trace(
-        Scatter(
-            x=x[dots],
-            y=y_um[dots],
-            mode="markers",
-            showlegend=False,
-            legendgroup=name,
-            marker={"size": 3, "color": colour, "opacity": 0.35},
-            hovertemplate=f"{name}: %{{y:.2f}} um at %{{x:.4g}}<extra></extra>",
-        ),
-        row=row,
-        col=col,
-    )
-    middle, mean = class_means(x[known], y_um[known])
-    figure.add_trace(
-        Scatter(
-            x=middle,
-            y=mean,
-            mode="lines+markers",
-            name=name,
-            legendgroup=name,
-            showlegend=legend,
-            line={"color": colour, "width": 2},
-            marker={"size": 5, "color": colour},
-            hovertemplate=f"{name}, mean: %{{y:.3f}} um<extra></extra>",
-        ),
-        row=row,
-        col=col,
-    )
-
-
-def class_means(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Means of x and y in classes of about equally many rows; equal values are never split."""
-    ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:]))
-    group = np.searchsorted(ends, x)
-    count = np.bincount(group)
-    filled = count > 0
-    return np.bincount(group, x)[filled] / count[filled], np.bincount(group, y)[filled] / count[filled]
-
-
-def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
+def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     """Residual vectors in the workspace, and how many times they are enlarged."""
     aligned = comparison.aligned
     used = np.flatnonzero(comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1))
     if aligned.of_links or not len(used):
         return NOT_RECORDED, 1.0
-    chosen = thinned(used, ARROWS)
+    chosen = thin(used, ARROWS)
     tip = aligned.rows.tip_M_mm[chosen]
     vector_um = np.zeros((len(chosen), 3))
     vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
-    typical_mm = max(float(np.sqrt(np.mean((vector_um**2).sum(axis=1)))) / 1e3, 1e-9)
+    typical_mm = max(rms(np.linalg.norm(vector_um, axis=1)) / UM_PER_MM, 1e-9)
     reach_mm = float(np.ptp(tip, axis=0).max()) or 1.0
     enlarged = 10.0 ** np.floor(np.log10(ARROW_SHARE * reach_mm / typical_mm))
     enlarged *= max(step for step in (1, 2, 5) if step * enlarged <= ARROW_SHARE * reach_mm / typical_mm)
-    end = tip + vector_um / 1e3 * enlarged
+    end = tip + vector_um / UM_PER_MM * enlarged
     gap = np.full_like(tip, np.nan)
     path = np.stack([tip, end, gap], axis=1).reshape(-1, 3)
     size_um = np.linalg.norm(vector_um, axis=1)
@@ -192,7 +88,7 @@ def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
             },
         )
     )
-    styled(figure, "", "", 600)
+    style_figure(figure, "", "", 600)
     figure.update_layout(
         scene={
             **{f"{axis}axis_title": f"{axis}, mm" for axis in "xyz"},
@@ -204,7 +100,7 @@ def arrows(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     return figure, enlarged
 
 
-def histogram(comparison: Comparison) -> Figure:
+def plot_histogram(comparison: Comparison) -> Figure:
     """Each coordinate's residual, and what noise alone would make."""
     labels = comparison.aligned.labels
     figure = make_subplots(1, len(labels), subplot_titles=list(labels))
@@ -244,37 +140,37 @@ def histogram(comparison: Comparison) -> Figure:
             col=k,
         )
         figure.update_xaxes(title_text=f"residual of {label}, um", row=1, col=k)
-    styled(figure, f"residual of {labels[0]}, um", "rows", 350)
+    style_figure(figure, f"residual of {labels[0]}, um", "rows", 350)
     return figure.update_layout(margin={"t": 70}, legend={"y": 1.12})
 
 
-def workspace(comparison: Comparison) -> Figure | PageTable:
+def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
     """Rms residual in cells of the workspace, seen from above, from the front and from the side."""
     aligned = comparison.aligned
     used = comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1)
     if not used.any():
         return NOT_RECORDED
-    tip = aligned.rows.tip_M_mm[used]
-    square = (comparison.residual_um[used] ** 2).mean(axis=1)
+    tip_mm = aligned.rows.tip_M_mm[used]
+    square_um2 = (comparison.residual_um[used] ** 2).mean(axis=1)
     views = [("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2)]
     figure = make_subplots(1, 3, subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
-    maps = []
+    maps: list[tuple[list[FloatArray], FloatArray]] = []
     for _, a, b in views:
-        edges = [np.linspace(*_ends(tip[:, axis]), CELLS + 1) for axis in (a, b)]
-        total, _, _ = np.histogram2d(tip[:, a], tip[:, b], bins=edges, weights=square)
-        count, _, _ = np.histogram2d(tip[:, a], tip[:, b], bins=edges)
+        edges = [np.linspace(*_ends(tip_mm[:, axis]), CELLS + 1) for axis in (a, b)]
+        total_um2, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges, weights=square_um2)
+        count, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges)
         with np.errstate(invalid="ignore"):
-            maps.append((edges, np.sqrt(total / np.where(count > 0, count, np.nan))))
-    highest = max(float(np.nanmax(rms)) for _, rms in maps)
-    for k, ((name, a, b), (edges, rms)) in enumerate(zip(views, maps, strict=True), start=1):
+            maps.append((edges, np.sqrt(total_um2 / np.where(count > 0, count, np.nan))))
+    highest_um = max(float(np.nanmax(cells_um)) for _, cells_um in maps)
+    for k, ((name, a, b), (edges, cells_um)) in enumerate(zip(views, maps, strict=True), start=1):
         middle = [(edge[1:] + edge[:-1]) / 2 for edge in edges]
         figure.add_trace(
             Heatmap(
                 x=middle[0],
                 y=middle[1],
-                z=rms.T,
+                z=cells_um.T,
                 zmin=0.0,
-                zmax=highest,
+                zmax=highest_um,
                 colorscale="Viridis",
                 showscale=k == 3,
                 colorbar={"title": "um rms", "thickness": 14},
@@ -286,7 +182,7 @@ def workspace(comparison: Comparison) -> Figure | PageTable:
         )
         figure.update_xaxes(title_text=f"{'xyz'[a]}, mm", row=1, col=k)
         figure.update_yaxes(title_text=f"{'xyz'[b]}, mm", title_standoff=2, row=1, col=k)
-    return styled(figure, "x, mm", "y, mm", 390).update_layout(margin={"r": 80, "t": 60})
+    return style_figure(figure, "x, mm", "y, mm", 390).update_layout(margin={"r": 80, "t": 60})
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
@@ -294,12 +190,12 @@ def _ends(values: FloatArray) -> tuple[float, float]:
     return (low, high) if high > low else (low - 1.0, high + 1.0)
 
 
-def switched_off(comparison: Comparison) -> Figure | PageTable:
+def plot_contributions(comparison: Comparison) -> Figure | PageTable:
     """The error that is left with each source switched off, beside the whole model and the noise floor."""
     if not comparison.contributions:
         return NOT_RECORDED
     names = ["whole model", *(f"without {name}" for name in comparison.contributions)]
-    left = [comparison.rms_um, *(one.without_rms_um for one in comparison.contributions.values())]
+    left = [comparison.rms_um, *(part.without_rms_um for part in comparison.contributions.values())]
     colours = [COLOURS["best"], *[COLOURS["plain"]] * (len(names) - 1)]
     figure = Figure(
         Bar(
@@ -320,36 +216,5 @@ def switched_off(comparison: Comparison) -> Figure | PageTable:
         annotation_position="top",
     )
     figure.update_yaxes(autorange="reversed")
-    styled(figure, "residual, um rms per coordinate", "", 130 + 38 * len(names))
+    style_figure(figure, "residual, um rms per coordinate", "", 130 + 38 * len(names))
     return figure.update_layout(margin={"l": 210, "r": 90, "t": 40}, xaxis_range=[0, 1.05 * max(left)])
-
-
-def falling(labels: Sequence[str], rms_um: Sequence[float], floors_um: Sequence[float]) -> Figure:
-    """The error after each step of a model, and the noise floor that it cannot fall below."""
-    figure = Figure()
-    figure.add_trace(
-        Scatter(
-            x=list(labels),
-            y=list(floors_um),
-            mode="lines",
-            name="noise floor",
-            line={"color": COLOURS["worst"], "dash": "dash"},
-        )
-    )
-    figure.add_trace(
-        Scatter(
-            x=list(labels),
-            y=list(rms_um),
-            mode="lines+markers+text",
-            name="residual",
-            text=[f"{value:.3g}" for value in rms_um],
-            textposition="top center",
-            line={"color": COLOURS["plain"], "width": 3},
-            marker={"size": 9},
-        )
-    )
-    styled(figure, "", "residual, um rms per coordinate", 420)
-    ends = np.log10([0.7 * min(*rms_um, *floors_um), 1.6 * max(*rms_um, *floors_um)])
-    return figure.update_yaxes(type="log", dtick="D2", tickformat=".3~g", range=ends.tolist()).update_layout(
-        margin={"b": 90}, xaxis={"tickangle": 0}
-    )

@@ -18,6 +18,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
+from compd.errors import CompdError, Problem
+
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
 
@@ -46,6 +48,14 @@ class Panel:
     content: Figure | PageTable
 
 
+def check_page_path(path: Path) -> None:
+    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it."""
+    if not path.parent.is_dir():
+        raise CompdError(
+            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
+        )
+
+
 def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], footer: str) -> None:
     """Write the page to `path`; all texts are escaped, and plotly's script is inside, once."""
     page = _template().render(
@@ -66,7 +76,7 @@ def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], fo
     path.write_text(page, encoding="utf-8")
 
 
-def styled(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
+def style_figure(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
     """The figure with the look that all have: axis titles with units, quiet grid, legend on top."""
     figure.update_layout(
         template="plotly_white",

@@ -16,8 +16,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration.document import Document, Location
-from compd.configuration.document import read as read_document
+from compd.configuration.document import Document, Location, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
@@ -39,7 +38,7 @@ class PresetDirectory:
         """Of all presets, sorted."""
         return sorted(file.name.removesuffix(SUFFIX) for file in self._folder.iterdir() if file.name.endswith(SUFFIX))
 
-    def read_document(self, name: str) -> tuple[Preset, Document]:
+    def read(self, name: str) -> tuple[Preset, Document]:
         """A preset and the file that it was read from. Raises PluginError, with every problem and its line."""
         if name not in self.names():
             raise PluginError(
@@ -56,7 +55,7 @@ class PresetDirectory:
 
     def _driver(self, name: str) -> type[Gauge[Any]]:
         """The driver's class. Raises PluginError, with every problem and its line, for a file that cannot be used."""
-        preset, document = self.read_document(name)
+        preset, document = self.read(name)
         base = load(GAUGES, preset.base, document.where(("base",)))
         try:
             return driver_class(name, preset, base)
@@ -67,7 +66,7 @@ class PresetDirectory:
 
     def _simulated_device(self, name: str) -> type:
         """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
-        preset, document = self.read_document(name)
+        preset, document = self.read(name)
         base = load(GAUGES, preset.base, document.where(("base",)))
         device = load(SIMULATED_GAUGES, preset.base, document.where(("base",)))
         sample = self.driver(name).Options.model_validate({"driver": name, "line": "line", **preset.sample})

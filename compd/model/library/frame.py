@@ -32,6 +32,7 @@ EFFECTS = (
         mistaken_for=(),
         separated_by="a gauge block of known thickness under a comparator",
         basis=memoryless_basis(_gain),
+        follows_reading=True,
     ),
     Effect(
         id="frame_rod_expansion",

@@ -33,6 +33,7 @@ EFFECTS = (
         mistaken_for=("joint_runout",),
         separated_by="a gauge block of known thickness under a comparator",
         basis=memoryless_basis(_gain),
+        follows_reading=True,
     ),
     Effect(
         id="joint_comparator_drift",

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from compd.cli.effect import effect as command
 from compd.errors import CompdError
 from compd.model.library import BUNDLED
-from compd.report.effect_signature import signature
+from compd.report.effect_signature import compute_signature
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD
 from tests.support.paths import CONFIG
 
@@ -54,9 +54,9 @@ def test_every_effect_has_a_signature(effect: object) -> None:
     for model in (TRIPOD, HEXAPOD):
         if "revolute_axes" in one.needs and model is HEXAPOD:
             with pytest.raises(CompdError, match="only a tripod"):
-                signature(one, model, DETAILS)
+                compute_signature(one, model, DETAILS)
             continue
-        found = signature(one, model, DETAILS)
+        found = compute_signature(one, model, DETAILS)
         assert np.isfinite(found.tip_um).all()
         assert np.linalg.norm(found.tip_um, axis=1).max() > 1e-3
         assert found.curves
@@ -65,7 +65,7 @@ def test_every_effect_has_a_signature(effect: object) -> None:
 
 
 def test_the_hysteresis_curve_is_a_loop() -> None:
-    found = signature(LIBRARY["friction_hysteresis"], TRIPOD, DETAILS)
+    found = compute_signature(LIBRARY["friction_hysteresis"], TRIPOD, DETAILS)
     path_mm, tip_um = found.curves[0].driven_by, found.curves[0].tip_um[:, 0]
     middle = np.flatnonzero(np.abs(path_mm) < 1e-9)
     there, back, again = tip_um[middle]

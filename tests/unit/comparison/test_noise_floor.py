@@ -42,7 +42,7 @@ def test_a_gross_repeat_does_not_raise_the_floor() -> None:
     values[7, 1] += 50
     scatter = repeat_scatter(values, everything(values), pairs(400))
     assert scatter is not None
-    assert scatter.gross_visits == 1
+    assert scatter.outlier_visits == 1
     np.testing.assert_allclose(scatter.by_axis_um, 0.2, rtol=0.15)
 
 

@@ -1,0 +1,86 @@
+"""The ledger of a model file as a page: each step that changed the model, and how the error fell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from plotly.graph_objects import Figure, Scatter
+
+from compd.model_file import StoredModel
+from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
+
+LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
+
+
+def write_ledger_page(path: Path, model: StoredModel) -> None:
+    """Write the page: the error after each step, and the steps. The model has one step or more."""
+    steps = model.steps
+    labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
+    rms_um = [steps[0].rms_before_um, *(step.rms_after_um for step in steps)]
+    floors_um = [steps[0].noise_floor_um, *(step.noise_floor_um for step in steps)]
+    verdict = (
+        f"After {len(steps)} steps the residual is {rms_um[-1]:.3g} um; it was {rms_um[0]:.3g} um. "
+        f"Noise alone would be {floors_um[-1]:.3g} um."
+    )
+    panels = [
+        Panel(
+            "The falling error",
+            "Residual after each step, on the recording it was fitted on.",
+            plot_error_by_step(labels, rms_um, floors_um),
+        ),
+        Panel(
+            "Every step",
+            "Each can be taken back with `compd effect undo`.",
+            PageTable(LEDGER_HEAD, ledger_rows(model)),
+        ),
+    ]
+    write_page(path, f"Ledger: {model.machine}", verdict, panels, "")
+
+
+def ledger_rows(model: StoredModel) -> list[list[str]]:
+    """One line per step."""
+    return [
+        [
+            str(k),
+            f"{step.kind} {step.effect}".rstrip() + (" (undone)" if step.undone else ""),
+            step.recording,
+            f"{step.rms_before_um:.3g}",
+            f"{step.rms_after_um:.3g}",
+            f"{step.noise_floor_um:.3g}",
+            step.date[:10],
+        ]
+        for k, step in enumerate(model.steps, start=1)
+    ]
+
+
+def plot_error_by_step(labels: Sequence[str], rms_um: Sequence[float], floors_um: Sequence[float]) -> Figure:
+    """The error after each step of a model, and the noise floor that it cannot fall below."""
+    figure = Figure()
+    figure.add_trace(
+        Scatter(
+            x=list(labels),
+            y=list(floors_um),
+            mode="lines",
+            name="noise floor",
+            line={"color": COLOURS["worst"], "dash": "dash"},
+        )
+    )
+    figure.add_trace(
+        Scatter(
+            x=list(labels),
+            y=list(rms_um),
+            mode="lines+markers+text",
+            name="residual",
+            text=[f"{value:.3g}" for value in rms_um],
+            textposition="top center",
+            line={"color": COLOURS["plain"], "width": 3},
+            marker={"size": 9},
+        )
+    )
+    style_figure(figure, "", "residual, um rms per coordinate", 420)
+    ends = np.log10([0.7 * min(*rms_um, *floors_um), 1.6 * max(*rms_um, *floors_um)])
+    return figure.update_yaxes(type="log", dtick="D2", tickformat=".3~g", range=ends.tolist()).update_layout(
+        margin={"b": 90}, xaxis={"tickangle": 0}
+    )

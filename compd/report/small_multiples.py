@@ -1,0 +1,136 @@
+"""Small multiples: values of a comparison's rows against one covariate after the other, as dots and class means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from plotly.graph_objects import Figure, Scatter
+from plotly.subplots import make_subplots
+
+from compd.arrays import FloatArray, IntArray
+from compd.comparison.compare import Comparison
+from compd.comparison.covariates import Covariate
+from compd.report.page import COLOURS, PageTable, style_figure
+
+# More dots than this hide each other; means are always over all rows.
+DOTS = 500
+BINS = 12
+COLUMNS = 3
+SERIES_COLOURS = (COLOURS["worst"], COLOURS["best"], COLOURS["plain"], COLOURS["middle"], "#cc79a7", "#56b4e9")
+NOT_RECORDED = PageTable(("",), [("not recorded, or it never changed",)])
+
+
+def plot_residual_against(comparison: Comparison, columns: Sequence[Covariate]) -> Figure | PageTable:
+    """The residual against each covariate: dots, and each coordinate's mean in twelve classes of equally many rows."""
+    return small_multiples(comparison, columns, comparison.residual_um, comparison.aligned.labels, "residual, um")
+
+
+def small_multiples(
+    comparison: Comparison, columns: Sequence[Covariate], values_um: FloatArray, names: Sequence[str], label: str
+) -> Figure | PageTable:
+    """One small figure per covariate, side by side with a common scale; NOT_RECORDED where no covariate changes.
+
+    values_um : (N, series), named `names`, over the rows of the comparison.  label : of the vertical axes.
+    """
+    used = np.flatnonzero(comparison.used)
+    changing = [column for column in columns if _changes(column.values[used])]
+    if not changing:
+        return NOT_RECORDED
+    lines = -(-len(changing) // COLUMNS)
+    across = min(COLUMNS, len(changing))
+    figure = make_subplots(
+        lines,
+        across,
+        shared_yaxes=True,
+        subplot_titles=[covariate.name for covariate in changing],
+        vertical_spacing=min(0.45 / lines, 0.3),
+        horizontal_spacing=0.04,
+    )
+    style_figure(figure, "", "", 80 + 240 * lines).update_layout(
+        legend={"y": 1 + 45 / (240 * lines), "itemsizing": "constant"}, margin={"t": 70}
+    )
+    for k, covariate in enumerate(changing):
+        row, col = k // across + 1, k % across + 1
+        for series, name in enumerate(names):
+            colour = SERIES_COLOURS[series % len(SERIES_COLOURS)]
+            add_dots_and_means(
+                figure, (row, col), covariate.values, values_um[:, series], used, name, colour, legend=k == 0
+            )
+        figure.update_xaxes(title_text=_axis_unit(covariate), title_standoff=4, row=row, col=col)
+        if col == 1:
+            figure.update_yaxes(title_text=label, row=row, col=1)
+    return figure
+
+
+def _changes(values: FloatArray) -> bool:
+    return bool(np.isfinite(values).any() and np.nanstd(values) > 0)
+
+
+def _axis_unit(covariate: Covariate) -> str:
+    """The unit of the covariate itself, where `Covariate.unit` is that of its changes."""
+    if covariate.name.startswith("temperature"):
+        return "K" if " - " in covariate.name else "degC"
+    return covariate.unit if covariate.unit != "1" else "-1 = shortening, +1 = lengthening"
+
+
+def add_dots_and_means(
+    figure: Figure,
+    place: tuple[int, int],
+    x: FloatArray,
+    y_um: FloatArray,
+    rows: IntArray,
+    name: str,
+    colour: str,
+    legend: bool,
+) -> None:
+    """Add values y_um (N,) against x (N,) to the subplot at `place` (row, column): dots, and means of classes.
+
+    rows : (R,) indices of the rows that count.  legend : whether the series gets an entry.
+    """
+    known = rows[np.isfinite(x[rows]) & np.isfinite(y_um[rows])]
+    dots = thin(known, DOTS)
+    row, col = place
+    figure.add_trace(
+        Scatter(
+            x=x[dots],
+            y=y_um[dots],
+            mode="markers",
+            showlegend=False,
+            legendgroup=name,
+            marker={"size": 3, "color": colour, "opacity": 0.35},
+            hovertemplate=f"{name}: %{{y:.2f}} um at %{{x:.4g}}<extra></extra>",
+        ),
+        row=row,
+        col=col,
+    )
+    middle, mean = class_means(x[known], y_um[known])
+    figure.add_trace(
+        Scatter(
+            x=middle,
+            y=mean,
+            mode="lines+markers",
+            name=name,
+            legendgroup=name,
+            showlegend=legend,
+            line={"color": colour, "width": 2},
+            marker={"size": 5, "color": colour},
+            hovertemplate=f"{name}, mean: %{{y:.3f}} um<extra></extra>",
+        ),
+        row=row,
+        col=col,
+    )
+
+
+def class_means(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(C,) means of x and of y (R,) in classes of about equally many rows; equal values are never split."""
+    ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:]))
+    group = np.searchsorted(ends, x)
+    count = np.bincount(group)
+    filled = count > 0
+    return np.bincount(group, x)[filled] / count[filled], np.bincount(group, y)[filled] / count[filled]
+
+
+def thin(rows: IntArray, most: int) -> IntArray:
+    """At most so many of the rows, evenly spread."""
+    return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)]
