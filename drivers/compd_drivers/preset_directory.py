@@ -16,7 +16,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration.document import Document, Location, read
+from compd.configuration.document import Document, Location
+from compd.configuration.document import read as read_document
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
@@ -38,9 +39,24 @@ class PresetDirectory:
         """Of all presets, sorted."""
         return sorted(file.name.removesuffix(SUFFIX) for file in self._folder.iterdir() if file.name.endswith(SUFFIX))
 
+    def read(self, name: str) -> tuple[Preset, Document]:
+        """A preset and the file that it was read from. Raises PluginError, with every problem and its line."""
+        if name not in self.names():
+            raise PluginError(
+                Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
+            )
+        try:
+            with as_file(self._folder / f"{name}{SUFFIX}") as path:
+                document = read_document(path)
+            return Preset.model_validate(document.data), document
+        except ConfigurationError as error:
+            raise PluginError(error.problems) from error
+        except ValidationError as error:
+            raise PluginError(_problems(document, error)) from error
+
     def _driver(self, name: str) -> type[Gauge[Any]]:
         """The driver's class. Raises PluginError, with every problem and its line, for a file that cannot be used."""
-        preset, document = self._read(name)
+        preset, document = self.read(name)
         base = load(GAUGES, preset.base, document.where(("base",)))
         try:
             return driver_class(name, preset, base)
@@ -51,7 +67,7 @@ class PresetDirectory:
 
     def _simulated_device(self, name: str) -> type:
         """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
-        preset, document = self._read(name)
+        preset, document = self.read(name)
         base = load(GAUGES, preset.base, document.where(("base",)))
         device = load(SIMULATED_GAUGES, preset.base, document.where(("base",)))
         sample = self.driver(name).Options.model_validate({"driver": name, "line": "line", **preset.sample})
@@ -60,20 +76,6 @@ class PresetDirectory:
         except ValidationError as error:
             raise PluginError(_problems(document, error, ("simulated",))) from error
         return simulated_class(name, preset, base.Options, device)
-
-    def _read(self, name: str) -> tuple[Preset, Document]:
-        if name not in self.names():
-            raise PluginError(
-                Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
-            )
-        try:
-            with as_file(self._folder / f"{name}{SUFFIX}") as path:
-                document = read(path)
-            return Preset.model_validate(document.data), document
-        except ConfigurationError as error:
-            raise PluginError(error.problems) from error
-        except ValidationError as error:
-            raise PluginError(_problems(document, error)) from error
 
 
 def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gauge[Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from compd.commissioning.conformance.report import driver_under_test, run_confor
 from compd.errors import PluginError
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd_drivers.preset_directory import PresetDirectory
+from tests.support.paths import ROOT
 from tests.support.transcripts import check_simulated_device, replay_transcript
 
 # Three gauges that do not exist, one on each protocol: the preset, and its transcript.
@@ -183,6 +185,15 @@ def test_a_preset_is_listed_and_shown_like_any_driver(made_up: Path) -> None:
 def test_options_that_cannot_be_right(made_up: Path, options: dict[str, object], why: str) -> None:
     with pytest.raises(ValidationError, match=why):
         load(GAUGES, "dial_100", "x").Options.model_validate({"driver": "dial_100", "line": "l", **options})
+
+
+def test_the_example_in_the_guide_is_a_preset(tmp_path: Path) -> None:
+    guide = (ROOT / "drivers" / "compd_drivers" / "presets" / "README.md").read_text()
+    first, last = guide.index("    title:"), guide.index("An option is")
+    (tmp_path / "dial.yaml").write_text(textwrap.dedent(guide[first:last]))
+    presets = PresetDirectory(tmp_path)
+    assert presets.driver("dial").sample_options == {"unit": "mm"}
+    assert presets.simulated_device("dial")
 
 
 def test_what_is_wrong_for_the_simulated_device_is_named_too(tmp_path: Path) -> None:
