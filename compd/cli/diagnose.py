@@ -44,14 +44,14 @@ def diagnose(
     from compd.cli.progress import steps_shown
     from compd.diagnosis.diagnose import diagnose as diagnosed
     from compd.diagnosis.holdout import opened
-    from compd.model.library import library
+    from compd.model.library import load_library
 
     if html is not None:
         write_page_to(html)
     sealed = [open_recording(path, machine)[0] for path in recordings[1:]]
     aligned, _ = open_recording(recordings[0], machine)
     file = open_model(model, aligned)
-    effects = [*library().values()]
+    effects = [*load_library().values()]
     with steps_shown(quiet=as_json) as progress:
         found = diagnosed(aligned, file.fitted, file.covariance, effects, progress)
     checked = [opened(found, one) for one in sealed]

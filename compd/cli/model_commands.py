@@ -88,12 +88,12 @@ def _name(declared: Declaration) -> str:
 def declaration_of(text: str) -> tuple[Declaration, Effect]:
     """What the person named, and the effect it stands for. Raises CompdError with every problem."""
     from compd.configuration.document import read
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
     if Path(text).suffix in (".yaml", ".yml"):
         declared = read(Path(text)).data
-        return declared, find(declared, text)
-    return text, find(text, "compd effect add")
+        return declared, find_effect(declared, text)
+    return text, find_effect(text, "compd effect add")
 
 
 def _opened(path: Path, aligned: AlignedRecording, configuration: Configuration | None) -> ModelFile:

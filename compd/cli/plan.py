@@ -34,7 +34,7 @@ def plan(
     from compd.diagnosis.measurement_programmes import limits_of
     from compd.diagnosis.next_measurement import plan as planned
     from compd.errors import CompdError, Problem
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
     names = [name.strip() for name in rivals.split(",")]
     if len(names) != 2 or names[0] == names[1]:
@@ -47,7 +47,7 @@ def plan(
                 next_step="`compd diagnose` names rivals",
             )
         )
-    effects = [find(name, "--rivals") for name in names]
+    effects = [find_effect(name, "--rivals") for name in names]
     aligned, _ = open_recording(recording, machine)
     file = open_model(model, aligned)
     present = [one.effect.id for one in file.fitted if one.effect.id in names]

@@ -12,7 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.model.effect import Effect
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.units import unit_of
 
 HOUR_S = 3600.0
@@ -70,7 +70,7 @@ class EmpiricalTerm:
 
     def effect(self) -> Effect:
         """To be searched; along the first axis where there are several."""
-        return find(self.declaration(self.axes[0]), "description")
+        return find_effect(self.declaration(self.axes[0]), "description")
 
     def declaration(
         self, axis: str, value: float | None = None, sizes: Mapping[str, float] | None = None

@@ -14,7 +14,7 @@ from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect, FittedEffect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
@@ -102,7 +102,7 @@ def _change(
     file: ModelFile, old: ModelFile, found: FitResult, before: Comparison, kind: Kind, effect: str, date: str
 ) -> Change:
     aligned = before.aligned
-    others = library_pool(aligned, list(library().values()), [one.effect.id for one in found.fitted])
+    others = library_pool(aligned, list(load_library().values()), [one.effect.id for one in found.fitted])
     found = with_disturbances(found, aligned, before.floor.by_axis_um, others.candidates)
     after = compare(aligned, found.fitted, found.covariance)
     recording = aligned.recording

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 from compd.diagnosis.diagnose import diagnose
-from compd.model.library import library
+from compd.model.library import load_library
 from tests.benchmarks.figures import show
 from tests.support.diagnosed import recorded
 
@@ -27,7 +27,7 @@ CASES: dict[str, dict[str, tuple[float, ...]]] = {
 
 def main() -> None:
     """Print a table: wall and processor time of each case, and how often it fits into the budget."""
-    effects = list(library().values())
+    effects = list(load_library().values())
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.csv"

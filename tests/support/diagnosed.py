@@ -12,11 +12,11 @@ from compd.comparison.aligned_recording import AlignedRecording, added_by, align
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 
-LIBRARY = library()
+LIBRARY = load_library()
 NOISE_UM = 0.15
 PLACES = ("room", "link_1", "link_2", "link_3", "base", "frame", "platform", "tool", "plate_top", "plate_bottom")
 SIDECAR = {

@@ -97,10 +97,10 @@ class Run:
         self.machine.commands.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
 
     @contextmanager
-    def recorder(self, name: Path, keeping=ROOMY, say=None, **watch):
+    def recorder(self, name: Path, limits=ROOMY, reports=None, **watch):
         """A recorder that has written everything when the block ends."""
-        said = [] if say is None else say
-        recorder = Recorder(name, self.version, self.watch | watch, keeping, said.append, MonotonicClock())
+        texts = [] if reports is None else reports
+        recorder = Recorder(name, self.version, self.watch | watch, limits, texts.append, MonotonicClock())
         recorder.start()
         yield recorder
         recorder.close()

@@ -13,7 +13,7 @@ SMALLEST = 1e-300
 
 
 @helper
-def turn(R: FloatArray, x_rad: float, y_rad: float, z_rad: float) -> None:
+def rotate_in_place(R: FloatArray, x_rad: float, y_rad: float, z_rad: float) -> None:
     """Turn R (3, 3) in place by a small vector about the fixed axes.
 
     The quaternion (1, v/2), normalised, agrees with the exponential to second order, which is all that
@@ -50,7 +50,7 @@ def orthonormalise(R: FloatArray) -> None:
 
 
 @helper
-def vector_of(R: FloatArray, vector_rad: FloatArray) -> None:
+def set_rotation_vector(R: FloatArray, vector_rad: FloatArray) -> None:
     """Rotation vector (3,) of R (3, 3), angle 0 to pi, by its quaternion (Shepperd's choice of the divisor)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace > 0.0:
@@ -77,7 +77,7 @@ def vector_of(R: FloatArray, vector_rad: FloatArray) -> None:
 @kernel([MATRIX, VECTOR], "(d,d)->(d)")
 def rotation_vector(R: FloatArray, vector_rad: FloatArray) -> None:
     """R (..., 3, 3) -> its rotation vector (..., 3) in rad, angle 0 to pi."""
-    vector_of(R, vector_rad)
+    set_rotation_vector(R, vector_rad)
 
 
 @kernel([VECTOR, MATRIX], "(d)->(d,d)")

@@ -16,7 +16,7 @@ from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.regression import Block, Evidence, sums
 from compd.diagnosis.significance import FLIPS, chances
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.library import find
+from compd.model.library import find_effect
 from tests.support.diagnosed import LIBRARY, recorded
 from tests.support.paths import SHARED
 
@@ -82,7 +82,7 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     first = found.depends_on[0].as_json()
     assert first["port"] == "link"
     assert first["note"] == "a description, not a cause"
-    effect = find(first["formula_effect"], "pasted")
+    effect = find_effect(first["formula_effect"], "pasted")
     aligned = found.before.aligned
     result = fit(aligned, [start(effect, {}, aligned.rows.links)], found.before.floor.by_axis_um)
     assert result.rms_um < 1.1 * found.before.floor.um

@@ -282,13 +282,13 @@ def test_a_hexapods_target_may_turn_the_platform():
 
 
 def test_the_same_snapshots_give_the_same_setpoints_bit_for_bit():
-    one, other = machine(), machine()
+    first, second = machine(), machine()
     random = np.random.default_rng(7)
     for _ in range(50):
-        changes = {channel: float(random.normal(0, 0.005)) for channel in one.change_mm}
-        one.change_mm |= changes
-        other.change_mm |= changes
-        a, b = one.step(), other.step()
+        changes = {channel: float(random.normal(0, 0.005)) for channel in first.change_mm}
+        first.change_mm |= changes
+        second.change_mm |= changes
+        a, b = first.step(), second.step()
         assert a.to_json() == b.to_json()
         assert a.to_packet(bytes(8)) == b.to_packet(bytes(8))
 
@@ -330,7 +330,7 @@ def test_an_unusable_thermometer_is_nan_and_stops_nothing(tripod):
     tripod.faults["cabinet.room"] = Quality.SENSOR_FAULT
     assert tripod.step().state is State.OK
     wires = tripod.wires.quantity_wires(["temperature_room_degC", "temperature_link_1_degC"])
-    found = wires.read(tripod.latest.snapshot(tripod.now_s), np.zeros(2))
-    assert math.isnan(found.values[0])
-    assert found.values[1] == 20.0
-    assert "temperature_room_degC (cabinet.room): sensor_fault" in found.lost
+    read = wires.read(tripod.latest.snapshot(tripod.now_s), np.zeros(2))
+    assert math.isnan(read.values[0])
+    assert read.values[1] == 20.0
+    assert "temperature_room_degC (cabinet.room): sensor_fault" in read.lost

@@ -23,7 +23,7 @@ from compd.live.loop.model_loader import Models
 from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.model.effect import FittedEffect
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.model_file import ModelFile, write_model_file
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, Machine, machine
 from tests.unit.live.test_daemon import StillGauges, configuration, first, running
@@ -35,13 +35,13 @@ WARM_degC = 23.0
 def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Path:
     """A model file with these effects; numbers by id, else ones."""
     fitted = []
-    for one in declared:
-        effect = find(one, "here")
+    for declaration in declared:
+        effect = find_effect(declaration, "here")
         columns = effect.columns(links)
         numbers = np.broadcast_to(theta.get(effect.id, 1.0), (len(columns),)).astype(float)
         shape = {constant.name: constant.grid[0] for constant in effect.constants}
         fitted.append(FittedEffect(effect, numbers, shape))
-    count = sum(len(one.theta) for one in fitted)
+    count = sum(len(effect.theta) for effect in fitted)
     write_model_file(path, ModelFile(name, tuple(declared), tuple(fitted), np.eye(count) * 1e-2), links)
     return path
 
@@ -60,21 +60,21 @@ def test_a_model_is_adopted_between_two_ticks_slewing_never_jumping(tripod, tmp_
     file = file_with(tmp_path / "m.yaml", "link_zero", "tool_offset", link_zero=LINK_ZERO_UM, tool_offset=[3, -2, 5])
     before = tripod.settle()
     tripod.commands.models = Models(tripod.loader.read(file))
-    seen = [before]
-    while len(seen) < 200 and (len(seen) < 3 or seen[-1].state is not State.OK):
-        seen.append(tripod.step())
-    assert seen[1].state is State.SLEWING
-    assert seen[-1].state is State.OK
-    corrections = np.array([one.values.correction_mm for one in seen])
+    setpoints = [before]
+    while len(setpoints) < 200 and (len(setpoints) < 3 or setpoints[-1].state is not State.OK):
+        setpoints.append(tripod.step())
+    assert setpoints[1].state is State.SLEWING
+    assert setpoints[-1].state is State.OK
+    corrections = np.array([setpoint.values.correction_mm for setpoint in setpoints])
     assert np.abs(np.diff(corrections, axis=0)).max() <= STEP_MM + 1e-12
-    tips = np.array([one.values.tip_M_mm for one in seen])
+    tips = np.array([setpoint.values.tip_M_mm for setpoint in setpoints])
     assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() <= 5 * STEP_MM, "nor does the tip that is told"
     assert np.linalg.norm(tips[-1] - tips[0]) > 0.02
-    sources = seen[-1].values.sources_mm
+    sources = setpoints[-1].values.sources_mm
     assert list(sources) == ["joints", "frame", "link_zero", "tool_offset"]
     assert sources["link_zero"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-9)
-    assert sum(sources.values()) == pytest.approx(seen[-1].values.correction_mm, abs=1e-12)
-    assert (before.model, seen[1].model) == ("", tripod.commands.models.applied.hash)
+    assert sum(sources.values()) == pytest.approx(setpoints[-1].values.correction_mm, abs=1e-12)
+    assert (before.model, setpoints[1].model) == ("", tripod.commands.models.applied.hash)
     tripod.commands.models = None
     assert tripod.settle().values.correction_mm == pytest.approx(np.zeros(3), abs=1e-12)
 
@@ -105,7 +105,7 @@ NAMED_AS_A_PART = {**FORMULA, "id": "frame", "formula": "k * tip_x_mm"}
 
 
 @pytest.mark.parametrize(
-    ("declared", "told"),
+    ("declared", "text"),
     [
         ("link_elasticity", "wire a force gauge under `wiring: quantities:` as `name: force_z_N`"),
         (FORMULA, "wire a hygrometer under `wiring: quantities:` as `name: humidity_pct`"),
@@ -114,18 +114,18 @@ NAMED_AS_A_PART = {**FORMULA, "id": "frame", "formula": "k * tip_x_mm"}
     ],
     ids=["force", "formula", "time", "name"],
 )
-def test_an_effect_that_cannot_run_here_is_refused_with_what_to_do(tripod, tmp_path, declared, told):
+def test_an_effect_that_cannot_run_here_is_refused_with_what_to_do(tripod, tmp_path, declared, text):
     with pytest.raises(StateError) as caught:
         tripod.loader.read(file_with(tmp_path / "m.yaml", declared, "link_zero"))
-    assert told in str(caught.value)
+    assert text in str(caught.value)
 
 
 def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tripod, tmp_path):
     with pytest.raises(StateError) as caught:
         tripod.loader.read(file_with(tmp_path / "m.yaml", "link_elasticity", "link_zero", IN_TIME, link_zero=np.nan))
-    told = str(caught.value)
+    problems = str(caught.value)
     for part in ("force_x_N", "force_y_N", "force_z_N", "time_s", "effect link_zero: has a parameter"):
-        assert part in told
+        assert part in problems
     with pytest.raises(StateError, match="belongs to another machine"):
         tripod.loader.read(file_with(tmp_path / "other.yaml", "link_zero", name="hexapod", links=6))
     with pytest.raises(StateError, match="cannot be read"):
@@ -133,7 +133,7 @@ def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tri
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "text"),
     [
         ("value: 1.0", "value: one", "is no number"),
         ("effects:", "effects: 5\nothers:", "is no list"),
@@ -141,12 +141,12 @@ def test_every_problem_is_told_at_once_and_a_file_of_another_machine_refused(tri
         ("machine: tripod-cmm", "machine: tripod-cmm\ngeometry: 0123", "another geometry of this machine"),
     ],
 )
-def test_a_damaged_model_file_is_refused_in_words(tripod, tmp_path, old, new, told):
+def test_a_damaged_model_file_is_refused_in_words(tripod, tmp_path, old, new, text):
     file = file_with(tmp_path / "m.yaml", "link_sag")
     assert tripod.loader.read(file).summary["effects"] == ["link_sag"]
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
-    with pytest.raises(StateError, match=told):
+    with pytest.raises(StateError, match=text):
         tripod.loader.read(file)
 
 
@@ -154,9 +154,9 @@ def test_an_effect_of_faulty_code_is_refused_before_the_loop_meets_it(tripod, tm
     code = tmp_path / "mine.py"
     code.write_text(
         "from dataclasses import replace\n"
-        "from compd.model.library import library\n"
+        "from compd.model.library import load_library\n"
         "def basis(rows, shape, memory):\n    return rows.scale_mm[:, :2, None], memory\n"
-        "MINE = replace(library()['link_sag'], id='mine', basis=basis)\n"
+        "MINE = replace(load_library()['link_sag'], id='mine', basis=basis)\n"
     )
     code.chmod(0o644)
     with pytest.raises(StateError, match="an effect fails: ValueError"):
@@ -242,9 +242,9 @@ def test_a_shadow_changes_nothing_and_tells_what_it_would_do(tmp_path):
         assert both.values._replace(shadow=None).correction_mm.tobytes() == plain.values.correction_mm.tobytes()
         assert both.values.tip_M_mm.tobytes() == plain.values.tip_M_mm.tobytes()
         assert (both.state, both.model, list(both.values.sources_mm)) == (plain.state, "", ["joints", "frame"])
-    told = both.values.shadow
-    assert told.model == models.shadow.hash
-    difference_mm = told.correction_mm - sum(both.values.sources_mm.values())
+    shadow_result = both.values.shadow
+    assert shadow_result.model == models.shadow.hash
+    difference_mm = shadow_result.correction_mm - sum(both.values.sources_mm.values())
     expected_mm = -10e-6 * (WARM_degC - 20.0) * both.values.link_length_mm
     assert difference_mm == pytest.approx(expected_mm, rel=1e-3)
     beside.faults["cabinet.link_1"] = Quality.TIMEOUT
@@ -295,7 +295,7 @@ def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp
     file = file_with(tmp_path / "m.yaml", "link_zero", "tool_offset", name=machine_name, links=links)
     model = live.loader.read(file)
     live.commands.models = Models(model)
-    found = live.settle().values.u_tip_um
+    u_tip_um = live.settle().values.u_tip_um
 
     def tip_um(at, step):
         values = {"scale_mm": np.zeros(links), "joint_mm": np.zeros(live.wires.joints), "frame_mm": np.zeros(9)}
@@ -306,21 +306,21 @@ def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp
             values[kind][k - first_] = live.change_mm[channel] + (step if at == k else 0.0)
         changed = model.machine
         if isinstance(at, tuple):
-            one = changed.effects[at[0]]
-            theta = one.theta + step * (np.arange(len(one.theta)) == at[1])
-            effects = [replace(o, theta=theta) if o is one else o for o in changed.effects]
+            fitted = changed.effects[at[0]]
+            theta = fitted.theta + step * (np.arange(len(fitted.theta)) == at[1])
+            effects = [replace(effect, theta=theta) if effect is fitted else effect for effect in changed.effects]
             changed = replace(changed, effects=tuple(effects))
-        found, _ = compensate_cmm(changed, GaugeValues(**values, quantities={}), WarmStart.at_zero(changed))
-        return found.tip_M_mm * 1e3
+        compensation, _ = compensate_cmm(changed, GaugeValues(**values, quantities={}), WarmStart.at_zero(changed))
+        return compensation.tip_M_mm * 1e3
 
     def variance(places, step, sigma):
         return sum(((tip_um(at, step) - tip_um(at, -step)) / (2 * step) * sigma) ** 2 for at in places)
 
     gauges = variance(range(len(live.wires.length_channels)), 1e-3, 0.2e-3)
-    numbers = [(e, k) for e, one in enumerate(model.machine.effects) for k in range(len(one.theta))]
-    parameters = variance(numbers, 1.0, 0.1)
+    places = [(e, k) for e, fitted in enumerate(model.machine.effects) for k in range(len(fitted.theta))]
+    parameters = variance(places, 1.0, 0.1)
     assert gauges_alone == pytest.approx(np.sqrt(gauges), rel=1e-3)
-    assert found == pytest.approx(np.sqrt(gauges + parameters), rel=1e-3)
+    assert u_tip_um == pytest.approx(np.sqrt(gauges + parameters), rel=1e-3)
     assert live.step().to_json().count(b'"u_tip_um":[') == 1
 
 
@@ -331,13 +331,13 @@ def test_what_is_not_known_makes_the_tip_uncertain_without_a_number(tmp_path):
     assert b"u_tip_um" not in live.step().to_json()
     loaded = live.configuration
     quantities = tuple(q.model_copy(update={"noise": 0.02}) for q in loaded.wiring.quantities)
-    told = Machine(replace(loaded, wiring=loaded.wiring.model_copy(update={"quantities": quantities})))
-    told.commands.models = thermal(told, tmp_path)
-    assert np.isfinite(told.settle().values.u_tip_um).all()
-    unsure = told.commands.models.applied
+    known = Machine(replace(loaded, wiring=loaded.wiring.model_copy(update={"quantities": quantities})))
+    known.commands.models = thermal(known, tmp_path)
+    assert np.isfinite(known.settle().values.u_tip_um).all()
+    unsure = known.commands.models.applied
     unknown = replace(unsure.machine, covariance=np.full((1, 1), np.nan))
-    told.commands.models = Models(replace(unsure, machine=unknown))
-    assert np.isnan(told.settle().values.u_tip_um).all()
+    known.commands.models = Models(replace(unsure, machine=unknown))
+    assert np.isnan(known.settle().values.u_tip_um).all()
 
 
 def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
@@ -381,9 +381,9 @@ def test_a_running_daemon_is_asked_told_and_refuses(tmp_path, capsys):
         assert beside["shadow"]["correction_mm"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-5)
         assert beside["correction_mm"] == pytest.approx([0, 0, 0], abs=1e-9)
         adopt(file, configured.sockets.unix.path)
-        told = capsys.readouterr().out
-        assert f"applied: {file} (" in told
-        assert f"model_file: {file}" in told
+        printed = capsys.readouterr().out
+        assert f"applied: {file} (" in printed
+        assert f"model_file: {file}" in printed
         done = next(s for s in setpoints if s.get("model") and s["state"] == "ok")
         assert done["sources_mm"]["link_zero"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-5)
         assert "shadow" not in done, "the shadow is what is applied now"

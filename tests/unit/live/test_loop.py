@@ -98,11 +98,11 @@ def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
 
 
 def test_a_stop_ends_a_real_loop_and_its_thread_says_what_was_permitted():
-    seen = threading.Event()
+    called = threading.Event()
 
-    loop = loop_with(lambda setpoint: seen.set(), RealClock())
+    loop = loop_with(lambda setpoint: called.set(), RealClock())
     loop.start()
-    assert seen.wait(10)
+    assert called.wait(10)
     assert loop.alive
     loop.stop()
     assert not loop.alive

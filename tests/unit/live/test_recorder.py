@@ -29,10 +29,10 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
-def recorded(run, name, cycles=20, keeping=ROOMY, say=None, **watch):
+def recorded(run, name, cycles=20, limits=ROOMY, reports=None, **watch):
     """A quiet run on disk; its READINGS."""
     messages = []
-    with run.recorder(name, keeping, say, **watch) as recorder:
+    with run.recorder(name, limits, reports, **watch) as recorder:
         for line, message, _ in run.quiet(cycles):
             recorder.put(line, message)
             messages.append(message)
@@ -46,16 +46,16 @@ def recorded(run, name, cycles=20, keeping=ROOMY, say=None, **watch):
 def test_it_is_a_recording_of_the_format(tmp_path, name):
     run = Run(machine(name))
     messages = recorded(run, tmp_path / "run")
-    found = read_recording(tmp_path / "run-0001.csv", run.machine.configuration, needs_reference=False)
-    assert found.machine == run.machine.configuration.machine
-    assert found.rows == len(messages)
-    assert not found.warnings
+    recording = read_recording(tmp_path / "run-0001.csv", run.machine.configuration, needs_reference=False)
+    assert recording.machine == run.machine.configuration.machine
+    assert recording.rows == len(messages)
+    assert not recording.warnings
     start_s = messages[0]["time_s"]
-    assert found.time_s.tolist() == pytest.approx([m["time_s"] - start_s for m in messages], abs=1e-6)
-    assert found.scale_mm.shape == (20, run.machine.model.links)
-    assert found.joint_mm.shape == (20, run.machine.wires.joints)
-    assert found.frame_mm.shape == (20, 9)
-    assert set(found.quantities) == {q.name for q in run.machine.configuration.wiring.quantities}
+    assert recording.time_s.tolist() == pytest.approx([m["time_s"] - start_s for m in messages], abs=1e-6)
+    assert recording.scale_mm.shape == (20, run.machine.model.links)
+    assert recording.joint_mm.shape == (20, run.machine.wires.joints)
+    assert recording.frame_mm.shape == (20, 9)
+    assert set(recording.quantities) == {q.name for q in run.machine.configuration.wiring.quantities}
 
 
 def test_zero_plus_column_is_the_raw_reading_whatever_the_sign(tmp_path):
@@ -108,10 +108,10 @@ def test_a_reading_that_is_bad_or_too_old_is_an_empty_cell(tmp_path):
 
 def test_the_transcript_is_what_the_daemon_said_byte_for_byte(tmp_path):
     run = Run(machine())
-    said = []
+    sent = []
     with run.recorder(tmp_path / "run") as recorder:
         for line, message, _ in run.eventful(200):
-            said.append(line)
+            sent.append(line)
             recorder.put(line, message)
     kept = b""
     for path in sorted(tmp_path.glob("*.jsonl")):
@@ -119,7 +119,7 @@ def test_the_transcript_is_what_the_daemon_said_byte_for_byte(tmp_path):
         assert json.loads(opening)["class"] == "VERSION"
         assert json.loads(watch)["columns"][0]["column"] == "scale_1_mm"
         kept += b"".join(lines)
-    assert kept == b"".join(said)
+    assert kept == b"".join(sent)
 
 
 # --- Parts and limits ----------------------------------------------------------------------------------------
@@ -127,8 +127,8 @@ def test_the_transcript_is_what_the_daemon_said_byte_for_byte(tmp_path):
 
 def test_a_machine_zero_taken_anew_begins_a_part_and_time_goes_on(tmp_path):
     run = Run(machine())
-    said = []
-    with run.recorder(tmp_path / "run", say=said) as recorder:
+    reports = []
+    with run.recorder(tmp_path / "run", reports=reports) as recorder:
         for _ in range(2):
             for line, message, _ in run.quiet(10):
                 recorder.put(line, message)
@@ -140,14 +140,14 @@ def test_a_machine_zero_taken_anew_begins_a_part_and_time_goes_on(tmp_path):
     assert abs(float(second[0]["joint_1_um"])) < 1
     zeros = yaml.safe_load((tmp_path / "run-0002.yaml").read_text())["provenance"]["zero"]
     assert zeros["joint_1_um"]["zero_mm"] == pytest.approx(12.51)
-    assert "machine zero was taken anew" in said
+    assert "machine zero was taken anew" in reports
     assert len(list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))) == 20
 
 
-@pytest.mark.parametrize("keeping", [replace(ROOMY, part_bytes=30_000), replace(ROOMY, part_s=0.025)])
-def test_parts_by_size_and_by_time_lose_no_row(tmp_path, keeping):
+@pytest.mark.parametrize("limits", [replace(ROOMY, part_bytes=30_000), replace(ROOMY, part_s=0.025)])
+def test_parts_by_size_and_by_time_lose_no_row(tmp_path, limits):
     run = Run(machine())
-    messages = recorded(run, tmp_path / "run", 40, keeping)
+    messages = recorded(run, tmp_path / "run", 40, limits)
     parts = sorted(tmp_path.glob("run-*.csv"))
     assert len(parts) > 5
     configuration = run.machine.configuration
@@ -157,9 +157,9 @@ def test_parts_by_size_and_by_time_lose_no_row(tmp_path, keeping):
 
 def test_at_the_limit_it_ends_and_says_so_and_what_was_written_is_whole(tmp_path):
     run = Run(machine())
-    keeping = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=False)
+    limits = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=False)
     with pytest.raises(RecordingError, match="reached its limit on disk") as ended:
-        recorded(run, tmp_path / "run", 100, keeping)
+        recorded(run, tmp_path / "run", 100, limits)
     assert "0.1 MB" in str(ended.value)
     sizes = [path.stat().st_size for path in tmp_path.iterdir()]
     assert 90_000 < sum(sizes) < 110_000
@@ -169,12 +169,12 @@ def test_at_the_limit_it_ends_and_says_so_and_what_was_written_is_whole(tmp_path
 
 
 def test_dropping_the_oldest_keeps_the_limit_and_says_what_went(tmp_path):
-    said = []
-    keeping = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=True)
-    messages = recorded(Run(machine()), tmp_path / "run", 100, keeping, said)
+    reports = []
+    limits = RecordingLimits(part_bytes=30_000, part_s=1e9, limit_bytes=100_000, drop_oldest=True)
+    messages = recorded(Run(machine()), tmp_path / "run", 100, limits, reports)
     paths = sorted(tmp_path.iterdir())
     assert sum(path.stat().st_size for path in paths) <= 100_000
-    gone = [text for text in said if "deleted" in text]
+    gone = [text for text in reports if "deleted" in text]
     assert gone[0].startswith(f"limit of 0.1 MB: {tmp_path / 'run-0001.csv'} deleted, with ")
     kept = sum(len(rows_of(path)) for path in tmp_path.glob("*.csv"))
     deleted = sum(int(text.split()[-2]) for text in gone)

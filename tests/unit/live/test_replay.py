@@ -81,6 +81,7 @@ def test_no_bit_of_what_went_in_is_lost_on_the_way(name):
         assert to_plain(recorded.state._replace(zero=None)) == to_plain(before._replace(zero=None))
         again = again_with(recorded, setpoint, settings)
         assert again.to_packet(bytes(8)) == setpoint.to_packet(bytes(8)), "float64 that are not rounded"
+        assert setpoint.valid is setpoint.state.valid
 
 
 def test_what_effects_remember_goes_to_json_and_back():
@@ -92,8 +93,8 @@ def test_what_effects_remember_goes_to_json_and_back():
     assert isinstance(read.motion, Motion)
     assert (read.motion.time_s, read.commanded, read.memories["none"]) == (1.5, True, None)
     assert read.motion.direction.tobytes() == motion.direction.tobytes()
-    for one, other in zip(read.memories["link.lag"], memories["link.lag"], strict=True):
-        assert one.tolist() == other.tolist()
+    for after, before in zip(read.memories["link.lag"], memories["link.lag"], strict=True):
+        assert after.tolist() == before.tolist()
     for number in (math.nan, math.inf, -math.inf):
         assert repr(from_plain(to_plain(number))) == repr(number)
     with pytest.raises(TypeError, match="set cannot be carried"):
@@ -157,19 +158,19 @@ def test_models_are_kept_with_the_recording_whatever_becomes_of_their_files(tmp_
 
 def test_a_model_file_that_has_changed_since_is_told_and_may_be_given_later(tmp_path):
     run, cycles, (lag, backlash) = with_models(tmp_path)
-    said, adopted = [], lag.read_bytes()
+    reports, adopted = [], lag.read_bytes()
     lag.write_bytes(adopted + b"# fitted again\n")
     backlash.unlink()
-    with run.recorder(tmp_path / "run", say=said) as recorder:
+    with run.recorder(tmp_path / "run", reports=reports) as recorder:
         for line, message, _ in cycles:
             recorder.put(line, message)
-    assert f"{lag} has changed since the daemon read it: it is not kept" in "\n".join(said)
-    assert f"{backlash} cannot be read: No such file or directory" in "\n".join(said)
+    assert f"{lag} has changed since the daemon read it: it is not kept" in "\n".join(reports)
+    assert f"{backlash} cannot be read: No such file or directory" in "\n".join(reports)
     with pytest.raises(RecordingError, match="give it with `--model`"):
         list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
-    given = [tmp_path / "saved.yaml", file_with(tmp_path / "backlash.yaml", "backlash")]
-    given[0].write_bytes(adopted)
-    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run"), given))
+    model_files = [tmp_path / "saved.yaml", file_with(tmp_path / "backlash.yaml", "backlash")]
+    model_files[0].write_bytes(adopted)
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run"), model_files))
     assert len(replayed) == len(cycles)
     assert not [cycle for cycle in replayed if cycle.differs]
 
@@ -209,8 +210,8 @@ def test_one_changed_number_is_found_and_its_place_is_told(tmp_path, capsys, cha
             recorder.put(line, message)
     path = tmp_path / "run-0001.cycles.jsonl"
     altered(path, 21, change)  # two lines of opening, so the 20th cycle
-    found = [cycle for cycle in replay_cycles(configuration, RecordedCycles(path)) if cycle.differs]
-    assert [(cycle.tick, cycle.where) for cycle in found] == [(20, f"{path}:22")]
+    different = [cycle for cycle in replay_cycles(configuration, RecordedCycles(path)) if cycle.differs]
+    assert [(cycle.tick, cycle.where) for cycle in different] == [(20, f"{path}:22")]
 
 
 def shipped_run(tmp_path, cycles=30):

@@ -32,8 +32,8 @@ def numbers(links: int = 3, tip_P_mm=None) -> SetpointValues:
     )
 
 
-def setpoint(found: SetpointValues | None, state: State = State.OK, mode: Mode = Mode.CMM) -> Setpoint:
-    return Setpoint(42, 1234.5678901, 1234.6678901, 0.0123456, state, "" if found else "why", mode, found)
+def setpoint(values: SetpointValues | None, state: State = State.OK, mode: Mode = Mode.CMM) -> Setpoint:
+    return Setpoint(42, 1234.5678901, 1234.6678901, 0.0123456, state, "" if values else "why", mode, values)
 
 
 def test_json_is_one_line_with_every_documented_key():
@@ -113,9 +113,9 @@ def test_packet_by_the_offsets_of_its_documentation(links, mode, mode_code):
         (168, sent.values.scale_setpoint_mm),
         (216, sent.values.correction_mm),
     ):
-        found = at(offset, "6d")
-        assert found[:links] == tuple(wanted)
-        assert all(map(math.isnan, found[links:]))
+        vector = at(offset, "6d")
+        assert vector[:links] == tuple(wanted)
+        assert all(map(math.isnan, vector[links:]))
     assert packet[264:272] == HASH
     assert at(272, "I") == (zlib.crc32(packet[:272]),)
 

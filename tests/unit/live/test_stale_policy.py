@@ -23,24 +23,24 @@ def settings(on_stale: str) -> LoopSettings:
 @pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
 def test_a_live_set_is_used_as_it_is(on_stale):
     live = LAST._replace(time_s=101.0)
-    found = usable_comparators(live, LAST, "", 101.0, settings(on_stale))
-    assert found.comparators is live
-    assert (found.state, found.reason, found.expires_s) == (State.OK, "", math.inf)
+    usable = usable_comparators(live, LAST, "", 101.0, settings(on_stale))
+    assert usable.comparators is live
+    assert (usable.state, usable.reason, usable.expires_s) == (State.OK, "", math.inf)
 
 
 @pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
 def test_before_the_first_whole_set_there_is_nothing_to_hold(on_stale):
-    found = usable_comparators(None, None, LOST, 100.0, settings(on_stale))
-    assert found.comparators is None
-    assert found.state is State.STARTING
-    assert LOST in found.reason
+    usable = usable_comparators(None, None, LOST, 100.0, settings(on_stale))
+    assert usable.comparators is None
+    assert usable.state is State.STARTING
+    assert LOST in usable.reason
 
 
 def test_stop_is_at_once():
-    found = usable_comparators(None, LAST, LOST, 100.005, settings("stop"))
-    assert found.comparators is None
-    assert found.state is State.STOP
-    assert LOST in found.reason
+    usable = usable_comparators(None, LAST, LOST, 100.005, settings("stop"))
+    assert usable.comparators is None
+    assert usable.state is State.STOP
+    assert LOST in usable.reason
 
 
 def test_hold_keeps_the_set_whole_and_then_stops():

@@ -19,12 +19,12 @@ def manager(tmp_path):
 
 
 def heard(manager):
-    found = []
+    messages = []
     while True:
         try:
-            found.append(manager.recv(4096).decode())
+            messages.append(manager.recv(4096).decode())
         except BlockingIOError:
-            return found
+            return messages
 
 
 def test_ready_status_and_stopping_are_what_systemd_expects(manager):
