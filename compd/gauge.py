@@ -37,9 +37,10 @@ Rules for every driver:
 - `read` does not sleep or log, nor repeat a poll that failed: the line's thread decides when to ask again.
 
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
-``driver: /etc/compd/my_gauge.py:MyGauge``. A gauge that is pure description is a preset instead, a YAML file in a folder
-of the group ``compd.gauge_presets``. ``drivers/template`` is a complete package to copy, with a simulated device;
-``compd driver test`` tries a driver on wires that go wrong.
+``driver: /etc/compd/my_gauge.py:MyGauge``. ``drivers/template`` is a complete package to copy, with a simulated device;
+``compd driver test`` tries a driver on wires that go wrong. A gauge whose protocol the drivers `serial_ascii`,
+`serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a folder of the entry-point group
+``compd.gauge_presets``.
 """
 
 from __future__ import annotations

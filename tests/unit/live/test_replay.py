@@ -81,6 +81,7 @@ def test_no_bit_of_what_went_in_is_lost_on_the_way(name):
         assert to_plain(recorded.state._replace(zero=None)) == to_plain(before._replace(zero=None))
         again = again_with(recorded, setpoint, settings)
         assert again.to_packet(bytes(8)) == setpoint.to_packet(bytes(8)), "float64 that are not rounded"
+        assert setpoint.valid is setpoint.state.valid
 
 
 def test_what_effects_remember_goes_to_json_and_back():
