@@ -12,7 +12,7 @@ from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, style_figure
-from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
+from compd.simulation.truth.instruments import TRACKER
 from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
@@ -40,7 +40,7 @@ def run(configuration: Configuration, seed: int) -> DriftResult:
     ball = machine.tip0_M if machine.tip_frame == "M" else machine.tip0_P
     gauge_log, time_h, frame_degC = GaugeLog(), [], []
     for _ in range(int(HOURS * HOUR_S / EVERY_S) + 1):
-        probe_ball(world, noisy(ball, TRACKER_SIGMA_UM, rng))
+        probe_ball(world, TRACKER.measure(ball, rng))
         gauge_log.read(world)
         time_h.append(world.time_s / HOUR_S)
         frame_degC.append(world.sense("temperature_frame_degC"))

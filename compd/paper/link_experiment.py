@@ -19,7 +19,7 @@ from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, style_figure
 from compd.simulation.causes.catalogue import build_cause
 from compd.simulation.truth.cause import Cause
-from compd.simulation.truth.instruments import INTERFEROMETER_SIGMA_UM, noisy
+from compd.simulation.truth.instruments import INTERFEROMETER
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import Heat
 from compd.simulation.truth.world import World
@@ -92,7 +92,7 @@ def _measure_link(
         gauge_mm = gauge_log.scale_mm[0][LINK]
         if compensated:
             gauge_mm -= float(weights @ gauge_log.joint_mm[0])  # equation (1)
-        true_mm = noisy(world.link_change_mm()[[LINK]], INTERFEROMETER_SIGMA_UM, rng)[0]
+        true_mm = INTERFEROMETER.measure(world.link_change_mm()[[LINK]], rng)[0]
         return (gauge_mm - float(true_mm)) * UM_PER_MM
 
     def loading() -> tuple[FloatArray, FloatArray]:

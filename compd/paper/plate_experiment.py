@@ -13,7 +13,7 @@ from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
 from compd.report.page import COLOURS, Panel, style_figure
-from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, ball_plate_mm, noisy
+from compd.simulation.truth.instruments import TRACKER, ball_plate_mm
 from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
@@ -43,9 +43,9 @@ def run(configuration: Configuration, seed: int) -> PlateResult:
     order = [*there, *reversed(there)] * (ROUNDS // 2)
     gauge_log = GaugeLog()
     for ball in order:
-        probe_ball(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        probe_ball(world, TRACKER.measure(balls[ball], rng))
         world.advance(PER_BALL_S)
-        probe_ball(world, noisy(balls[ball], TRACKER_SIGMA_UM, rng))
+        probe_ball(world, TRACKER.measure(balls[ball], rng))
         gauge_log.read(world)
     pairs = np.array(list(itertools.combinations(there, 2)))
     nominal_mm = _distances(balls, pairs)

@@ -22,7 +22,7 @@ from compd.simulation.campaign.campaign_plan import (
 from compd.simulation.campaign.row_log import LoggedRows, RowLog
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.closure import Posture
-from compd.simulation.truth.instruments import Kind, noisy
+from compd.simulation.truth.instruments import EXACT, ReferenceInstrument
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.probing import PROBING_STEP_S, probing_steps_mm
 from compd.simulation.truth.strengths import Strengths
@@ -45,12 +45,10 @@ class Campaign:
         strengths: Strengths,
         causes: Sequence[Cause] = (),
         *,
-        reference: Kind = "tracker",
-        sigma_um: float = 0.0,
-        outlier_share: float = 0.0,
+        reference: ReferenceInstrument = EXACT,
         balls_M: FloatArray | None = None,
     ) -> None:
-        """seed : of joints and noise. sigma_um : of the reference, 0 for the truth itself.
+        """seed : of joints and noise.
 
         balls_M : (points, 3) mm, for a ball plate: the balls that are probed at the plan's points.
         """
@@ -60,8 +58,8 @@ class Campaign:
         self._mechanism = self._world.mechanism
         self._plan = plan
         self._rng = np.random.default_rng([seed, 2, plan.number])
-        self._log = RowLog(self._world, wiring, self._rng, reference, sigma_um, outlier_share)
-        self._sigma_um, self._outlier_share = sigma_um, outlier_share
+        self._log = RowLog(self._world, wiring, self._rng, reference)
+        self._reference = reference
         self._balls_M = balls_M
         self._direction = np.ones(self._mechanism.links)
         self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
@@ -103,7 +101,7 @@ class Campaign:
         guess = self._postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
         if self._balls_M is not None:
-            ball_M = noisy(self._balls_M[item.point - 1], self._sigma_um, self._rng, self._outlier_share)
+            ball_M = self._reference.measure(self._balls_M[item.point - 1], self._rng)
             for scale_mm in probing_steps_mm(self._world, ball_M, guess):
                 self._move(scale_mm, guess, PROBING_STEP_S)
 

@@ -14,7 +14,7 @@ from compd.simulation.campaign.campaign_plan import PASS_ROW_EVERY_S, REPEAT_AFT
 from compd.simulation.campaign.row_log import LoggedRows, RowLog
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.heat import HELD_TIME_CONSTANT_S
-from compd.simulation.truth.instruments import Kind
+from compd.simulation.truth.instruments import ReferenceInstrument
 from compd.simulation.truth.plan_motion import Stage, plan_stages
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.strengths import Strengths
@@ -40,19 +40,13 @@ class PlannedCampaign:
         number: int,
         strengths: Strengths,
         causes: Sequence[Cause],
-        *,
-        reference: Kind,
-        sigma_um: float,
-        outlier_share: float,
+        reference: ReferenceInstrument,
     ) -> None:
-        """seed : of joints, weather and noise. number : of the campaign, with weather and noise of its own.
-
-        sigma_um : of the reference.
-        """
+        """seed : of joints, weather and noise. number : of the campaign, with weather and noise of its own."""
         weather = Weather(strengths.room_swing_K, np.random.default_rng([seed, 1, number]))
         self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
         rng = np.random.default_rng([seed, 4, number])
-        self._log = RowLog(self._world, wiring, rng, reference, sigma_um, outlier_share)
+        self._log = RowLog(self._world, wiring, rng, reference)
         self._rows = rows
         self._direction: FloatArray = np.ones(geometry.links)
         self._visit = 0

@@ -11,7 +11,7 @@ from compd.arrays import FloatArray
 from compd.configuration.operation import Wiring
 from compd.recording.columns import POSITION_COLUMNS, approach_columns, link_reference_column, scale_columns
 from compd.simulation.truth.indicated_tip import IndicatedTip
-from compd.simulation.truth.instruments import Kind, noisy
+from compd.simulation.truth.instruments import ReferenceInstrument
 from compd.simulation.truth.world import World
 
 UM = 1e-3
@@ -43,14 +43,12 @@ class RowLog:
         world: World,
         wiring: Wiring,
         rng: np.random.Generator,
-        reference: Kind,
-        sigma_um: float,
-        outlier_share: float,
+        reference: ReferenceInstrument,
     ) -> None:
-        """sigma_um : of the reference; 0 for the truth itself, and then the indicated tip is logged as well."""
+        """reference : with an exact one (sigma_um 0) the indicated tip is logged as well."""
         self._world, self._rng = world, rng
-        self._reference, self._sigma_um, self._outlier_share = reference, sigma_um, outlier_share
-        self._indicated = IndicatedTip(world.mechanism, wiring) if sigma_um == 0 else None
+        self._reference = reference
+        self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
         self.rows = LoggedRows()
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
@@ -80,20 +78,17 @@ class RowLog:
 
     def _reference_columns(self) -> list[str]:
         """Names of the reference's columns."""
-        if self._reference == "ball_plate":
+        if self._reference.kind == "ball_plate":
             return ["ball"]
-        if self._reference == "interferometer":
+        if self._reference.kind == "interferometer":
             return [link_reference_column(i) for i in range(1, self._world.mechanism.links + 1)]
         return list(POSITION_COLUMNS)
 
     def _reference_values(self, point: int | None) -> dict[str, float]:
         """One noisy measurement by column."""
-        if self._reference == "ball_plate":
+        if self._reference.kind == "ball_plate":
             return {"ball": np.nan if point is None else point}
-        if self._reference == "interferometer":
-            changes = noisy(self._world.link_change_mm(), self._sigma_um, self._rng, self._outlier_share)
-            return {
-                name: round(value, 6) for name, value in zip(self._reference_columns(), changes.tolist(), strict=True)
-            }
-        tip = noisy(self._world.reference_tip_mm(), self._sigma_um, self._rng, self._outlier_share)
-        return {name: round(value, 6) for name, value in zip(self._reference_columns(), tip.tolist(), strict=True)}
+        interferometer = self._reference.kind == "interferometer"
+        true_mm = self._world.link_change_mm() if interferometer else self._world.reference_tip_mm()
+        measured_mm = self._reference.measure(true_mm, self._rng).tolist()
+        return {name: round(value, 6) for name, value in zip(self._reference_columns(), measured_mm, strict=True)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from compd.simulation.campaign.planned_campaign import PlannedCampaign
 from compd.simulation.campaign.sizing import CauseSizer
 from compd.simulation.causes.hidden_cause import HiddenCause, SizedCause
 from compd.simulation.truth.cause import Cause
-from compd.simulation.truth.instruments import SIGMA_UM, Kind, ball_plate_mm
+from compd.simulation.truth.instruments import INSTRUMENTS, Kind, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.strengths import FULLY_MEASURED
@@ -65,37 +65,15 @@ def simulate_recording(
     sized = tuple(sizer.size(cause) for cause in hidden)
     weak = sizer.weak_disturbances([cause.id for cause in hidden], np.random.default_rng([seed, 3]))
     causes = [*(cause.cause for cause in sized), *weak]
-    sigma_um = SIGMA_UM[reference]
+    instrument = replace(INSTRUMENTS[reference], outlier_share=OUTLIER_SHARE)
     campaign: Campaign | PlannedCampaign
     balls_M = None
     if planned_rows:
-        campaign = PlannedCampaign(
-            geometry,
-            wiring,
-            planned_rows,
-            seed,
-            other_days,
-            FULLY_MEASURED,
-            causes,
-            reference=reference,
-            sigma_um=sigma_um,
-            outlier_share=OUTLIER_SHARE,
-        )
+        campaign = PlannedCampaign(geometry, wiring, planned_rows, seed, other_days, FULLY_MEASURED, causes, instrument)
     else:
         balls_M, days = _days(sizer.mechanism, reference, seed, other_days)
-        campaign = Campaign(
-            geometry,
-            wiring,
-            days,
-            seed,
-            FULLY_MEASURED,
-            causes,
-            reference=reference,
-            sigma_um=sigma_um,
-            outlier_share=OUTLIER_SHARE,
-            balls_M=balls_M,
-        )
-    reference_block: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": sigma_um}
+        campaign = Campaign(geometry, wiring, days, seed, FULLY_MEASURED, causes, reference=instrument, balls_M=balls_M)
+    reference_block: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": instrument.sigma_um}
     if reference == "tracker":
         reference_block["frame"] = "machine"
     if balls_M is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,7 +18,6 @@ UM = 1e-3
 OUTLIER_SIGMAS = (8.0, 40.0)
 
 Kind = Literal["tracker", "interferometer", "ball_plate"]
-SIGMA_UM = {"tracker": TRACKER_SIGMA_UM, "interferometer": INTERFEROMETER_SIGMA_UM, "ball_plate": TRACKER_SIGMA_UM}
 
 # A 3D ball plate: two rings of eight balls, the upper one turned by half a step, and one ball in the middle.
 BALLS = 17
@@ -24,13 +25,35 @@ RING_MM = (75.0, 45.0)
 LEVELS_MM = (-30.0, 25.0)
 
 
-def noisy(value_mm: FloatArray, sigma_um: float, rng: np.random.Generator, outlier_share: float = 0.0) -> FloatArray:
-    """(m,) with normal noise; with probability `outlier_share` one coordinate is an outlier."""
-    shown = value_mm + sigma_um * UM * rng.standard_normal(value_mm.shape)
-    if rng.uniform() < outlier_share:
-        off = rng.uniform(*OUTLIER_SIGMAS) * rng.choice([-1.0, 1.0])
-        shown[rng.integers(len(shown))] += off * sigma_um * UM
-    return np.asarray(shown)
+@dataclass(frozen=True)
+class ReferenceInstrument:
+    """An instrument that measures the tip (or, an interferometer, the links' lengths) beside the gauges.
+
+    sigma_um : standard uncertainty per coordinate; 0 for an exact instrument.
+    outlier_share : probability that one coordinate of a measurement is an outlier.
+    """
+
+    kind: Kind
+    sigma_um: float
+    outlier_share: float = 0.0
+
+    def measure(self, true_mm: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """(m,) true values with normal noise, and at random an outlier."""
+        measured_mm = true_mm + self.sigma_um * UM * rng.standard_normal(true_mm.shape)
+        if rng.uniform() < self.outlier_share:
+            off = rng.uniform(*OUTLIER_SIGMAS) * rng.choice([-1.0, 1.0])
+            measured_mm[rng.integers(len(measured_mm))] += off * self.sigma_um * UM
+        return np.asarray(measured_mm)
+
+
+EXACT = ReferenceInstrument("tracker", 0.0)
+TRACKER = ReferenceInstrument("tracker", TRACKER_SIGMA_UM)
+INTERFEROMETER = ReferenceInstrument("interferometer", INTERFEROMETER_SIGMA_UM)
+# The machine probes the balls: its own repeatability.
+BALL_PLATE = ReferenceInstrument("ball_plate", TRACKER_SIGMA_UM)
+INSTRUMENTS: Mapping[Kind, ReferenceInstrument] = {
+    instrument.kind: instrument for instrument in (TRACKER, INTERFEROMETER, BALL_PLATE)
+}
 
 
 def ball_plate_mm(middle: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.plugins import SIMULATED_GAUGES, load
-from compd.simulation.truth.instruments import TRACKER_SIGMA_UM, noisy
+from compd.simulation.truth.instruments import TRACKER
 from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
@@ -138,7 +138,7 @@ class Simulation:
         """
         with self._lock:
             world = self.world
-            tip_mm = noisy(world.reference_tip_mm(), TRACKER_SIGMA_UM, self._tracker_rng)
+            tip_mm = TRACKER.measure(world.reference_tip_mm(), self._tracker_rng)
             return {
                 "class": "MEASURED",
                 "instrument": "laser tracker",
@@ -147,7 +147,7 @@ class Simulation:
                 "moving": world.phase == "moving",
                 "tip_frame": world.tip_frame,
                 "reference_mm": [round(value, 6) for value in tip_mm.tolist()],
-                "sigma_um": TRACKER_SIGMA_UM,
+                "sigma_um": TRACKER.sigma_um,
             }
 
     def _drive(self, message: Mapping[str, Any]) -> Answer:

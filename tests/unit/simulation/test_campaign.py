@@ -24,12 +24,13 @@ from compd.simulation.campaign.simulated_recording import SimulatedRecording, si
 from compd.simulation.campaign.sizing import CauseSizer
 from compd.simulation.causes.catalogue import CAUSES, build_cause
 from compd.simulation.causes.hidden_cause import LEAST_FLOORS, MOST_FLOORS, HiddenCause, draw_hidden, parse_hidden
-from compd.simulation.truth.instruments import BALLS, TRACKER_SIGMA_UM, ball_plate_mm
+from compd.simulation.truth.instruments import BALLS, TRACKER, TRACKER_SIGMA_UM, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED, FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from tests.support.paths import SHARED
 from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, wiring
 
+TRACKER_WITH_OUTLIERS = replace(TRACKER, outlier_share=0.01)
 EXAMPLE = SHARED / "recordings" / "example-nothing-missing" / "train.csv"
 
 
@@ -93,7 +94,7 @@ def test_a_pass_moves_at_constant_speed(recorded: SimulatedRecording) -> None:
 
 def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
     days = draw_campaign_plan(machine, 3)
-    measured = Campaign(tripod(), wiring(), days, 3, NOTHING, sigma_um=TRACKER_SIGMA_UM, outlier_share=0.01).run()
+    measured = Campaign(tripod(), wiring(), days, 3, NOTHING, reference=TRACKER_WITH_OUTLIERS).run()
     true = Campaign(tripod(), wiring(), days, 3, NOTHING).run()
     names = [f"reference_{axis}_mm" for axis in "xyz"]
     error_um = 1e3 * np.array([np.array(measured.columns[name]) - np.array(true.columns[name]) for name in names])
@@ -156,7 +157,7 @@ def test_the_same_seed_brings_home_the_same(machine: Mechanism) -> None:
     def rows() -> LoggedRows:
         days = draw_campaign_plan(machine, 6).thinned(4)
         causes = [build_cause("backlash", 1.0, machine, 6)]
-        return Campaign(tripod(), wiring(), days, 6, FULLY_MEASURED, causes, sigma_um=0.15, outlier_share=0.01).run()
+        return Campaign(tripod(), wiring(), days, 6, FULLY_MEASURED, causes, reference=TRACKER_WITH_OUTLIERS).run()
 
     first, again = rows(), rows()
     for name, values in first.columns.items():
