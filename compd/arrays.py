@@ -1,4 +1,4 @@
-"""Arrays as the whole program names them in annotations; their shapes stand in the docstrings."""
+"""Array types for annotations; docstrings give the shapes."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def dotted(location: Location) -> str:
     return text
 
 
-def read(path: Path) -> Document:
+def read_document(path: Path) -> Document:
     """Read a YAML file of sections: a configuration, a sidecar, a preset.
 
     Raises ConfigurationError for a file that is missing, is not YAML, or has a key twice.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
-from compd.units import KNOWN, conversion, unit_of
+from compd.units import KNOWN_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
@@ -119,7 +119,7 @@ def intended_column(name: str) -> str | None:
     tidy = name.strip().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u").replace("%", "pct")
     tidy = re.sub(r"[^A-Za-z0-9]+", "_", tidy).strip("_")
     tidy = re.sub(r"_0+(?=[1-9])", "_", tidy)
-    for unit in sorted(["", *KNOWN], key=len, reverse=True):
+    for unit in sorted(["", *KNOWN_UNITS], key=len, reverse=True):
         if unit and not tidy.lower().endswith(f"_{unit.lower()}"):
             continue
         stem = tidy[: -len(unit) - 1] if unit else tidy
@@ -135,7 +135,7 @@ def intended_column(name: str) -> str | None:
 
 def _convertible(unit: str, right: str) -> bool:
     """Whether values in `unit` can be meant for a column in `right`; any unit can for a temperature."""
-    return right == "degC" or bool(conversion(unit, right)) or unit == "1"
+    return right == "degC" or bool(conversion_text(unit, right)) or unit == "1"
 
 
 def correct_names(table: CsvTable, problems: ProblemList) -> CsvTable:
@@ -189,6 +189,6 @@ def _wrong_name(name: str, meant: str) -> tuple[str, str, str, str]:
     if wanted and not unit and name == meant.removesuffix(f"_{wanted}"):
         return "has no unit in its name", name, meant, f"name it {meant} if the values are in {wanted}"
     if unit and wanted and unit != wanted:
-        how = conversion(unit, wanted) or f"give the values in {wanted}"
+        how = conversion_text(unit, wanted) or f"give the values in {wanted}"
         return f"is in {unit} by its name", name, meant, f"{how}, and name it {meant}"
     return "is not spelt as the format spells it", name, meant, f"name it {meant}"

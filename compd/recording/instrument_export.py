@@ -15,11 +15,11 @@ from compd.recording.columns import AXES
 from compd.recording.csv_cells import NUMBER
 from compd.recording.csv_table import CsvTable, read_table
 from compd.recording.problem_list import ProblemList, rows_text
-from compd.units import KINDS, factor
+from compd.units import UNIT_KINDS, unit_factor
 
 LENGTH = "length"
 TIME = "time"
-_LENGTH_UNITS, _TIME_UNITS = frozenset(KINDS[0]), frozenset(KINDS[1])
+_LENGTH_UNITS, _TIME_UNITS = frozenset(UNIT_KINDS[0]), frozenset(UNIT_KINDS[1])
 _TIME_NAME = re.compile(r"(?:.*_)?(?:t|time|timestamp|elapsed|seconds)")
 _AXIS_NAME = re.compile(r"(?:.*_)?([xyz])")
 _LENGTH_NAME = re.compile(r"(?:.*_)?(?:length|distance|displacement|position|l|d)(?:_\d+)?|.*link_\d+")
@@ -160,7 +160,7 @@ def _to_s_or_mm(table: CsvTable, name: str, role: str, unit: str | None, problem
     """(N,) the column in s for the time, in mm for a position or a length; nan where its unit is not known."""
     wanted = "s" if role == TIME else "mm"
     _, own_unit = _split_name(name)
-    ratio = factor(own_unit or (unit or "" if role != TIME else ""), wanted)
+    ratio = unit_factor(own_unit or (unit or "" if role != TIME else ""), wanted)
     if ratio is None:
         units = _TIME_UNITS if role == TIME else _LENGTH_UNITS
         problems.add(

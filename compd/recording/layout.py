@@ -9,7 +9,18 @@ from dataclasses import dataclass, replace
 
 from compd.configuration import Configuration
 from compd.errors import Problem
-from compd.recording.columns import ATTITUDES, AXES, FRAME_COLUMNS, ID_COLUMNS, parse_name
+from compd.recording.columns import (
+    ATTITUDE_COLUMNS,
+    ATTITUDES,
+    AXES,
+    FRAME_COLUMNS,
+    ID_COLUMNS,
+    POSITION_COLUMNS,
+    approach_columns,
+    joint_columns,
+    parse_name,
+    scale_columns,
+)
 from compd.recording.problem_list import ProblemList
 from compd.recording.sidecar import EXTERNAL, Sidecar
 
@@ -154,10 +165,9 @@ def _check_reference(
             )
         return
     quantity = sidecar.reference.quantity
-    position = [f"reference_{axis}_mm" for axis in AXES]
     wanted: dict[str, list[str]] = {
-        "tool_position": position,
-        "tool_pose": [*position, *(f"reference_{axis}_rad" for axis in ATTITUDES)],
+        "tool_position": [*POSITION_COLUMNS],
+        "tool_pose": [*POSITION_COLUMNS, *ATTITUDE_COLUMNS],
         "link_length": [name for name in present if name.startswith("reference_link_")],
         "ball_plate": ["ball"],
     }
@@ -218,9 +228,8 @@ def _check_model(names: Sequence[str], external: bool, layout: Layout, problems:
 def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
     """Names of the columns that have no attribute of their own in a Recording."""
     own = {"time_s", *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
-    own |= {f"scale_{i}_mm" for i in range(1, layout.scales + 1)}
-    own |= {f"joint_{k}_um" for k in range(1, layout.joints + 1)}
-    own |= {f"approach_{i}" for i in range(1, layout.scales + 1)} if layout.approach else set()
+    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints)}
+    own |= {*approach_columns(layout.scales)} if layout.approach else set()
     return (name for name in names if name not in own and not name.startswith(("reference_", "model_")))
 
 

@@ -1,4 +1,4 @@
-"""From NAME.csv and NAME.yaml to a Recording, or to every problem in them at once."""
+"""Reading a recording: NAME.csv and NAME.yaml as a Recording, or every problem in them at once."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.problem_list import ProblemList, rows_text
 from compd.recording.recording import Recording, travel_direction
 from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.units import UM_PER_MM
 
 # Comparators are converted from um to mm and rounded to a picometre, far below any gauge, so that a reading
 # that was written in decimals comes back as the same number that the gauge delivered.
-_PER_MM = 1e9
+_PICOMETRES_PER_MM = 1e9
 
 
 def read_recording(path: Path, configuration: Configuration | None = None, needs_reference: bool = True) -> Recording:
@@ -183,10 +184,12 @@ def _build(
 
 
 def _to_mm(value_um: FloatArray | None) -> FloatArray | None:
-    return None if value_um is None else np.rint(value_um * (_PER_MM / 1000.0)) / _PER_MM
+    """The values in mm, rounded to a picometre; None stays None."""
+    return None if value_um is None else np.rint(value_um * (_PICOMETRES_PER_MM / UM_PER_MM)) / _PICOMETRES_PER_MM
 
 
 def _sha256(content: bytes, sidecar: Sidecar, plate: BallPlate | None) -> str:
+    """Hash of the CSV file, its sidecar and its ball plate, in hexadecimal digits."""
     digest = hashlib.sha256(content)
     digest.update(b"\0" + sidecar.path.read_bytes())
     if plate is not None:

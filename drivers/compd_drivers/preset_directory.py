@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration.document import Document, read
+from compd.configuration.document import Document, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
@@ -61,7 +61,7 @@ class PresetDirectory:
                 Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
             )
         with as_file(self._folder / f"{name}{SUFFIX}") as path:
-            document = read(path)
+            document = read_document(path)
         try:
             return Preset.model_validate(document.data), document
         except ValidationError as error:

@@ -11,7 +11,7 @@ from compd.errors import RecordingError
 from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
-from tests.support.recordings import SIDECAR, csv_text, put, without
+from tests.support.recordings import SIDECAR, csv_text, drop_columns, write_recording_files
 
 STARTED = "provenance: {started_at: '2026-05-03T08:00:00+00:00', zero_taken_at: morning}\n"
 AN_HOUR_LATER = STARTED.replace("08:00", "09:00")
@@ -19,14 +19,14 @@ AN_HOUR_LATER = STARTED.replace("08:00", "09:00")
 
 def recording(directory: Path, text: str, sidecar: str = SIDECAR) -> Recording:
     directory.mkdir()
-    return read_recording(put(directory, text, sidecar))
+    return read_recording(write_recording_files(directory, text, sidecar))
 
 
 def test_rows_follow_each_other_and_ids_are_numbered_on(tmp_path: Path) -> None:
     first = recording(tmp_path / "first", csv_text(), SIDECAR + "excluded_rows: [{row: 3, reason: door}]\n")
     second = recording(
         tmp_path / "second",
-        without("session", "pressure_hPa")(csv_text(6)),
+        drop_columns("session", "pressure_hPa")(csv_text(6)),
         SIDECAR + "excluded_rows: [{row: 2, reason: lamp}]\n",
     )
     result = merge_recordings([first, second], tmp_path / "both.csv")

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from compd.configuration import crosscheck
-from compd.configuration.document import Document, Location, read
+from compd.configuration.document import Document, Location, read_document
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings
 from compd.configuration.operation import LimitSettings, LoopSettings, SocketSettings, StateSettings, Wiring
@@ -80,7 +80,7 @@ def load(path: Path) -> Configuration:
 
     Raises ConfigurationError with every problem: file, line, key, value, what is allowed, next step.
     """
-    document = read(path)
+    document = read_document(path)
     problems: list[Problem] = []
     section_names = [*SECTIONS, "gauges"]
     problems += [unknown_key(document, (key,), section_names) for key in document.data if key not in section_names]
