@@ -38,7 +38,9 @@ Rules for every driver:
 
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
 ``driver: /etc/compd/my_gauge.py:MyGauge``. ``drivers/template`` is a complete package to copy, with a simulated device;
-``compd driver test`` tries a driver on wires that go wrong.
+``compd driver test`` tries a driver on wires that go wrong. A gauge whose protocol the drivers `serial_ascii`,
+`serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a folder of the entry-point group
+``compd.gauge_presets``.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ class PresetFolder(Protocol):
         ...
 
     def driver(self, name: str) -> type:
-        """The driver that the preset `name` describes. Raises CompdError for a description that cannot be used."""
+        """The driver that the preset `name` describes. Raises PluginError for a description that cannot be used."""
         ...
 
     def simulated_device(self, name: str) -> type:
@@ -48,8 +48,7 @@ def names(group: str) -> list[str]:
 def load(group: str, name: str, where: str) -> Any:
     """What `name` stands for, a class or an effect: an entry point's name, a preset's, or /absolute/file.py:Name.
 
-    Raises PluginError, which names `where` and lists what there is; ConfigurationError for a preset whose
-    description cannot be used.
+    Raises PluginError, which names `where` and lists what there is, or every problem in a preset's file.
     """
     if match := _PATH.match(name):
         return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group))

@@ -45,7 +45,7 @@ class DriverDescription:
 
 
 def catalogue() -> list[CatalogueEntry]:
-    """Every installed driver, sorted by name. Raises CompdError for one that cannot be loaded."""
+    """Every installed driver, sorted by name. Raises PluginError for one that cannot be loaded."""
     simulated = set(names(SIMULATED_GAUGES))
     entries = []
     for name in names(GAUGES):

@@ -16,10 +16,8 @@ from compd.configuration import load as load_configuration
 from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
-from compd.lines import Line, open_line
-from compd.lines.modbus_rtu import RtuMaster, gap_s
-from compd.lines.open import QUIET_CHARACTERS, TCP_GAP_S
-from compd.lines.port import Port, SerialPort, TcpPort
+from compd.lines import Line, open_line, open_stream
+from compd.lines.port import Port
 from compd.lines.stream import StreamLine
 from compd.plugins import GAUGES, load
 
@@ -170,24 +168,14 @@ class TappedPort:
 
 def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
     """The line as the daemon opens it, with its bytes shown (those of Modbus TCP stay inside pymodbus)."""
-    if not isinstance(settings, SerialLine | ModbusRtuLine | TcpLine):
-        return open_line(settings, clock)
-    stream = open_tapped_stream(settings, clock, listener)
-    return RtuMaster(stream) if isinstance(settings, ModbusRtuLine) else stream
+    return open_line(settings, clock, lambda port: TappedPort(port, listener))
 
 
 def open_tapped_stream(
     settings: SerialLine | ModbusRtuLine | TcpLine, clock: Clock, listener: ByteListener
 ) -> StreamLine:
     """The byte stream of a line, with its bytes shown, whatever protocol runs over it."""
-    if isinstance(settings, TcpLine):
-        port = TappedPort(TcpPort(settings.host, settings.port, settings.timeout_s), listener)
-        return StreamLine(port, settings.timeout_s, TCP_GAP_S, clock)
-    serial = SerialPort(settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s)
-    quiet_s = max(QUIET_CHARACTERS * serial.character_s, TCP_GAP_S)
-    if isinstance(settings, ModbusRtuLine):
-        quiet_s = max(quiet_s, gap_s(settings.baud))
-    return StreamLine(TappedPort(serial, listener), settings.timeout_s, quiet_s, clock)
+    return open_stream(settings, clock, lambda port: TappedPort(port, listener))
 
 
 def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Sequence[Reading]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Protocol
 
 from compd.clock import Clock
 from compd.lines.modbus_rtu import RtuMaster, gap_s
 from compd.lines.modbus_tcp import ModbusTcp
-from compd.lines.port import SerialPort, TcpPort
+from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import StreamLine
 
 Line = StreamLine | RtuMaster | ModbusTcp
+WrapPort = Callable[[Port], Port]
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
 # TCP has no character times: a second copy of a reply follows the first within this, s.
@@ -19,6 +21,10 @@ TCP_GAP_S = 1e-3
 QUIET_CHARACTERS = 3.5
 # and at least this, s: a USB adapter hands over what has come once a millisecond.
 SERIAL_GAP_S = 2e-3
+
+
+def _unchanged(port: Port) -> Port:
+    return port
 
 
 class SerialSettings(Protocol):
@@ -38,11 +44,7 @@ class SerialSettings(Protocol):
     def timeout_s(self) -> float: ...
 
 
-class TcpSettings(Protocol):
-    """The keys of a line over TCP in the configuration that are needed to open it."""
-
-    @property
-    def kind(self) -> Literal["tcp", "modbus_tcp"]: ...
+class _Address(Protocol):
     @property
     def host(self) -> str: ...
     @property
@@ -51,19 +53,45 @@ class TcpSettings(Protocol):
     def timeout_s(self) -> float: ...
 
 
-def open_line(settings: SerialSettings | TcpSettings, clock: Clock) -> Line:
+class TcpSettings(_Address, Protocol):
+    """The keys of a stream over TCP in the configuration that are needed to open it."""
+
+    @property
+    def kind(self) -> Literal["tcp"]: ...
+
+
+class ModbusTcpSettings(_Address, Protocol):
+    """The keys of a Modbus TCP line in the configuration that are needed to open it."""
+
+    @property
+    def kind(self) -> Literal["modbus_tcp"]: ...
+
+
+def open_line(
+    settings: SerialSettings | TcpSettings | ModbusTcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged
+) -> Line:
     """Open a line of the settings' kind. After a LineFault with LINE_LOST, `close()` it and open a new one.
 
+    wrap_port : as in `open_stream`; the port of Modbus TCP is within pymodbus and stays as it is.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
     if settings.kind == "modbus_tcp":
         return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock)
+    stream = open_stream(settings, clock, wrap_port)
+    return RtuMaster(stream) if settings.kind == "modbus_rtu" else stream
+
+
+def open_stream(settings: SerialSettings | TcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> StreamLine:
+    """Open the stream of bytes of a line, whatever protocol is spoken over it.
+
+    wrap_port : puts another port around the line's own, for instance one that shows every byte.
+    Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
+    """
     if settings.kind == "tcp":
-        return StreamLine(
-            TcpPort(settings.host, settings.port, settings.timeout_s), settings.timeout_s, TCP_GAP_S, clock
-        )
+        connection = TcpPort(settings.host, settings.port, settings.timeout_s)
+        return StreamLine(wrap_port(connection), settings.timeout_s, TCP_GAP_S, clock)
     port = SerialPort(settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s)
     quiet_s = max(QUIET_CHARACTERS * port.character_s, SERIAL_GAP_S)
-    if settings.kind == "serial":
-        return StreamLine(port, settings.timeout_s, quiet_s, clock)
-    return RtuMaster(StreamLine(port, settings.timeout_s, max(quiet_s, gap_s(settings.baud)), clock))
+    if settings.kind == "modbus_rtu":
+        quiet_s = max(quiet_s, gap_s(settings.baud))
+    return StreamLine(wrap_port(port), settings.timeout_s, quiet_s, clock)

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import AfterValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
 from compd.gauge import Unit
 from compd_drivers.linearisation import Linearisation
+from compd_drivers.measured import DescriptionSection
 from compd_drivers.modbus import Address, Function, RegisterType, Status
 
 INPUTS = 8  # of every module that is described here
@@ -42,11 +43,7 @@ SPANS: Mapping[str, Span] = {
 }
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class AnalogueInput(_Section):
+class AnalogueInput(DescriptionSection):
     """One input that is wired to a sensor."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
@@ -57,7 +54,7 @@ class AnalogueInput(_Section):
     highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
 
 
-class AnalogueData(_Section):
+class AnalogueData(DescriptionSection):
     """How the module gives an input's signal."""
 
     type: RegisterType = Field(description="how the number is stored")
@@ -92,7 +89,7 @@ class AnalogueData(_Section):
         return channel
 
 
-class AnalogueModule(_Section):
+class AnalogueModule(DescriptionSection):
     """The registers of a module of eight inputs."""
 
     function: Function = Field(description="3: holding registers, 4: input registers")
@@ -107,14 +104,12 @@ class AnalogueModule(_Section):
         return tuple(name for data in self.data for name in data.ranges)
 
     def field(self, model_name: str) -> tuple[Any, FieldInfo]:
-        """Annotation and field of the option `channels`, for pydantic."""
+        """Annotation and field of the option `channels`, for pydantic. `model_name`: of the model of one input."""
         model: Any = AnalogueInput
         if self.ranges:
             choice: Any = Literal[self.ranges]
             setting = Field(description="what the input is set to in the module")
-            model = create_model(
-                f"{model_name}Input", __base__=_RangedInput, __module__=__name__, range=(choice, setting)
-            )
+            model = create_model(model_name, __base__=_RangedInput, __module__=__name__, range=(choice, setting))
         inputs: Any = Annotated[tuple[model, ...], AfterValidator(_check_once)]
         return inputs, Field(min_length=1, description="the inputs that are wired")
 

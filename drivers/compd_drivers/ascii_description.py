@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from compd_drivers.exchange import ExchangeOptions
-from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.reply_format import ReplyFormat, unescape
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class AsciiChannel(MeasuredChannel):
@@ -25,7 +21,7 @@ class AsciiChannel(MeasuredChannel):
     )
 
 
-class ErrorReply(_Section):
+class ErrorReply(DescriptionSection):
     """A reply that stands for the whole poll."""
 
     in_: str = Field(alias="in", description="what it looks like")
@@ -33,7 +29,7 @@ class ErrorReply(_Section):
     says: str = Field(default="", description="in words, for the status")
 
 
-class Exchange(_Section):
+class Exchange(DescriptionSection):
     """One request and its reply, without a value in it."""
 
     out: str = Field(min_length=1)

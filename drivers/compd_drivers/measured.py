@@ -51,10 +51,14 @@ CONVERSIONS: Mapping[str, _Conversion] = {
 SIGNALS = ("V", "mA")
 
 
-class MeasuredChannel(BaseModel):
-    """One number that a device sends."""
+class DescriptionSection(BaseModel):
+    """A part of a description: unknown keys are refused, and nothing changes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MeasuredChannel(DescriptionSection):
+    """One number that a device sends."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     unit: WireUnit = Field(description="of the number on the wire, after `scale`; V and mA need a linearisation")

@@ -19,10 +19,11 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
 from compd_drivers.linearisation import Linearisation
+from compd_drivers.measured import DescriptionSection, repeated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -34,10 +35,8 @@ MOST_REGISTERS = 124
 _FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 
 
-class Status(BaseModel):
+class Status(DescriptionSection):
     """A register that says whether a channel's value counts."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     address: Address = Field(description="of the status register; read by the channel's own function")
     ok: tuple[int, ...] = Field(default=(0,), description="values that mean: good")
@@ -45,10 +44,8 @@ class Status(BaseModel):
     under_range: tuple[int, ...] = Field(default=(), description="values that mean: under range")
 
 
-class ModbusChannel(BaseModel):
+class ModbusChannel(DescriptionSection):
     """One value in the register map: value = raw x scale + offset."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     function: Function = Field(description="3: holding registers, 4: input registers")
@@ -89,13 +86,12 @@ class ModbusOptions(GaugeOptions):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [channel.name for channel in self.channels]
-        if doubled := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"channel named twice: {', '.join(doubled)}")
+        if doubled := repeated([channel.name for channel in self.channels]):
+            raise ValueError(f"channel named twice: {doubled}")
         return self
 
 
-class Block(NamedTuple):
+class RegisterBlock(NamedTuple):
     """Adjacent registers that are read together."""
 
     function: int
@@ -103,7 +99,7 @@ class Block(NamedTuple):
     length: int
 
 
-class _Place(NamedTuple):
+class _RegisterPlace(NamedTuple):
     """Where a channel's registers are in the blocks."""
 
     block: int
@@ -172,26 +168,26 @@ class Modbus(Gauge[RegisterLine]):
             )
         return readings
 
-    def _place(self, function: int, address: int, length: int) -> _Place:
+    def _place(self, function: int, address: int, length: int) -> _RegisterPlace:
         return next(
-            _Place(i, address - block.address)
+            _RegisterPlace(i, address - block.address)
             for i, block in enumerate(self.blocks)
             if block.function == function and 0 <= address - block.address <= block.length - length
         )
 
 
-def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[Block, ...]:
+def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[RegisterBlock, ...]:
     """(function, address, registers) of every number -> reads that cover adjacent registers and split no number."""
-    reads: list[Block] = []
+    reads: list[RegisterBlock] = []
     for function, address, length in sorted(spans):
         end = address + length
         if reads and reads[-1].function == function and address <= reads[-1].address + reads[-1].length:
             last = reads[-1]
             covered = max(end - last.address, last.length)
             if covered <= MOST_REGISTERS:
-                reads[-1] = Block(function, last.address, covered)
+                reads[-1] = RegisterBlock(function, last.address, covered)
                 continue
-        reads.append(Block(function, address, length))
+        reads.append(RegisterBlock(function, address, length))
     return tuple(reads)
 
 

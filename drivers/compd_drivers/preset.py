@@ -10,27 +10,24 @@ import string
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
+from pydantic import BaseModel, Field, ValidationError, create_model, model_validator
 from pydantic.fields import FieldInfo
 
 from compd.gauge import GaugeOptions
 from compd_drivers.analogue import AnalogueModule
+from compd_drivers.measured import DescriptionSection
 
 Value = str | int | float
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LineAsDelivered(_Section):
+class LineAsDelivered(DescriptionSection):
     """How the manual says that the device's port is set."""
 
     baud: int = Field(ge=50, description="bits per second")
     format: str = Field(pattern=r"^[78][NEO][12]$", description="data bits, parity, stop bits: 8N1, 7E2 ...")
 
 
-class PresetOption(_Section):
+class PresetOption(DescriptionSection):
     """An option that the person has to choose: exactly one of `one_of`, `some_of`, `whole` and `like`."""
 
     one_of: tuple[Value, ...] = Field(default=(), description="the values of which one is chosen")
@@ -73,7 +70,7 @@ class PresetOption(_Section):
         return (annotation | None if default is None else annotation), Field(default=default, description=description)
 
 
-class PresetVariant(_Section):
+class PresetVariant(DescriptionSection):
     """A part of the description that holds for some values of the options only."""
 
     when: dict[str, Value | tuple[Value | None, ...] | None] = Field(
@@ -90,7 +87,7 @@ class PresetVariant(_Section):
         )
 
 
-class Preset(_Section):
+class Preset(DescriptionSection):
     """One described gauge."""
 
     title: str = Field(min_length=1, description="maker, instrument and what it is, in one line")
@@ -145,7 +142,7 @@ class Preset(_Section):
 
         fields: dict[str, Any] = {key: option.field(base) for key, option in self.options.items()}
         if self.inputs is not None:
-            fields["channels"] = self.inputs.field(name)
+            fields["channels"] = self.inputs.field(f"{name.removesuffix('Options')}Input")
         return create_model(
             name, __base__=CheckedOptions, __module__=__name__, __doc__=f"Options of {self.title}", **fields
         )

@@ -16,13 +16,14 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration.document import Document, read_document
+from compd.configuration.document import Document, Location, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd_drivers.preset import Preset
 
 SUFFIX = ".yaml"
+WORDS = {"missing": "is missing", "extra_forbidden": "unknown key"}
 
 
 class PresetDirectory:
@@ -37,35 +38,43 @@ class PresetDirectory:
         """Of all presets, sorted."""
         return sorted(file.name.removesuffix(SUFFIX) for file in self._folder.iterdir() if file.name.endswith(SUFFIX))
 
-    def _driver(self, name: str) -> type[Gauge[Any]]:
-        """The driver's class. ConfigurationError for a file that cannot be used, PluginError for an unknown base."""
-        preset, document = self._read(name)
-        base = load(GAUGES, preset.base, document.where(("base",)))
-        try:
-            return driver_class(name, preset, base)
-        except ValidationError as error:
-            raise ConfigurationError(_problems(document, error, ("sample",))) from error
-        except ValueError as error:
-            raise ConfigurationError(Problem(where=document.where(("options",)), what=str(error))) from error
-
-    def _simulated_device(self, name: str) -> type:
-        """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
-        preset, document = self._read(name)
-        base = load(GAUGES, preset.base, document.where(("base",)))
-        device = load(SIMULATED_GAUGES, preset.base, document.where(("base",)))
-        return simulated_class(name, preset, base.Options, device)
-
-    def _read(self, name: str) -> tuple[Preset, Document]:
+    def read(self, name: str) -> tuple[Preset, Document]:
+        """A preset and the file that it was read from. Raises PluginError, with every problem and its line."""
         if name not in self.names():
             raise PluginError(
                 Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
             )
-        with as_file(self._folder / f"{name}{SUFFIX}") as path:
-            document = read_document(path)
         try:
+            with as_file(self._folder / f"{name}{SUFFIX}") as path:
+                document = read_document(path)
             return Preset.model_validate(document.data), document
+        except ConfigurationError as error:
+            raise PluginError(error.problems) from error
         except ValidationError as error:
-            raise ConfigurationError(_problems(document, error)) from error
+            raise PluginError(_problems(document, error)) from error
+
+    def _driver(self, name: str) -> type[Gauge[Any]]:
+        """The driver's class. Raises PluginError, with every problem and its line, for a file that cannot be used."""
+        preset, document = self.read(name)
+        base = load(GAUGES, preset.base, document.where(("base",)))
+        try:
+            return driver_class(name, preset, base)
+        except ValidationError as error:
+            raise PluginError(_problems(document, error, ("sample",))) from error
+        except ValueError as error:
+            raise PluginError(Problem(where=document.where(("options",)), what=str(error))) from error
+
+    def _simulated_device(self, name: str) -> type:
+        """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
+        preset, document = self.read(name)
+        base = load(GAUGES, preset.base, document.where(("base",)))
+        device = load(SIMULATED_GAUGES, preset.base, document.where(("base",)))
+        sample = self.driver(name).Options.model_validate({"driver": name, "line": "line", **preset.sample})
+        try:
+            preset.simulated_options(sample, base.Options)
+        except ValidationError as error:
+            raise PluginError(_problems(document, error, ("simulated",))) from error
+        return simulated_class(name, preset, base.Options, device)
 
 
 def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gauge[Any]]:
@@ -115,19 +124,23 @@ def _camel(name: str) -> str:
     return "".join(part.capitalize() for part in name.split("_"))
 
 
-def _problems(document: Document, error: ValidationError, root: tuple[str, ...] = ()) -> list[Problem]:
-    """Each of pydantic's errors with its line in the file."""
+def _problems(document: Document, error: ValidationError, root: Location = ()) -> list[Problem]:
+    """Each of pydantic's errors with its line in the file; of a filled-in description with its place under `gauge`."""
     problems = []
     for detail in error.errors(include_url=False):
+        context = detail.get("ctx", {})
+        in_description = getattr(context.get("error"), "__cause__", None)
+        if isinstance(in_description, ValidationError):
+            problems += _problems(document, in_description, ("gauge",))
+            continue
         location = (*root, *detail["loc"])
         value = document.value(location)
-        allowed = detail.get("ctx", {}).get("expected", "")
         problems.append(
             Problem(
                 where=document.where(location),
-                what=detail["msg"].removeprefix("Value error, "),
+                what=WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, ")),
                 value="" if value is None or isinstance(value, dict | list) else str(value),
-                allowed=str(allowed),
+                allowed=str(context.get("expected") or context.get("pattern") or ""),
                 next_step="drivers/compd_drivers/presets/README.md says what a preset may hold",
             )
         )

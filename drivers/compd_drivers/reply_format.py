@@ -73,7 +73,7 @@ class _Number:
 
 
 @dataclass(frozen=True)
-class _Check:
+class _ChecksumField:
     """A checksum in the reply: of the bytes from `start` up to its group `group`."""
 
     group: str
@@ -94,7 +94,7 @@ class ReplyFormat:
         """`instead`: by channel, what may stand in place of its number. ValueError says what is wrong."""
         self._instead = instead or {}
         self._numbers: list[_Number] = []
-        self._checks: list[_Check] = []
+        self._checks: list[_ChecksumField] = []
         self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before
         self.length: int | None = 0
         self.longest = 0
@@ -234,7 +234,7 @@ class ReplyFormat:
         self._before = "fixed"
         group = f"c{len(self._checks)}"
         self._checks.append(
-            _Check(group, cast(ChecksumKind, match["checksum"]), int(match["skip"] or 0), bool(match["hex"]))
+            _ChecksumField(group, cast(ChecksumKind, match["checksum"]), int(match["skip"] or 0), bool(match["hex"]))
         )
         self._longer(2 * length if match["hex"] else length)
         return f"(?P<{group}>[0-9A-Fa-f]{{{2 * length}}})" if match["hex"] else f"(?P<{group}>.{{{length}}})"

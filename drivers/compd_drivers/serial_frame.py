@@ -24,13 +24,13 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
-from compd_drivers.measured import MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -38,7 +38,7 @@ _FLOATS: Mapping[str, str] = {"float32": "f", "float64": "d"}
 FEWEST_FIXED_BYTES = 2  # of a frame without a checksum
 
 
-class Frame(NamedTuple):
+class FrameLayout(NamedTuple):
     """A reply's bytes: None where any byte may stand, and where the checksum stands."""
 
     fixed: tuple[int | None, ...]
@@ -63,10 +63,8 @@ class Frame(NamedTuple):
         return len(data) == len(self.fixed) and all(fixed in (None, byte) for fixed, byte in pairs)
 
 
-class FrameChecksum(BaseModel):
+class FrameChecksum(DescriptionSection):
     """How the checksum of a frame is made."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: ChecksumKind
     first: Annotated[int, Field(ge=0)] = Field(default=0, description="first byte that it covers, from 0")
@@ -80,7 +78,7 @@ class FrameChecksum(BaseModel):
         checksum = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
         return checksum if self.byte_order == "little" else checksum[::-1]
 
-    def check(self, frame: Frame, key: str) -> None:
+    def check(self, frame: FrameLayout, key: str) -> None:
         """ValueError where `frame`, the option `key`, has no place for this checksum."""
         length = frame.checksum.stop - frame.checksum.start
         if length != CHECKSUMS[self.kind].length:
@@ -111,10 +109,8 @@ class FrameChannel(MeasuredChannel):
         return float(int.from_bytes(raw, self.byte_order, signed=self.type.startswith("int")))
 
 
-class ErrorFrame(BaseModel):
+class ErrorFrame(DescriptionSection):
     """A reply that stands for the whole poll."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     frame: str = Field(description="its bytes, as in `frame`")
     quality: ReplyQuality = Field(description="what it means")
@@ -140,8 +136,8 @@ class SerialFrameOptions(ExchangeOptions):
         if self.out_checksum is None:
             bytes.fromhex(self.out)
         else:
-            self.out_checksum.check(Frame.of(self.out), "out")
-        frame = Frame.of(self.frame)
+            self.out_checksum.check(FrameLayout.of(self.out), "out")
+        frame = FrameLayout.of(self.frame)
         if self.checksum is not None:
             self.checksum.check(frame, "frame")
         elif frame.checksum.stop:
@@ -152,7 +148,7 @@ class SerialFrameOptions(ExchangeOptions):
             if channel.at + channel.length > len(frame.fixed):
                 raise ValueError(f"channel {channel.name} ends beyond the frame's {len(frame.fixed)} bytes")
         for error in self.errors:
-            short = Frame.of(error.frame).fixed
+            short = FrameLayout.of(error.frame).fixed
             if len(short) > len(frame.fixed):
                 raise ValueError("an error's frame must not be longer than the reply")
             if all(None in (a, b) or a == b for a, b in zip(short, frame.fixed, strict=False)):
@@ -164,7 +160,7 @@ class SerialFrameOptions(ExchangeOptions):
         """What is sent, its checksum included."""
         if self.out_checksum is None:
             return bytes.fromhex(self.out)
-        frame = Frame.of(self.out)
+        frame = FrameLayout.of(self.out)
         request = bytes(byte or 0 for byte in frame.fixed)
         checksum = self.out_checksum.of(request, frame.checksum)
         return request[: frame.checksum.start] + checksum + request[frame.checksum.stop :]
@@ -197,8 +193,10 @@ class SerialFrame(Gauge[ByteLine]):
         super().__init__(options)
         self._protocol = options
         self._request = options.request
-        self._frame = Frame.of(options.frame)
-        self._errors = sorted(((Frame.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed))
+        self._frame = FrameLayout.of(options.frame)
+        self._errors = sorted(
+            ((FrameLayout.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed)
+        )
         self._channels = tuple(channel.channel for channel in options.channels)
         lengths_only = all(channel.unit == "mm" for channel in self._channels)
         checked = options.checksum is not None or not lengths_only

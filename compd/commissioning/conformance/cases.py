@@ -136,8 +136,8 @@ def _one_poll_each(*tried_faults: Fault) -> list[Sequence[Fault]]:
 def _ends_of_range(session: ConformanceSession, _: Subject) -> CaseResult:
     complaints = []
     for end in (0, 1):
-        session.truth.go_to(end)
-        complaints += _complaints(session.poll(turn=False), GOOD)
+        session.sensors.set_to_end(end)
+        complaints += _complaints(session.poll(new_values=False), GOOD)
     return _result("range: lowest and highest value", GOOD, "ok", complaints)
 
 
@@ -146,9 +146,9 @@ def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
     observed: set[str] = set()
     complaints = []
     for place, channel in enumerate(session.gauge.channels):
-        session.truth.turn()
-        session.truth.values[channel.name] = math.nan
-        poll = session.poll(turn=False)
+        session.sensors.advance()
+        session.sensors.values[channel.name] = math.nan
+        poll = session.poll(new_values=False)
         quality = poll.readings[place].quality
         observed.add(str(quality))
         complaints += [f"{channel.name} off: {text}" for text in poll.wrong]

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from compd.clock import Clock
 from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.peer import Peer, Truth
+from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.live.acquisition.acquisition import NOTHING_UNDER_WAY
 
@@ -67,21 +67,21 @@ class ConformanceSession:
 
     gauge: Gauge[Any]
     wire: ConformanceWire
-    truth: Truth
+    sensors: SensorValues
     tolerance: dict[str, float] = field(default_factory=dict)  # by channel, in its unit
     _line: Any = None
 
-    def poll(self, faults: Iterable[Fault] = (), turn: bool = True) -> Poll:
-        """One poll; `faults`: one for each of its replies, in order; `turn`: with new values at the sensors."""
-        if turn:
-            self.truth.turn()
-        self.wire.peer.afflict(faults)
-        self.truth.sensed_s = math.nan
+    def poll(self, faults: Iterable[Fault] = (), new_values: bool = True) -> Poll:
+        """One poll; `faults`: one for each of its replies, in order; `new_values`: with new values at the sensors."""
+        if new_values:
+            self.sensors.advance()
+        self.wire.peer.set_faults(faults)
+        self.sensors.sensed_s = math.nan
         started_s = self.wire.clock.monotonic()
         try:
             readings = self._read()
         finally:
-            self.wire.peer.afflict(())
+            self.wire.peer.set_faults(())
         return Poll(readings, tuple(self._wrong(readings, started_s)))
 
     def recover(self) -> tuple[int, Poll]:
@@ -104,8 +104,8 @@ class ConformanceSession:
             if not poll.ok:
                 return f"a poll without any fault gave {poll}"
             for channel, reading in zip(self.gauge.channels, poll.readings, strict=True):
-                differences[channel.name].append(abs(reading.value - self.truth.values[channel.name]))
-                extents[channel.name].append(self.truth.values[channel.name])
+                differences[channel.name].append(abs(reading.value - self.sensors.values[channel.name]))
+                extents[channel.name].append(self.sensors.values[channel.name])
         for name, off in differences.items():
             extent = max(extents[name]) - min(extents[name])
             largest = max(off)
@@ -166,12 +166,12 @@ class ConformanceSession:
                 if not math.isnan(reading.value):
                     yield f"{channel.name}: {reading.quality} with a number, {reading.value!r}"
                 continue
-            value = self.truth.values[channel.name]
+            value = self.sensors.values[channel.name]
             if not abs(reading.value - value) <= self.tolerance.get(channel.name, math.inf):
                 yield f"{channel.name}: {reading.value:.6g} {channel.unit} as ok, the sensor had {value:.6g}"
             if reading.time_s < started_s:
                 yield f"{channel.name}: time stamp {(started_s - reading.time_s) * 1e3:.3f} ms before the poll began"
             # an understated age: stamped after the device had looked
-            if reading.time_s > self.truth.sensed_s + SMALLEST:
-                late_ms = (reading.time_s - self.truth.sensed_s) * 1e3
+            if reading.time_s > self.sensors.sensed_s + SMALLEST:
+                late_ms = (reading.time_s - self.sensors.sensed_s) * 1e3
                 yield f"{channel.name}: time stamp {late_ms:.3f} ms after the device had sampled"

@@ -1,4 +1,4 @@
-"""The far end of the wire under test: a simulated device whose sensors are known, and what happens to its replies."""
+"""The far end of the wire under test: a simulated device whose sensors have known values, and faults in its replies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OTHER_RANGE = (-0.9, 0.9)
 GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples modulo 1 spread evenly: neighbours in time are far apart
 
 
-class Truth:
+class SensorValues:
     """The sensors' values by channel: new ones for every poll, so that an old reply is a wrong one."""
 
     def __init__(self, channels: Sequence[Channel], extent: tuple[float, float] | None) -> None:
@@ -26,14 +26,14 @@ class Truth:
         self._extents = {c.name: extent or RANGES.get(c.unit, OTHER_RANGE) for c in channels}
         self._step = 0
 
-    def turn(self) -> None:
-        """New values, each channel its own."""
+    def advance(self) -> None:
+        """New values: lowest + fraction (step x golden ratio + an offset per channel) x (highest - lowest)."""
         self._step += 1
         for place, (name, (lowest, highest)) in enumerate(self._extents.items()):
             share = (self._step * GOLDEN + place * 0.0719) % 1.0
             self.values[name] = lowest + share * (highest - lowest)
 
-    def go_to(self, end: int) -> None:
+    def set_to_end(self, end: int) -> None:
         """Every channel to its lowest (0) or highest (1) value."""
         self.values = {name: extent[end] for name, extent in self._extents.items()}
 
@@ -42,18 +42,21 @@ class Truth:
 
 
 class Peer:
-    """Hears requests, answers through the faults: each reply takes the next of `faults`, then there are none."""
+    """The simulated device behind a wire that damages replies: each reply takes the next of the faults that were set.
 
-    def __init__(self, simulator: Callable[..., Any], options: Any, truth: Truth, over_tcp: bool) -> None:
-        device = simulator(options, truth.sense)
+    replies : how many the device has given; longest : bytes of the longest of them.
+    """
+
+    def __init__(self, simulator: Callable[..., Any], options: Any, sensors: SensorValues, over_tcp: bool) -> None:
+        device = simulator(options, sensors.sense)
         registers = isinstance(device, SimulatedRegisterDevice)
         self._device: Slaves | SimulatedByteDevice = Slaves([device], over_tcp) if registers else device
         self.replies = 0
-        self.longest = 0  # bytes of the longest reply
-        self._truth = truth
+        self.longest = 0
+        self._sensors = sensors
         self._faults: Iterator[Fault] = iter(())
 
-    def afflict(self, faults: Iterable[Fault]) -> None:
+    def set_faults(self, faults: Iterable[Fault]) -> None:
         """Set the faults of the next replies, one each."""
         self._faults = iter(faults)
 
@@ -62,7 +65,7 @@ class Peer:
         reply = self._device.hear(request)
         if not reply:
             return []
-        self._truth.sensed_s = heard_s
+        self._sensors.sensed_s = heard_s
         self.replies += 1
         self.longest = max(self.longest, len(reply))
         return next(self._faults, NONE).act(reply, timeout_s)

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from compd.commissioning.conformance.cases import CaseResult, Subject, run_cases, slowest_line
 from compd.commissioning.conformance.harness import ConformanceSession, ConformanceWire
-from compd.commissioning.conformance.peer import Peer, Truth
+from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.commissioning.conformance.virtual import VirtualWire
 from compd.commissioning.conformance.wire import CHARACTER_BITS, Kind, RealWire
 from compd.errors import PluginError, Problem
@@ -52,23 +52,23 @@ class DriverUnderTest:
         checksum = self.registers or self.gauge.integrity == "checksum"
         return Subject(self.registers, over_tcp, checksum, exact, self.error_replies)
 
-    def peer(self, over_tcp: bool = False) -> tuple[Peer, Truth]:
+    def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
         """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
-        truth = Truth(self.gauge(self.options).channels, self.gauge.sample_range)
-        return Peer(self.simulator, self.options, truth, over_tcp), truth
+        sensors = SensorValues(self.gauge(self.options).channels, self.gauge.sample_range)
+        return Peer(self.simulator, self.options, sensors, over_tcp), sensors
 
     def virtual(self, character_s: float = 0.0) -> ConformanceSession:
         """On a wire in virtual time."""
-        peer, truth = self.peer()
-        return self._session(VirtualWire(peer, self.registers, character_s=character_s), truth)
+        peer, sensors = self.peer()
+        return self._session(VirtualWire(peer, self.registers, character_s=character_s), sensors)
 
     def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
         """On a pty or TCP port; `settings`: baud, timeout_s."""
-        peer, truth = self.peer(over_tcp=kind == "modbus_tcp")
-        return self._session(RealWire(peer, kind, directory, **settings), truth)
+        peer, sensors = self.peer(over_tcp=kind == "modbus_tcp")
+        return self._session(RealWire(peer, kind, directory, **settings), sensors)
 
-    def _session(self, wire: ConformanceWire, truth: Truth) -> ConformanceSession:
-        return ConformanceSession(self.gauge(self.options), wire, truth)
+    def _session(self, wire: ConformanceWire, sensors: SensorValues) -> ConformanceSession:
+        return ConformanceSession(self.gauge(self.options), wire, sensors)
 
 
 def driver_under_test(

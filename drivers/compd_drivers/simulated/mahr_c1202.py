@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from compd.simulation.wires.device import Sense
-from compd_drivers.simulated.commands import CommandDevice
+from compd_drivers.simulated.shared import UNITS, CommandDevice
 
-MM_IN = {"mm": 1.0, "um": 1e-3, "inch": 25.4}
 FEATURES = (1, 2, 3)
 
 
@@ -36,5 +35,5 @@ class SimulatedC1202(CommandDevice):
         if not math.isfinite(value_mm):
             return f"{feature} ERR6"
         width = 2 + self.options.digits + self.options.decimals
-        value = f"{value_mm / MM_IN[self.options.unit]:+0{width}.{self.options.decimals}f}"
+        value = f"{value_mm / UNITS[self.options.unit]:+0{width}.{self.options.decimals}f}"
         return f"{feature} {value} {self.options.unit}"

@@ -7,7 +7,7 @@ import struct
 from typing import Any
 
 from compd.simulation.wires.device import Sense, SimulatedRegisterDevice
-from compd_drivers.simulated.transducer import signal_for
+from compd_drivers.simulated.shared import signal_for
 
 # type -> struct code, smallest and largest count
 INTEGERS = {

@@ -11,10 +11,8 @@ import re
 from typing import Any
 
 from compd.simulation.wires.device import Sense, SimulatedByteDevice
-from compd_drivers.simulated.transducer import signal_for
+from compd_drivers.simulated.shared import number_for
 
-MM_IN = {"um": 1e-3, "nm": 1e-6, "inch": 25.4, "mil": 0.0254}
-OTHER = {"kN": 1e3, "kPa": 10.0, "Pa": 1e-2}
 ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
 TOKEN = re.compile(
     r"%%|%(0?)(\d*)<(\w+)>|%\*\??(\d*)(?:[cdefxs]|\[(\^?)\]?([^\]]*)\])|%(?:\((\w+)\))?([+ 0]*\d*(?:\.\d+)?)([fdex])"
@@ -108,17 +106,7 @@ class SimulatedAscii(SimulatedByteDevice):
 
     def _number(self, name: str, form: str) -> str:
         channel = next(channel for channel in self.options.channels if channel.name == name)
-        value = self.sense(name)
-        match channel.unit:
-            case "V" | "mA":
-                value = signal_for(channel.linearisation, value)
-            case "degF":
-                value = value * 9 / 5 + 32
-            case "K":
-                value += 273.15
-            case unit:
-                value /= MM_IN.get(unit, OTHER.get(unit, 1.0))
-        value = value / channel.scale * 10**channel.decimals
+        value = number_for(channel, self.sense(name)) / channel.scale * 10**channel.decimals
         text = str(form % (round(value) if form[-1] in "dx" else value))
         width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)
         # an exact width without room for the zero before the point: -.050000

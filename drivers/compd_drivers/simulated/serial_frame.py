@@ -7,8 +7,8 @@ import struct
 from typing import Any
 
 from compd.simulation.wires.device import Sense, SimulatedByteDevice
-from compd_drivers.simulated.serial_ascii import MM_IN, OTHER, checksum
-from compd_drivers.simulated.transducer import signal_for
+from compd_drivers.simulated.serial_ascii import checksum
+from compd_drivers.simulated.shared import number_for
 
 FLOATS = {"float32": "f", "float64": "d"}
 
@@ -52,10 +52,8 @@ class SimulatedFrame(SimulatedByteDevice):
             if not channel.invalid and channel.type not in FLOATS:
                 return None
             number = next(iter(channel.invalid), math.nan)
-        elif channel.linearisation is not None:
-            number = signal_for(channel.linearisation, value) / channel.scale
         else:
-            number = value / MM_IN.get(channel.unit, OTHER.get(channel.unit, 1.0)) / channel.scale
+            number = number_for(channel, value) / channel.scale
         if channel.type in FLOATS:
             return struct.pack(f"{'<' if channel.byte_order == 'little' else '>'}{FLOATS[channel.type]}", number)
         signed = channel.type.startswith("int")

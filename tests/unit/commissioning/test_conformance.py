@@ -24,22 +24,22 @@ from compd.simulation.wires.device import SimulatedByteDevice
 NAMES = names(GAUGES)
 
 
-def failures(found: Sequence[tuple[str, CaseResult]]) -> list[str]:
-    return [f"{wire}: {result.case}: {result.observed}" for wire, result in found if result.verdict == "FAIL"]
+def failures(results: Sequence[tuple[str, CaseResult]]) -> list[str]:
+    return [f"{wire}: {result.case}: {result.observed}" for wire, result in results if result.verdict == "FAIL"]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_installed_driver_in_virtual_time(name: str) -> None:
-    found = list(run_conformance(driver_under_test(name), on_real_wires=False))
-    assert failures(found) == []
-    assert sum(result.verdict == "pass" for _, result in found) >= 12
+    results = list(run_conformance(driver_under_test(name), on_real_wires=False))
+    assert failures(results) == []
+    assert sum(result.verdict == "pass" for _, result in results) >= 12
 
 
 @pytest.mark.parametrize("name", ["heidenhain_nd28x", "modbus"])
 def test_driver_on_ptys_and_ports(name: str) -> None:
-    found = list(run_conformance(driver_under_test(name)))
-    assert failures(found) == []
-    assert len({wire for wire, _ in found}) == 3
+    results = list(run_conformance(driver_under_test(name)))
+    assert failures(results) == []
+    assert len({wire for wire, _ in results}) == 3
 
 
 @pytest.mark.long
@@ -88,9 +88,9 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
-    for afflictions in polls:
-        poll = session.poll(afflictions)
-        assert not poll.wrong, (afflictions, poll)
+    for faults_by_reply in polls:
+        poll = session.poll(faults_by_reply)
+        assert not poll.wrong, (faults_by_reply, poll)
     session.settle()
     count, poll = session.recover()
     assert poll.ok, (count, poll)
@@ -216,13 +216,13 @@ def test_a_careful_driver_passes() -> None:
     ],
 )
 def test_a_wrong_driver_is_found(gauge: type[Gauge[Any]], case: str) -> None:
-    found = list(run_conformance(driver_of(gauge), on_real_wires=False))
-    assert case in {result.case for _, result in found if result.verdict == "FAIL"}, found
+    results = list(run_conformance(driver_of(gauge), on_real_wires=False))
+    assert case in {result.case for _, result in results if result.verdict == "FAIL"}, results
 
 
 def test_flips_that_a_wire_cannot_show_are_said_and_not_hidden() -> None:
-    found = {result.case: result for _, result in run_conformance(driver_of(Careful), on_real_wires=False)}
-    flips = found["one bit turned"]
+    results = {result.case: result for _, result in run_conformance(driver_of(Careful), on_real_wires=False)}
+    flips = results["one bit turned"]
     assert flips.verdict == "-"
     assert "not detectable on this wire" in flips.observed
 
@@ -231,8 +231,8 @@ def test_a_checksum_that_is_not_checked_is_a_failure() -> None:
     class Claims(Careful):
         integrity = "checksum"
 
-    found = list(run_conformance(driver_of(Claims), on_real_wires=False))
-    assert "one bit turned" in {result.case for _, result in found if result.verdict == "FAIL"}
+    results = list(run_conformance(driver_of(Claims), on_real_wires=False))
+    assert "one bit turned" in {result.case for _, result in results if result.verdict == "FAIL"}
 
 
 def test_error_replies_that_the_simulated_device_names_are_tried() -> None:
@@ -240,8 +240,8 @@ def test_error_replies_that_the_simulated_device_names_are_tried() -> None:
         error_replies = {b"ERROR\r\n": "sensor_fault", b"E9\r\n": "device_error"}  # noqa: RUF012
 
     options = GaugeOptions(driver="x", line="test")
-    found = list(run_conformance(DriverUnderTest("x", Careful, WithErrors, options), on_real_wires=False))
-    assert any("device_error" in result.required and result.verdict == "FAIL" for _, result in found)
+    results = list(run_conformance(DriverUnderTest("x", Careful, WithErrors, options), on_real_wires=False))
+    assert any("device_error" in result.required and result.verdict == "FAIL" for _, result in results)
 
 
 def test_real_wire_replugs(tmp_path: Path) -> None:

@@ -41,10 +41,10 @@ INT16, FLOAT32, UNITS = [(8, 23)], [(8, 41)], [(8, 7)] * 9
     ],
 )
 def test_nine_comparators(traffic: list[tuple[int, int]], count: int, baud: int, ideal_hz: str, usual_hz: str) -> None:
-    found = budget_of_line("x", rtu(baud), {"gauge": traffic})
-    assert found.bytes == count
-    assert f"{found.ideal_hz:.0f}" == ideal_hz
-    assert f"{found.usual_hz:.{1 if '.' in usual_hz else 0}f}" == usual_hz
+    budget = budget_of_line("x", rtu(baud), {"gauge": traffic})
+    assert budget.bytes == count
+    assert f"{budget.ideal_hz:.0f}" == ideal_hz
+    assert f"{budget.usual_hz:.{1 if '.' in usual_hz else 0}f}" == usual_hz
 
 
 def test_bits_of_a_character() -> None:
@@ -72,27 +72,27 @@ def test_slower_by_wish() -> None:
 
 
 def test_unknown_traffic_has_no_rate_and_says_so() -> None:
-    found = budget_of_line("x", rtu(9600), {"a": INT16, "mystery": None})
-    assert not found.known
-    assert math.isnan(found.ideal_hz)
-    (warning,) = line_warnings(found, 1.0, "lines.x")
+    budget = budget_of_line("x", rtu(9600), {"a": INT16, "mystery": None})
+    assert not budget.known
+    assert math.isnan(budget.ideal_hz)
+    (warning,) = line_warnings(budget, 1.0, "lines.x")
     assert "mystery" in str(warning)
 
 
-def said(found: LineBudget, stale_after_s: float) -> str:
-    return "\n".join(str(problem) for problem in line_warnings(found, stale_after_s, "lines.x"))
+def warning_text(budget: LineBudget, stale_after_s: float) -> str:
+    return "\n".join(str(problem) for problem in line_warnings(budget, stale_after_s, "lines.x"))
 
 
 def test_warnings_where_they_belong() -> None:
     nine = {f"g{i}": [(8, 7)] for i in range(9)}
     slow = budget_of_line("x", rtu(19200), nine)
-    assert "go stale between two polls" in said(slow, 0.2)
-    assert "one absent device of 9" in said(slow, 0.3)
-    assert said(slow, 1.0) == ""
+    assert "go stale between two polls" in warning_text(slow, 0.2)
+    assert "one absent device of 9" in warning_text(slow, 0.3)
+    assert warning_text(slow, 1.0) == ""
     alone = budget_of_line("x", rtu(19200, timeout_s=5.0), {"g": INT16})
-    assert said(alone, 1.0) == ""
+    assert warning_text(alone, 1.0) == ""
     hurried = budget_of_line("x", rtu(19200, poll_every_s=0.01), {"g": INT16})
-    assert "the wanted rate cannot be reached" in said(hurried, 1.0)
+    assert "the wanted rate cannot be reached" in warning_text(hurried, 1.0)
 
 
 @pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])
@@ -100,7 +100,7 @@ def test_shipped_machines(name: str, capsys: pytest.CaptureFixture[str]) -> None
     configuration = load(CONFIG / f"{name}.yaml")
     assert print_line_plan(configuration) == []
     printed = capsys.readouterr().out
-    assert all(one.known and one.usual_hz > 1 for one in line_budgets(configuration))
+    assert all(budget.known and budget.usual_hz > 1 for budget in line_budgets(configuration))
     assert all(line in printed for line in configuration.lines)
 
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from compd.gauge import Quality, Reading, RegisterReply
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.simulated.transducer import signal_for
+from compd_drivers.simulated.shared import signal_for
 
 TABLE = {"signal": "V", "table": [[-10, -1.0], [0, 0.002], [10, 1.0]]}
 LOOP = {"signal": "mA", "polynomial": [-1.5, 0.125], "valid": [4, 20]}
@@ -109,10 +109,10 @@ class Wire:
         return RegisterReply(tuple(registers), 1.0)
 
 
-def module(driver: str, seen: dict[str, float], **options: Any) -> tuple[Any, Wire]:
+def module(driver: str, values: dict[str, float], **options: Any) -> tuple[Any, Wire]:
     gauge = load(GAUGES, driver, driver)
     checked = gauge.Options.model_validate({"driver": driver, "line": "l", "unit": 1, **options})
-    return gauge(checked), Wire(load(SIMULATED_GAUGES, driver, driver)(checked, lambda name: seen[name]))
+    return gauge(checked), Wire(load(SIMULATED_GAUGES, driver, driver)(checked, lambda name: values[name]))
 
 
 V10 = {"name": "a", "input": 1, "linearisation": {"signal": "V", "table": [[-9.5, -1], [9.5, 1]]}}

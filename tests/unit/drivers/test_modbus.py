@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from compd.gauge import LineFault, Quality, Reading, RegisterReply
-from compd_drivers.modbus import Block, Modbus, ModbusChannel, blocks, decode
+from compd_drivers.modbus import Modbus, ModbusChannel, RegisterBlock, blocks, decode
 
 
 def channel(**keys: Any) -> dict[str, Any]:
@@ -113,17 +113,17 @@ def test_adjacent_registers_are_read_together_and_stamped_with_their_own_read() 
     st.lists(st.tuples(st.sampled_from([3, 4]), st.integers(0, 400), st.sampled_from([1, 2])), min_size=1, max_size=200)
 )
 def test_every_number_is_whole_in_one_read(spans: list[tuple[int, int, int]]) -> None:
-    found = blocks(spans)
-    assert all(1 <= block.length <= 124 for block in found)
+    reads = blocks(spans)
+    assert all(1 <= block.length <= 124 for block in reads)
     for function, address, length in spans:
         assert any(
             block.function == function and block.address <= address and address + length <= block.address + block.length
-            for block in found
+            for block in reads
         )
 
 
 def test_a_long_map_is_split_between_numbers() -> None:
-    assert blocks([(4, 2 * i, 2) for i in range(63)]) == (Block(4, 0, 124), Block(4, 124, 2))
+    assert blocks([(4, 2 * i, 2) for i in range(63)]) == (RegisterBlock(4, 0, 124), RegisterBlock(4, 124, 2))
 
 
 def test_a_block_that_fails_leaves_no_values() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,9 +13,10 @@ from pydantic import ValidationError
 
 from compd.commissioning.catalogue import catalogue, driver_description
 from compd.commissioning.conformance.report import driver_under_test, run_conformance
-from compd.errors import CompdError
+from compd.errors import PluginError
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd_drivers.preset_directory import PresetDirectory
+from tests.support.paths import ROOT
 from tests.support.transcripts import check_simulated_device, replay_transcript
 
 # Three gauges that do not exist, one on each protocol: the preset, and its transcript.
@@ -185,18 +187,34 @@ def test_options_that_cannot_be_right(made_up: Path, options: dict[str, object],
         load(GAUGES, "dial_100", "x").Options.model_validate({"driver": "dial_100", "line": "l", **options})
 
 
+def test_the_example_in_the_guide_is_a_preset(tmp_path: Path) -> None:
+    guide = (ROOT / "drivers" / "compd_drivers" / "presets" / "README.md").read_text()
+    first, last = guide.index("    title:"), guide.index("An option is")
+    (tmp_path / "dial.yaml").write_text(textwrap.dedent(guide[first:last]))
+    presets = PresetDirectory(tmp_path)
+    assert presets.driver("dial").sample_options == {"unit": "mm"}
+    assert presets.simulated_device("dial")
+
+
+def test_what_is_wrong_for_the_simulated_device_is_named_too(tmp_path: Path) -> None:
+    preset = MADE_UP["dial_100"][0] + "simulated: {extra_input: sometimes}\n"
+    (tmp_path / "dial.yaml").write_text(preset)
+    with pytest.raises(PluginError, match=r"dial\.yaml:\d+ simulated\.extra_input"):
+        PresetDirectory(tmp_path).simulated_device("dial")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "where", "what"),
     [
         ("base: serial_ascii", "base: serial_latin", r"dial\.yaml:\d+ base", "no such driver"),
-        ("title:", "titel:", r"dial\.yaml", "title"),
+        ("title:", "titel:", r"dial\.yaml:\d+ titel", "unknown key"),
         ("format: 8N1", "format: 9X1", r"dial\.yaml:\d+ line\.format", "pattern"),
         ('unit: "{unit}"', 'unit: "{unnit}"', r"dial\.yaml", "no option `unnit`"),
         ("like: channels.range", "like: channels.extent", r"dial\.yaml:\d+ options", "channels.extent"),
         ("one_of: [mm, inch], ", "", r"dial\.yaml:\d+ options\.unit", "exactly one of"),
-        ("quality: sensor_fault", "quality: broken", r"dial\.yaml:\d+ sample", "sensor_fault"),
+        ("quality: sensor_fault", "quality: broken", r"dial\.yaml:\d+ gauge\.errors\[1\]\.quality", "sensor_fault"),
         ("when: {unit: mm}", "when: {unit: um}", r"dial\.yaml:\d+ sample", "unit mm is not described"),
-        ('"%+08.3f"', '"%+08q"', r"dial\.yaml:\d+ sample", "not a converter"),
+        ('"%+08.3f"', '"%+08q"', r"dial\.yaml:\d+ gauge", "not a converter"),
         ("sample: {unit: mm}", "sample: {unit: mil}", r"dial\.yaml:\d+ sample\.unit", "'mm' or 'inch'"),
         ("delivers:", "title: again\ndelivers:", r"dial\.yaml:\d+", "title"),
     ],
@@ -207,6 +225,6 @@ def test_what_is_wrong_in_a_file_is_named_with_its_place(
     preset = MADE_UP["dial_100"][0]
     assert old in preset
     (tmp_path / "dial.yaml").write_text(preset.replace(old, new, 1))
-    with pytest.raises(CompdError, match=what) as caught:
+    with pytest.raises(PluginError, match=what) as caught:
         PresetDirectory(tmp_path).driver("dial")
     assert any(re.search(where, problem.where) for problem in caught.value.problems), caught.value

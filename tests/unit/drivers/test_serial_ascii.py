@@ -278,12 +278,12 @@ def test_silent_in_its_menu_and_lost() -> None:
     line = StreamLine(ScriptedPort(clock, device=lambda request: answers["now"]), 0.1, 0.002, clock)
     device.read(line)
     answers["now"] = b""
-    seen = []
+    qualities = []
     for _ in range(3):
         with pytest.raises(LineFault) as caught:
             device.read(line)
-        seen.append(caught.value.quality)
-    assert seen == [Quality.TIMEOUT, Quality.SILENT, Quality.SILENT]
+        qualities.append(caught.value.quality)
+    assert qualities == [Quality.TIMEOUT, Quality.SILENT, Quality.SILENT]
     assert fault(device, b"") is Quality.TIMEOUT, "a new connection on which it has never answered"
 
 

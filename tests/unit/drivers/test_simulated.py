@@ -139,9 +139,9 @@ def test_each_fault_has_its_name_and_the_next_reading_is_right(tmp_path: Path, c
             bench.wire.fault = None
             bench.values.update({name: value / 2 for name, value in case.values.items()})
             if fault == "doubled":  # a second copy that comes late breaks one more poll, but never passes
-                seen = [outcome(gauge, line) for _ in range(3)]
-                assert all(polled == expected(bench, case) or polled[0][0] is not OK for polled in seen)
-                assert seen[-1] == expected(bench, case)
+                outcomes = [outcome(gauge, line) for _ in range(3)]
+                assert all(polled == expected(bench, case) or polled[0][0] is not OK for polled in outcomes)
+                assert outcomes[-1] == expected(bench, case)
             elif fault != "unplugged":
                 assert outcome(gauge, line) == expected(bench, case)
         with bench.open() as line:  # a new line object is right in any case

@@ -8,8 +8,9 @@ import pytest
 
 from compd.gauge import LineFault
 from compd.plugins import GAUGES, names
+from compd_drivers.presets import directory
 from tests.support.paths import TESTS
-from tests.support.transcripts import check_simulated_device, parse, replay_transcript
+from tests.support.transcripts import check_simulated_device, gauge_of, parse, replay_transcript
 
 FILES = sorted((TESTS / "transcripts").glob("*.txt"))
 GENERIC = {"modbus"}  # its map is tried in tests of its own; the presets on it have transcripts
@@ -27,6 +28,15 @@ def test_the_simulated_device_says_the_same(path: Path) -> None:
 
 def test_every_driver_has_a_transcript() -> None:
     assert {parse(path).driver for path in FILES} | GENERIC == set(names(GAUGES))
+
+
+@pytest.mark.parametrize("name", directory.names())
+def test_every_variant_of_a_preset_has_a_transcript(name: str) -> None:
+    preset, _ = directory.read(name)
+    transcripts = [parse(path) for path in FILES if parse(path).driver == name]
+    chosen = [gauge_of(transcript)[1].model_dump() for transcript in transcripts]
+    for variant in preset.variants:
+        assert any(variant.applies(options) for options in chosen), variant.when
 
 
 # --- the replayer finds what is wrong ------------------------------------------------------------------------

@@ -13,8 +13,9 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
-from compd.lines import open_line
-from compd.lines.port import SerialPort, TcpPort
+from compd.lines import open_line, open_stream
+from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import MOST_DRAIN_TIMEOUTS, StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
@@ -149,6 +150,48 @@ def test_every_format_talks_on_a_pty(pty: tuple[int, str], form: str) -> None:
     os.write(master, b"1.5\r\n")
     assert line.receive_until(b"\r\n", 10) == b"1.5\r\n"
     line.close()
+
+
+class ShownPort:
+    """A port that keeps what was written to it."""
+
+    def __init__(self, port: Port) -> None:
+        self.character_s = port.character_s
+        self.written = b""
+        self._port = port
+
+    def read(self, timeout_s: float) -> bytes:
+        return self._port.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+        self._port.write(data)
+
+    def close(self) -> None:
+        self._port.close()
+
+
+@pytest.mark.parametrize("kind", ["serial", "modbus_rtu"])
+def test_a_line_over_a_wrapped_port_is_otherwise_the_same(pty: tuple[int, str], kind: str) -> None:
+    master, name = pty
+    ports: list[ShownPort] = []
+
+    def wrap(port: Port) -> ShownPort:
+        ports.append(ShownPort(port))
+        return ports[-1]
+
+    settings = SETTINGS.validate_python(
+        {"kind": kind, "port": name, "baud": 9600, "format": "8N1", "timeout_s": TIMEOUT_S}
+    )
+    plain = open_line(settings, MonotonicClock())
+    plain.close()
+    stream = plain._stream if isinstance(plain, RtuMaster) else plain
+    assert isinstance(stream, StreamLine)
+    shown = open_stream(settings, MonotonicClock(), wrap)
+    assert shown._gap_s == stream._gap_s, "the silence before a request"
+    shown.send(b"?\r")
+    assert os.read(master, 10) == b"?\r" == ports[0].written
+    shown.close()
 
 
 def test_a_character_with_a_wrong_parity_is_asked_to_read_as_nul(pty: tuple[int, str]) -> None:

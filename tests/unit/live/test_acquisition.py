@@ -32,11 +32,11 @@ SETTINGS_TCP = SETTINGS.validate_python({"kind": "tcp", "host": "x", "port": 1, 
 def acquiring(*rigs: Rig) -> Iterator[tuple[Acquisition, WatchedLatest]]:
     """The rigs' lines under names a, b ..., their gauges ag, bg ..."""
     names = "abc"[: len(rigs)]
-    gauges = {f"{name}g": made.gauges["g"] for name, made in zip(names, rigs, strict=True)}
+    gauges = {f"{name}g": built.gauges["g"] for name, built in zip(names, rigs, strict=True)}
     latest = WatchedLatest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
     lines = {
-        name: (made.settings.model_copy(update={"back_off_s": BACK_OFF_S}), [(f"{name}g", made.gauges["g"])])
-        for name, made in zip(names, rigs, strict=True)
+        name: (built.settings.model_copy(update={"back_off_s": BACK_OFF_S}), [(f"{name}g", built.gauges["g"])])
+        for name, built in zip(names, rigs, strict=True)
     }
     acquisition = Acquisition(lines, latest, MonotonicClock())
     acquisition.start()
@@ -46,23 +46,23 @@ def acquiring(*rigs: Rig) -> Iterator[tuple[Acquisition, WatchedLatest]]:
         assert acquisition.stop(PATIENCE_S)
 
 
-def made(tmp_path: Path, case: Case) -> Any:
+def build_rig(tmp_path: Path, case: Case) -> Any:
     tmp_path.mkdir(exist_ok=True)
     return rig(tmp_path, case.line, {"g": case.gauge}, dict(case.values))
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_an_unplugged_line_is_lost_and_comes_back_by_itself(tmp_path: Path, case: Case) -> None:
-    with made(tmp_path, case) as bench, acquiring(bench) as (acquisition, latest):
+    with build_rig(tmp_path, case) as device_rig, acquiring(device_rig) as (acquisition, latest):
         channel, value = f"ag.{next(iter(case.values))}", next(iter(case.values.values()))
         assert latest.wait_for(channel, OK).value == pytest.approx(value, abs=case.step)
         since = latest.now
-        bench.wire.fault = "unplugged"
+        device_rig.wire.fault = "unplugged"
         for name in latest.channels:
             assert math.isnan(latest.wait_for(name, Quality.LINE_LOST, since).value)
         assert acquisition.status()["a"]["state"] == "lost"
         since = latest.now
-        bench.wire.fault = None
+        device_rig.wire.fault = None
         assert latest.wait_for(channel, OK, since).value == pytest.approx(value, abs=case.step)
         status = acquisition.status()["a"]
         assert status["state"] == "open"
@@ -73,12 +73,12 @@ def test_an_unplugged_line_is_lost_and_comes_back_by_itself(tmp_path: Path, case
 
 @pytest.mark.parametrize("name", ["modbus TCP", "modbus RTU over TCP", "keyence"])
 def test_faults_that_come_and_go_at_any_moment_leave_nothing_behind(tmp_path: Path, name: str) -> None:
-    with made(tmp_path, CASES[name]) as bench, acquiring(bench) as (_, latest):
+    with build_rig(tmp_path, CASES[name]) as device_rig, acquiring(device_rig) as (_, latest):
         channel, value = next(iter(CASES[name].values.items()))
         for _ in range(10):
-            for fault in bench.wire.faults:
-                bench.wire.fault = fault
-        bench.wire.fault = None
+            for fault in device_rig.wire.faults:
+                device_rig.wire.fault = fault
+        device_rig.wire.fault = None
         reading = latest.wait_for(f"ag.{channel}", OK, latest.now)
         assert reading.value == pytest.approx(value, abs=CASES[name].step)
         assert all(
@@ -89,11 +89,11 @@ def test_faults_that_come_and_go_at_any_moment_leave_nothing_behind(tmp_path: Pa
 
 
 def test_a_device_that_comes_later_is_found(tmp_path: Path) -> None:
-    with made(tmp_path, CASES["keyence"]) as bench:
-        bench.wire.fault = "unplugged"
-        with acquiring(bench) as (_, latest):
+    with build_rig(tmp_path, CASES["keyence"]) as device_rig:
+        device_rig.wire.fault = "unplugged"
+        with acquiring(device_rig) as (_, latest):
             latest.wait_for("ag.1", Quality.LINE_LOST)
-            bench.wire.fault = None
+            device_rig.wire.fault = None
             latest.wait_for("ag.1", OK)
 
 
@@ -101,8 +101,8 @@ def test_a_dead_line_does_not_delay_another(tmp_path: Path) -> None:
     dead = CASES["keyence"]._replace(line={**CASES["keyence"].line, "timeout_s": PATIENCE_S / 2})
     alive = CASES["modbus RTU"]
     with (
-        made(tmp_path / "a", dead) as a,
-        made(tmp_path / "b", alive) as b,
+        build_rig(tmp_path / "a", dead) as a,
+        build_rig(tmp_path / "b", alive) as b,
         acquiring(a, b) as (acquisition, latest),
     ):
         latest.wait_for("ag.1", OK)
@@ -119,15 +119,15 @@ def test_a_dead_line_does_not_delay_another(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["heidenhain 38400", "keyence", "modbus RTU", "modbus RTU over TCP", "modbus TCP"])
 def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) -> None:
     case = CASES[name]
-    with made(tmp_path, case) as bench, acquiring(bench) as (_, latest):
+    with build_rig(tmp_path, case) as device_rig, acquiring(device_rig) as (_, latest):
         channel = next(iter(case.values))
         latest.wait_for(f"ag.{channel}", OK)
-        bench.wire.fault = "late"
+        device_rig.wire.fault = "late"
         since = latest.now
         latest.wait_for(f"ag.{channel}", Quality.TIMEOUT, since)
         old = latest.now
-        bench.values[channel] = case.values[channel] / 2  # before the fault ends: every sound reply shows this
-        bench.wire.fault = None
+        device_rig.values[channel] = case.values[channel] / 2  # before the fault ends: every sound reply shows this
+        device_rig.wire.fault = None
         reading = latest.wait_for(f"ag.{channel}", OK, old)
         assert reading.value == pytest.approx(case.values[channel] / 2, abs=case.step)
 
@@ -143,9 +143,9 @@ def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) ->
     ],
 )
 def test_while_a_line_is_broken_no_reading_is_ok(tmp_path: Path, fault: str, quality: Quality) -> None:
-    with made(tmp_path, CASES["modbus RTU"]) as bench, acquiring(bench) as (_, latest):
+    with build_rig(tmp_path, CASES["modbus RTU"]) as device_rig, acquiring(device_rig) as (_, latest):
         latest.wait_for("ag.u1", OK)
-        bench.wire.fault = fault
+        device_rig.wire.fault = fault
         since = latest.now
         latest.wait_for("ag.u1", quality, since)
         since = latest.now
@@ -193,7 +193,7 @@ class Stop(Exception):
     """Ends a script."""
 
 
-class Bench:
+class ScriptedThread:
     """One LineThread on an InstantClock, run to the end of its script on its own thread."""
 
     def __init__(self, *drivers: Gauge[Any], opener: Any = None, settings: Any = SETTINGS_TCP) -> None:
@@ -222,13 +222,13 @@ def test_a_line_that_cannot_be_opened_is_tried_again_later_and_later() -> None:
     def closed(settings: Any, clock: Clock) -> Line:
         raise LineFault(Quality.LINE_LOST, "cannot open it")
 
-    bench = Bench(Scripted(lambda: []), opener=closed)
-    bench.clock.on_wait = lambda: bench.thread.stop() if len(bench.clock.waits_s) == 7 else None
-    bench.run()
-    assert bench.clock.waits_s == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0]
-    assert bench.qualities("g0.c0") == [Quality.LINE_LOST] * 7
-    assert bench.thread.status()["lost"] == 1
-    assert "cannot open it" in bench.thread.status()["detail"]
+    scripted = ScriptedThread(Scripted(lambda: []), opener=closed)
+    scripted.clock.on_wait = lambda: scripted.thread.stop() if len(scripted.clock.waits_s) == 7 else None
+    scripted.run()
+    assert scripted.clock.waits_s == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0]
+    assert scripted.qualities("g0.c0") == [Quality.LINE_LOST] * 7
+    assert scripted.thread.status()["lost"] == 1
+    assert "cannot open it" in scripted.thread.status()["detail"]
 
 
 def test_a_lost_line_is_closed_and_made_anew_and_success_shortens_the_wait() -> None:
@@ -240,34 +240,34 @@ def test_a_lost_line_is_closed_and_made_anew_and_success_shortens_the_wait() -> 
         if polls in (2, 3, 5):
             raise LineFault(Quality.LINE_LOST, "pulled")
         if polls == 6:
-            bench.thread.stop()
-        return [good(1.0, bench.clock.now_s)]
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
 
-    bench = Bench(Scripted(poll))
-    bench.run()
-    assert len(bench.lines) == 4
-    assert bench.thread.status()["lost"] == 3
-    assert [wait for wait in bench.clock.waits_s if wait >= 0.5] == [0.5, 1.0, 0.5]
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert len(scripted.lines) == 4
+    assert scripted.thread.status()["lost"] == 3
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.5] == [0.5, 1.0, 0.5]
 
 
 def test_an_absent_unit_rests_and_the_others_go_on() -> None:
     def present() -> list[Reading]:
-        bench.clock.now_s += 0.01
-        if bench.clock.now_s > 120.0:
-            bench.thread.stop()
-        return [good(1.0, bench.clock.now_s)]
+        scripted.clock.now_s += 0.01
+        if scripted.clock.now_s > 120.0:
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
 
     def absent() -> list[Reading]:
-        bench.clock.now_s += 0.1
+        scripted.clock.now_s += 0.1
         raise LineFault(Quality.TIMEOUT, "no byte")
 
-    bench = Bench(Scripted(present), Scripted(absent))
-    bench.run()
-    status = bench.thread.status()["gauges"]
+    scripted = ScriptedThread(Scripted(present), Scripted(absent))
+    scripted.run()
+    status = scripted.thread.status()["gauges"]
     assert status["g1"]["faults"] == {"timeout": status["g1"]["polls"]}
     assert status["g1"]["polls"] == 6, "at once, then after 0.5, 1, 2, 4, 8 s of rest: the next after 10 s"
     assert status["g0"]["polls"] > 1000
-    assert bench.lines[0].drained == 6
+    assert scripted.lines[0].drained == 6
 
 
 def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
@@ -276,17 +276,17 @@ def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
-        bench.clock.now_s += 0.01
+        scripted.clock.now_s += 0.01
         if polls <= 3:
             raise LineFault(Quality.TIMEOUT, "no byte")
         if polls == 50:
-            bench.thread.stop()
-        return [good(float(polls), bench.clock.now_s)]
+            scripted.thread.stop()
+        return [good(float(polls), scripted.clock.now_s)]
 
-    bench = Bench(Scripted(poll))
-    bench.run()
-    assert [wait for wait in bench.clock.waits_s if wait >= 0.4] == pytest.approx([0.5, 1.0, 2.0])
-    assert bench.clock.now_s < 105.0
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.4] == pytest.approx([0.5, 1.0, 2.0])
+    assert scripted.clock.now_s < 105.0
 
 
 def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
@@ -295,18 +295,18 @@ def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
-        bench.clock.now_s += 0.01
+        scripted.clock.now_s += 0.01
         if polls == 1:
             raise LineFault(Quality.CRC, "b'..'")
         if polls == 2:
             raise LineFault(Quality.DEVICE_ERROR, "busy")
-        bench.thread.stop()
-        return [good(1.0, bench.clock.now_s)]
+        scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
 
-    bench = Bench(Scripted(poll))
-    bench.run()
-    assert bench.lines[0].drained == 1, "after a device's own error nothing is under way"
-    assert [wait for wait in bench.clock.waits_s if wait >= 0.4] == pytest.approx([0.5]), "the second in a row rests"
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert scripted.lines[0].drained == 1, "after a device's own error nothing is under way"
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.4] == pytest.approx([0.5]), "the second in a row rests"
 
 
 @pytest.mark.parametrize(
@@ -332,30 +332,30 @@ def test_a_defect_of_a_driver_is_named_logged_once_and_survived(answer: Any) -> 
         nonlocal polls
         polls += 1
         if polls > 2:
-            bench.thread.stop()
-            return [good(5.0, bench.clock.now_s)]
+            scripted.thread.stop()
+            return [good(5.0, scripted.clock.now_s)]
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    bench = Bench(Scripted(poll))
+    scripted = ScriptedThread(Scripted(poll))
     with structlog.testing.capture_logs() as logs:
-        bench.run()
-    assert bench.qualities("g0.c0") == [Quality.DRIVER_ERROR, Quality.DRIVER_ERROR, OK]
+        scripted.run()
+    assert scripted.qualities("g0.c0") == [Quality.DRIVER_ERROR, Quality.DRIVER_ERROR, OK]
     assert len([entry for entry in logs if entry["event"] == "driver failed"]) == 1
-    assert bench.thread.status()["gauges"]["g0"]["faults"] == {"driver_error": 2}
+    assert scripted.thread.status()["gauges"]["g0"]["faults"] == {"driver_error": 2}
 
 
 def test_channels_of_one_poll_have_their_own_qualities() -> None:
     def poll() -> list[Reading]:
-        bench.thread.stop()
-        now_s = bench.clock.now_s
+        scripted.thread.stop()
+        now_s = scripted.clock.now_s
         return [good(1.0, now_s), Reading(math.nan, now_s, Quality.SENSOR_FAULT, "?"), good(math.inf, now_s)]
 
-    bench = Bench(Scripted(poll, channels=3))
-    bench.run()
-    assert [bench.qualities(f"g0.c{i}") for i in range(3)] == [[OK], [Quality.SENSOR_FAULT], [Quality.NOT_FINITE]]
-    status = bench.thread.status()["gauges"]["g0"]
+    scripted = ScriptedThread(Scripted(poll, channels=3))
+    scripted.run()
+    assert [scripted.qualities(f"g0.c{i}") for i in range(3)] == [[OK], [Quality.SENSOR_FAULT], [Quality.NOT_FINITE]]
+    status = scripted.thread.status()["gauges"]["g0"]
     assert status["polls"] == 1
     assert status["ok"] == 0
     assert status["faults"] == {"sensor_fault": 1, "not_finite": 1}
@@ -368,15 +368,15 @@ def test_rounds_keep_the_pace_that_is_configured() -> None:
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
-        bench.clock.now_s += 0.03
+        scripted.clock.now_s += 0.03
         if polls == 10:
-            bench.thread.stop()
-        return [good(1.0, bench.clock.now_s)]
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
 
-    bench = Bench(Scripted(poll), settings=SETTINGS_TCP.model_copy(update={"poll_every_s": 0.1}))
-    bench.run()
-    assert bench.clock.waits_s[:9] == pytest.approx([0.07] * 9)
-    assert bench.thread.status()["round_s"] == pytest.approx(0.03)
+    scripted = ScriptedThread(Scripted(poll), settings=SETTINGS_TCP.model_copy(update={"poll_every_s": 0.1}))
+    scripted.run()
+    assert scripted.clock.waits_s[:9] == pytest.approx([0.07] * 9)
+    assert scripted.thread.status()["round_s"] == pytest.approx(0.03)
 
 
 def test_stopping_cuts_a_back_off_short() -> None:

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 
 import pytest
 
-from compd.client import connect
+from compd.client import Client, connect
 from compd.errors import DaemonError
+from compd.live.service.requests import REQUESTS
 
 VERSION = b'{"class":"VERSION","protocol":1,"machine":"test"}\n'
 TIMEOUT_S = 20
@@ -115,3 +116,8 @@ def test_what_is_not_compd_is_named(tmp_path, greeting):
         pytest.raises(DaemonError, match="not compd"),
     ):
         connect(path)
+
+
+def test_every_request_has_a_method_of_its_name_and_the_version_is_there_already():
+    methods = {name for name in vars(Client) if not name.startswith("_")}
+    assert methods - {"close", "readings"} == {name.lower() for name in REQUESTS} - {"version"}

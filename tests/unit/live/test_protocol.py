@@ -47,7 +47,7 @@ class Peer:
         self.file = self.socket.makefile("rb")
         self.version = self.read()
 
-    def say(self, message):
+    def send(self, message):
         self.socket.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
 
     def read(self):
@@ -56,7 +56,7 @@ class Peer:
         return json.loads(received)
 
     def ask(self, message):
-        self.say(message)
+        self.send(message)
         return self.read()
 
     def close(self):
@@ -64,7 +64,7 @@ class Peer:
         self.socket.close()
 
 
-class Bench:
+class Service:
     """A publisher on real sockets, with the loop's side in the test's hands."""
 
     def __init__(self, directory, target_keys):
@@ -103,44 +103,44 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path):
-    with closing(Bench(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as bench:
-        yield bench
+def service(tmp_path):
+    with closing(Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as service:
+        yield service
 
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
-def test_version_greets_and_every_setpoint_comes_once_in_order(bench, kind):
-    peer = getattr(bench, kind)()
+def test_version_greets_and_every_setpoint_comes_once_in_order(service, kind):
+    peer = getattr(service, kind)()
     assert peer.version == VERSION
     assert peer.ask({"class": "WATCH"}) == {"class": "WATCH"}
     now_s = MonotonicClock().monotonic()
     for seq in range(1, 101):
-        bench.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     received = [peer.read() for _ in range(100)]
     assert [message["seq"] for message in received] == list(range(1, 101))
     assert {message["class"] for message in received} == {"SETPOINT"}
 
 
-def test_a_rate_thins_the_setpoints_evenly_and_zero_stops_them(bench):
-    peer = bench.tcp()
+def test_a_rate_thins_the_setpoints_evenly_and_zero_stops_them(service):
+    peer = service.tcp()
     assert peer.ask({"class": "WATCH", "rate_hz": 20}) == {"class": "WATCH", "rate_hz": 20}
     now_s = MonotonicClock().monotonic()
     for seq in range(1, 201):
-        bench.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     seqs = [peer.read()["seq"] for _ in range(20)]
     assert set(np.diff(seqs)) == {10}, "200 Hz thinned to 20 Hz"
     peer.ask({"class": "WATCH", "rate_hz": 0})
-    bench.publisher.deliver(setpoint(999, now_s + 9))
+    service.publisher.deliver(setpoint(999, now_s + 9))
     assert peer.ask({"class": "STATUS"}) == {"class": "STATUS"}, "and no setpoint in between"
 
 
-def test_who_does_not_watch_gets_nothing_and_state_changes_are_still_observed(bench):
-    peer = bench.unix()
-    bench.publisher.deliver(setpoint(1))
-    bench.publisher.deliver(setpoint(2))
-    bench.publisher.deliver(setpoint(3)._replace(state=State.HOLD))
+def test_who_does_not_watch_gets_nothing_and_state_changes_are_still_observed(service):
+    peer = service.unix()
+    service.publisher.deliver(setpoint(1))
+    service.publisher.deliver(setpoint(2))
+    service.publisher.deliver(setpoint(3)._replace(state=State.HOLD))
     assert peer.ask({"class": "STATUS"})["class"] == "STATUS"
-    assert [s.seq for s in bench.observed] == [1, 3]
+    assert [s.seq for s in service.observed] == [1, 3]
 
 
 DEEP = b"[" * (MAX_LINE_BYTES - 10)
@@ -178,18 +178,18 @@ BAD = [
 
 
 @pytest.mark.parametrize(("message", "code"), BAD, ids=[f"{code}-{i}" for i, (_, code) in enumerate(BAD)])
-def test_a_bad_message_gets_an_error_and_harms_nobody(bench, message, code):
-    other, peer = bench.tcp(), bench.tcp()
+def test_a_bad_message_gets_an_error_and_harms_nobody(service, message, code):
+    other, peer = service.tcp(), service.tcp()
     other.ask({"class": "WATCH"})
-    peer.say(message)
+    peer.send(message)
     answer = peer.read()
     assert answer["class"] == "ERROR"
     assert answer["code"] == code
     assert answer["text"]
     assert peer.ask({"class": "VERSION"}) == VERSION, "the connection stays"
-    bench.publisher.deliver(setpoint(1, MonotonicClock().monotonic()))
+    service.publisher.deliver(setpoint(1, MonotonicClock().monotonic()))
     assert other.read()["seq"] == 1
-    assert bench.commands.target is None
+    assert service.commands.target is None
 
 
 @pytest.mark.parametrize(
@@ -213,28 +213,28 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(bench, message, code):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_an_error_names_the_key_its_value_and_what_is_allowed(bench, message, text):
-    answer = bench.unix().ask(message)
+def test_an_error_names_the_key_its_value_and_what_is_allowed(service, message, text):
+    answer = service.unix().ask(message)
     assert answer["class"] == "ERROR"
     assert answer["text"] == text
 
 
-def test_the_answer_to_watch_repeats_the_keys_as_they_were_written(bench):
-    peer = bench.tcp()
+def test_the_answer_to_watch_repeats_the_keys_as_they_were_written(service):
+    peer = service.tcp()
     for request in (b'{"class":"WATCH","rate_hz":20}\n', b'{"class":"WATCH","what":"setpoints","rate_hz":20.0}\n'):
-        peer.say(request)
+        peer.send(request)
         assert peer.file.readline() == request
 
 
-def test_a_model_is_switched_over_the_unix_socket_alone(bench):
-    remote, local = bench.tcp(), bench.unix()
+def test_a_model_is_switched_over_the_unix_socket_alone(service):
+    remote, local = service.tcp(), service.unix()
     for request in ({"class": "MODEL"}, {"class": "MODEL", "file": "/m.yaml"}):
         assert remote.ask(request)["code"] == "unix_only"
     assert local.ask({"class": "MODEL"}) == {"class": "MODEL"}
-    local.say({"class": "MODEL", "file": "/m.yaml", "shadow": True})
-    local.say({"class": "MODEL", "file": ""})
+    local.send({"class": "MODEL", "file": "/m.yaml", "shadow": True})
+    local.send({"class": "MODEL", "file": ""})
     local.ask({"class": "STATUS"})
-    assert [(file, shadow) for file, shadow, _ in bench.models] == [("/m.yaml", True), ("", False)]
+    assert [(file, shadow) for file, shadow, _ in service.models] == [("/m.yaml", True), ("", False)]
 
 
 def test_every_request_documents_itself_and_each_of_its_keys():
@@ -244,123 +244,123 @@ def test_every_request_documents_itself_and_each_of_its_keys():
         assert bool(kind.refusal) == (kind.asker is not Asker.ANYBODY), name
 
 
-def test_a_message_may_come_in_pieces_and_several_in_one_piece(bench):
-    peer = bench.tcp()
+def test_a_message_may_come_in_pieces_and_several_in_one_piece(service):
+    peer = service.tcp()
     for piece in (b'{"cla', b'ss":"VER', b'SION"}\n{"class":"STATUS"}\n\n \n{"class"', b':"VERSION"}\r\n'):
-        peer.say(piece)
+        peer.send(piece)
     assert [peer.read()["class"] for _ in range(3)] == ["VERSION", "STATUS", "VERSION"]
 
 
-def test_the_first_client_with_a_target_is_the_controller_until_it_releases(bench):
-    first, second = bench.tcp(), bench.unix()
+def test_the_first_client_with_a_target_is_the_controller_until_it_releases(service):
+    first, second = service.tcp(), service.unix()
     target = {"class": "TARGET", "tip_B0_mm": [1, 2.5, -510]}
-    first.say(target)
+    first.send(target)
     assert first.ask({"class": "STATUS"})["class"] == "STATUS"
-    assert bench.commands.target is not None
-    assert bench.commands.target.tip_mm == (1.0, 2.5, -510.0)
+    assert service.commands.target is not None
+    assert service.commands.target.tip_mm == (1.0, 2.5, -510.0)
     assert second.ask(target)["code"] == "role_taken"
     assert second.ask({"class": "RELEASE"})["code"] == "not_controller"
     assert first.ask({"class": "RELEASE"}) == {"class": "RELEASE"}
-    assert bench.commands.target is None
-    second.say(target)
+    assert service.commands.target is None
+    second.send(target)
     second.ask({"class": "STATUS"})
-    assert bench.commands.target is not None
+    assert service.commands.target is not None
 
 
-def test_a_controller_that_goes_leaves_cmm_mode_behind(bench):
-    first, second = bench.tcp(), bench.tcp()
-    first.say({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})
+def test_a_controller_that_goes_leaves_cmm_mode_behind(service):
+    first, second = service.tcp(), service.tcp()
+    first.send({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})
     first.ask({"class": "STATUS"})
-    assert bench.commands.target is not None
+    assert service.commands.target is not None
     first.close()
     # the publisher sees the end of that stream no later than it answers the newcomer after it
     second.ask({"class": "STATUS"})
-    bench.tcp().ask({"class": "STATUS"})
-    assert bench.commands.target is None
+    service.tcp().ask({"class": "STATUS"})
+    assert service.commands.target is None
 
 
 def test_a_hexapod_and_a_tool_on_the_plate_take_their_own_targets(tmp_path):
-    with closing(Bench(tmp_path / "h", TargetKeys("tip_B0_mm", rotation=True))) as hexapod:
+    with closing(Service(tmp_path / "h", TargetKeys("tip_B0_mm", rotation=True))) as hexapod:
         peer = hexapod.unix()
-        peer.say({"class": "TARGET", "tip_B0_mm": [1, 2, 3], "rotation_B0_rad": [0, 0.1, 0]})
+        peer.send({"class": "TARGET", "tip_B0_mm": [1, 2, 3], "rotation_B0_rad": [0, 0.1, 0]})
         peer.ask({"class": "STATUS"})
         assert hexapod.commands.target is not None
         assert hexapod.commands.target.rotation_B0_rad == (0.0, 0.1, 0.0)
-    with closing(Bench(tmp_path / "p", TargetKeys("tip_P_mm", rotation=False))) as plate:
+    with closing(Service(tmp_path / "p", TargetKeys("tip_P_mm", rotation=False))) as plate:
         peer = plate.unix()
         assert peer.ask({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})["code"] == "bad_message"
-        peer.say({"class": "TARGET", "tip_P_mm": [1, 2, 3]})
+        peer.send({"class": "TARGET", "tip_P_mm": [1, 2, 3]})
         peer.ask({"class": "STATUS"})
         assert plate.commands.target is not None
 
 
-def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(bench):
-    assert bench.tcp().ask({"class": "ZERO"})["code"] == "unix_only"
-    assert bench.zeros == []
-    peer = bench.unix()
-    peer.say({"class": "ZERO"})
+def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(service):
+    assert service.tcp().ask({"class": "ZERO"})["code"] == "unix_only"
+    assert service.zeros == []
+    peer = service.unix()
+    peer.send({"class": "ZERO"})
     assert peer.ask({"class": "STATUS"})["class"] == "STATUS", "the publisher does not wait for it"
-    (answer,) = bench.zeros
+    (answer,) = service.zeros
     threading.Thread(target=answer, args=(line({"class": "ZERO", "taken_at": "now"}),)).start()
     assert peer.read() == {"class": "ZERO", "taken_at": "now"}
 
 
-def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(bench):
-    slow, good = bench.unix(), bench.tcp()
+def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(service):
+    slow, good = service.unix(), service.tcp()
     slow.ask({"class": "WATCH"})
     good.ask({"class": "WATCH"})
     now_s = MonotonicClock().monotonic()
     seq = 0
-    while not bench.publisher.dropped_clients:
+    while not service.publisher.dropped_clients:
         seq += 1
         assert seq < 50_000, "the slow client was never dropped"
-        bench.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
         assert good.read()["seq"] == seq
-    assert bench.publisher.dropped_setpoints == 0
+    assert service.publisher.dropped_setpoints == 0
     good.ask({"class": "STATUS"})
-    assert bench.publisher.summary()["clients"] == 1
+    assert service.publisher.summary()["clients"] == 1
     while slow.socket.recv(65536):
         pass  # what was on its way, then the end of the stream
 
 
-def test_a_full_queue_drops_the_oldest_and_counts_them(bench):
-    peer = bench.tcp()
+def test_a_full_queue_drops_the_oldest_and_counts_them(service):
+    peer = service.tcp()
     entered, leave = threading.Event(), threading.Event()
 
     def hold_up(setpoint):
         entered.set()
         assert leave.wait(TIMEOUT_S)
 
-    bench.publisher._observe = hold_up
+    service.publisher._observe = hold_up
     peer.ask({"class": "WATCH"})
     now_s = MonotonicClock().monotonic()
-    bench.publisher.deliver(setpoint(0, now_s))
+    service.publisher.deliver(setpoint(0, now_s))
     assert entered.wait(TIMEOUT_S)
     for seq in range(1, 601):
-        bench.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     leave.set()
     assert peer.read()["seq"] == 0
     assert peer.read()["seq"] == 600 - 512 + 1
-    assert bench.publisher.dropped_setpoints == 600 - 512
+    assert service.publisher.dropped_setpoints == 600 - 512
 
 
-def test_beyond_the_last_seat_a_client_is_told_and_closed(bench):
-    seated = [bench.unix() for _ in range(32)]
-    extra = bench.tcp()
+def test_beyond_the_last_seat_a_client_is_told_and_closed(service):
+    seated = [service.unix() for _ in range(32)]
+    extra = service.tcp()
     assert extra.version["code"] == "too_many_clients"
     assert extra.file.read() == b""
     seated[0].close()
     seated[1].ask({"class": "STATUS"})
-    bench.unix().ask({"class": "STATUS"})
+    service.unix().ask({"class": "STATUS"})
 
 
 def test_the_unix_socket_is_for_user_and_group_and_goes_with_the_daemon(tmp_path):
-    bench = Bench(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
-    assert bench.path.stat().st_mode & 0o777 == 0o660
+    service = Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
+    assert service.path.stat().st_mode & 0o777 == 0o660
     with pytest.raises(DaemonError, match="another daemon is listening"):
-        Bench(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
-    bench.close()
-    assert not bench.path.exists()
+        Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
+    service.close()
+    assert not service.path.exists()
 
 
 def test_a_socket_that_a_crash_left_behind_is_replaced(tmp_path):
@@ -368,8 +368,8 @@ def test_a_socket_that_a_crash_left_behind_is_replaced(tmp_path):
     path.parent.mkdir()
     with socket.socket(socket.AF_UNIX) as crashed:
         crashed.bind(str(path))
-    with closing(Bench(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as bench:
-        assert bench.unix().version == VERSION
+    with closing(Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as service:
+        assert service.unix().version == VERSION
 
 
 def test_a_port_that_is_taken_is_named(tmp_path):

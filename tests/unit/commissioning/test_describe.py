@@ -1,0 +1,71 @@
+"""Descriptions of unknown gauges from their replies: what was captured is read, and nothing that looks like it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from compd.commissioning.capture import read_capture
+from compd.commissioning.describe import describe_replies, read_replies
+from compd.errors import CompdError
+from compd.plugins import GAUGES, load
+
+OBSERVED = {
+    "fixed decimals": (b"?\r", [b"+0001.23\r\n", b"-0012.30\r\n", b"+0000.00\r\n"], ["1.23", "-12.3", "0"]),
+    "two heads": (
+        b"M0\r\n",
+        [b"M0,+000.1234,-001.0000\r\n", b"M0,-000.1234,-001.5000\r\n", b"M0,+010.1234,-001.0000\r\n"],
+        ["0.1234, -1", "-0.1234, -1.5", "10.1234, -1"],
+    ),
+    "leading blanks": (
+        b"\x02",
+        [b"+    12.3456    \r\n", b"-     2.3456 >  \r\n", b"      0.0001 <  \r\n"],
+        ["12.3456", "-2.3456", "0.0001"],
+    ),
+    "no fixed width": (b"?\r", [b" 1.234\r", b"-12.345\r", b" 0.001\r"], ["1.234", "-12.345", "0.001"]),
+    "unasked": (b"", [b"GS,  12.3,kg\r\n", b"NT,  -2.3,kg\r\n", b"GS,   0.0,kg\r\n"], ["12.3", "-2.3", "0"]),
+    "no terminator": (b"R", [b"A+1.234", b"A-0.500", b"A+0.001"], ["1.234", "-0.5", "0.001"]),
+    "percent": (b"R", [b"12345%\r", b"00345%\r", b"-0001%\r"], ["12345", "345", "-1"]),
+}
+
+
+@pytest.mark.parametrize("case", OBSERVED)
+def test_learned_description_reads_what_was_observed(case: str) -> None:
+    request, replies, values = OBSERVED[case]
+    learned = describe_replies(request, replies, "mm")
+    assert read_replies(learned, load(GAUGES, "serial_ascii", "x"), replies) == values
+
+
+def test_learned_description_is_narrow() -> None:
+    request, replies, _ = OBSERVED["fixed decimals"]
+    learned = describe_replies(request, replies, "mm")
+    for damaged in (b"+001.23\r\n", b"+0001.2\r\n", b"+0001.234\r\n", b"0001.23\r\n", b"+00x1.23\r\n", b"\r\n"):
+        with pytest.raises(CompdError, match="does not fit"):
+            read_replies(learned, load(GAUGES, "serial_ascii", "x"), [damaged])
+
+
+@pytest.mark.parametrize(
+    ("replies", "message"),
+    [
+        ([b"+1.23\r\n", b"+1.23\r\n", b"+1.23\r\n"], "too few that differ"),
+        ([b"+1.23\r\n", b"ERR0\r\n", b"+1.24\r\n", b"+1.25\r\n"], "reply 2, character"),
+        ([b"+1.23", b"+11.23", b"+1.25"], "no terminator in common"),
+        ([b"a\r", b"b\r", b"c\r"], "no number"),
+        ([], "there is none"),
+        ([b"1.0,2.0\r", b"1.1,2.1\r", b"1.2\r"], "reply 3"),
+    ],
+)
+def test_inconsistent_replies_are_refused_with_their_place(replies: list[bytes], message: str) -> None:
+    with pytest.raises(CompdError, match=message):
+        describe_replies(b"?", replies, "mm")
+
+
+def test_a_capture_that_cannot_be_read_is_named_by_its_line(tmp_path: Path) -> None:
+    capture = tmp_path / "capture.txt"
+    capture.write_text("> 3F\n< 2G\n")
+    with pytest.raises(CompdError, match=r"capture.txt:2"):
+        read_capture(capture)
+    capture.write_text("> 3F\n> 40\n")
+    with pytest.raises(CompdError, match="another request"):
+        read_capture(capture)
