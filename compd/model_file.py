@@ -32,7 +32,7 @@ from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
 from compd.files import write_files
 from compd.model.effect import FittedEffect
-from compd.model.library import find
+from compd.model.library import find_effect
 
 FORMAT = 2
 Kind = Literal["add", "remove", "fit", "undo"]
@@ -324,7 +324,7 @@ def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray)
 
 def _fitted_effect(entry: _EffectInFile, links: int, where: str, problems: list[Problem]) -> FittedEffect:
     """The effect with its numbers; what is missing goes to `problems`. Raises CompdError where it is not installed."""
-    effect = find(entry.effect, where)
+    effect = find_effect(entry.effect, where)
     values = {parameter.name: parameter.value for parameter in entry.parameters}
     columns = effect.columns(links)
     names = [column.name for column in columns]

@@ -41,9 +41,9 @@ def diagnose(
 
     from compd.cli.progress import steps_shown
     from compd.comparison.open import open_model, open_recording
-    from compd.diagnosis.diagnose import diagnose as diagnosed
+    from compd.diagnosis.diagnose import diagnose as diagnose_recording
     from compd.diagnosis.holdout import evaluate_holdout
-    from compd.model.library import library
+    from compd.model.library import load_library
 
     if html is not None:
         from compd.report.page import check_page_path
@@ -52,42 +52,42 @@ def diagnose(
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
     file = open_model(model, aligned)
-    effects = [*library().values()]
+    effects = [*load_library().values()]
     with steps_shown(quiet=as_json) as progress:
-        found = diagnosed(aligned, file.fitted, file.covariance, effects, progress)
-    checked = [evaluate_holdout(found, one) for one in sealed]
+        diagnosis = diagnose_recording(aligned, file.fitted, file.covariance, effects, progress)
+    holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis_page
 
-        write_diagnosis_page(html, found, checked)
+        write_diagnosis_page(html, diagnosis, holdouts)
     if as_json:
-        data: dict[str, Any] = {**found.as_json(), "sealed": [one.as_json() for one in checked]}
+        data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return
-    _print(Console(highlight=False), found, checked)
+    _print_diagnosis(Console(highlight=False), diagnosis, holdouts)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
 
 
-def _print(console: Console, found: Diagnosis, checked: list[Holdout]) -> None:
+def _print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: list[Holdout]) -> None:
     """Verdict first."""
-    console.print(f"[bold]{found.verdict}[/]: {found.summary}")
-    for number, step in enumerate(found.steps, start=1):
+    console.print(f"[bold]{diagnosis.verdict}[/]: {diagnosis.summary}")
+    for number, step in enumerate(diagnosis.steps, start=1):
         _print_step(console, number, step)
-    for one in checked:
-        console.print(f"\n{one.summary}")
-    if found.depends_on:
+    for holdout in holdouts:
+        console.print(f"\n{holdout.summary}")
+    if diagnosis.depends_on:
         console.print("\n[bold]What the rest follows[/] (a description, not a cause):")
-        for dependence in found.depends_on[:SHOWN]:
-            _print_dependence(console, dependence)
-        _print_formulas(console, found.depends_on[0])
-    _print_candidates(console, found)
-    if found.next_measurement:
+        for finding in diagnosis.depends_on[:SHOWN]:
+            _print_finding(console, finding)
+        _print_formulas(console, diagnosis.depends_on[0])
+    _print_candidates(console, diagnosis)
+    if diagnosis.next_measurement:
         console.print("\n[bold]Next[/], measure:")
-        for row in found.next_measurement:
+        for row in diagnosis.next_measurement:
             console.print("    " + ", ".join(f"{name} {value}" for name, value in row.items()), soft_wrap=True)
-        path = found.before.aligned.recording.path
-        for step in found.steps:
+        path = diagnosis.before.aligned.recording.path
+        for step in diagnosis.steps:
             if step.rivals:
                 pair = f"{step.effect.id},{step.rivals[0].name}"
                 console.print(f"    more: compd plan {path} --rivals {pair} --rows 40", soft_wrap=True)
@@ -97,11 +97,12 @@ def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
     effect = step.effect
     console.print(f"\n[bold]{number}. {effect.id}[/]: {effect.physics}")
     console.print(f"    {effect.equation}", markup=False)
-    for one in step.parameters:
-        said = "" if one.plausible else " (implausible)"
-        console.print(f"    {one.name} = {one.value:.4g} +- {one.std:.2g} {one.unit}{said}", markup=False)
-    for name, value in step.fitted.constants.items():
-        console.print(f"    {name} = {value:.4g}, searched")
+    for parameter in step.parameters:
+        remark = "" if parameter.plausible else " (implausible)"
+        value = f"{parameter.value:.4g} +- {parameter.std:.2g} {parameter.unit}"
+        console.print(f"    {parameter.name} = {value}{remark}", markup=False)
+    for name, constant in step.fitted.constants.items():
+        console.print(f"    {name} = {constant:.4g}, searched")
     console.print(
         f"    explains {100 * step.explained_fraction:.3g} % of what was above the noise; error on rows left out "
         f"{step.heldout_rms_um:.3g} um; chance {step.p_value:.3g}"
@@ -112,45 +113,46 @@ def _print_step(console: Console, number: int, step: DiagnosisStep) -> None:
         console.print(f"    told apart by: {effect.separated_by}")
 
 
-def _print_dependence(console: Console, one: EmpiricalFinding) -> None:
+def _print_finding(console: Console, finding: EmpiricalFinding) -> None:
     console.print(
-        f"    {one.covariate}, {one.form}, at the {one.port}: {100 * one.explained_fraction:.3g} % on rows left out "
-        f"({one.heldout_rms_um:.3g} um left), chance {one.p_value:.3g}"
-        + (f", together with {', '.join(one.beside)}" if one.beside else "")
+        f"    {finding.covariate}, {finding.form}, at the {finding.port}: "
+        f"{100 * finding.explained_fraction:.3g} % on rows left out "
+        f"({finding.heldout_rms_um:.3g} um left), chance {finding.p_value:.3g}"
+        + (f", together with {', '.join(finding.beside)}" if finding.beside else "")
     )
 
 
-def _print_formulas(console: Console, one: EmpiricalFinding) -> None:
+def _print_formulas(console: Console, finding: EmpiricalFinding) -> None:
     import yaml
 
     console.print("    To use it until the cause is known, each in a file of its own for `compd effect add`:")
-    for effect, numbers in zip(one.formula_effects, one.parameters, strict=True):
+    for effect, parameters in zip(finding.formula_effects, finding.parameters, strict=True):
         text = yaml.safe_dump(effect, sort_keys=False, default_flow_style=None, width=110)
         console.print("\n".join(f"      {line}" for line in text.splitlines()), markup=False, soft_wrap=True)
-        fitted = ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
+        fitted = ", ".join(f"{name} = {value:.4g}" for name, value in parameters.items())
         console.print(f"      # fitted: {fitted}", markup=False, soft_wrap=True)
 
 
-def _print_candidates(console: Console, found: Diagnosis) -> None:
+def _print_candidates(console: Console, diagnosis: Diagnosis) -> None:
     from rich.table import Table
 
     table = Table("effect", "status", "explains", "left, um", "why")
-    for one in found.candidates:
-        if one.status in ("no_gain", "not_testable"):
+    for candidate in diagnosis.candidates:
+        if candidate.status in ("no_gain", "not_testable"):
             continue
-        known = math.isfinite(one.explained_fraction)
+        known = math.isfinite(candidate.explained_fraction)
         table.add_row(
-            one.effect,
-            one.status,
-            f"{100 * max(one.explained_fraction, 0):.0f} %" if known else "-",
-            f"{one.heldout_rms_um:.3g}" if known else "-",
-            one.why,
+            candidate.effect,
+            candidate.status,
+            f"{100 * max(candidate.explained_fraction, 0):.0f} %" if known else "-",
+            f"{candidate.heldout_rms_um:.3g}" if known else "-",
+            candidate.why,
         )
     if table.row_count:
         console.print("\n[bold]Effects of the library[/], each alone, on rows left out:")
         console.print(table)
-    for status, said in (("no_gain", "Without gain"), ("not_testable", "Not testable here")):
-        names = [one.effect for one in found.candidates if one.status == status]
+    for status, heading in (("no_gain", "Without gain"), ("not_testable", "Not testable here")):
+        names = [candidate.effect for candidate in diagnosis.candidates if candidate.status == status]
         if names:
-            console.print(f"{said}: {', '.join(names)}")
+            console.print(f"{heading}: {', '.join(names)}")
     console.print("--json gives each one's reason and numbers.")

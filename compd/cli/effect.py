@@ -22,12 +22,12 @@ def list_effects() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model.library import library
+    from compd.model.library import load_library
 
     table = Table("effect", "port", "needs", "physics")
     table.columns[0].no_wrap = True
     table.columns[2].overflow = "fold"  # names of quantities are to be copied whole
-    for one in library().values():
+    for one in load_library().values():
         table.add_row(one.id, one.port, ", ".join(one.needs) or "-", one.physics)
     Console().print(table)
 
@@ -47,9 +47,9 @@ def show(
 
     from compd.configuration import load
     from compd.configuration.shipped import shipped_configuration
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
-    one = find(name, "compd effect show")
+    one = find_effect(name, "compd effect show")
     configuration = load(machine or shipped_configuration("tripod-cmm.yaml"))
     Console().print(_card(one, configuration))
     if html is not None:

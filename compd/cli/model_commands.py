@@ -33,12 +33,13 @@ def add(
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.comparison.open import open_recording
-    from compd.diagnosis.model_changes import add as added
+    from compd.diagnosis.model_changes import add as add_effect
 
-    declared, found = declaration_of(effect)
+    declared, declared_effect = declaration_of(effect)
     aligned = open_recording(recording, machine)
     file = _opened(model, aligned) if model.exists() else _begun(aligned)
-    _finish(model, added(file, declared, found, aligned, _now()), f"added {found.id}", dry_run)
+    change = add_effect(file, declared, declared_effect, aligned, _now())
+    _finish(model, change, f"added {declared_effect.id}", dry_run)
 
 
 def remove(
@@ -50,10 +51,10 @@ def remove(
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.comparison.open import open_recording
-    from compd.diagnosis.model_changes import remove as removed
+    from compd.diagnosis.model_changes import remove as remove_effect
 
     aligned = open_recording(recording, machine)
-    _finish(model, removed(_opened(model, aligned), effect, aligned, _now()), f"removed {effect}", dry_run)
+    _finish(model, remove_effect(_opened(model, aligned), effect, aligned, _now()), f"removed {effect}", dry_run)
 
 
 def fit(
@@ -69,10 +70,10 @@ def fit(
 
 def undo(model: ModelOption) -> None:
     """Take back the last step; undo again for the step before it. The ledger keeps both."""
-    from compd.diagnosis.model_changes import undo as undone
+    from compd.diagnosis.model_changes import undo as undo_step
     from compd.model_file import read_stored, write_stored
 
-    after = undone(read_stored(model), _now(), str(model))
+    after = undo_step(read_stored(model), _now(), str(model))
     write_stored(model, after)
     names = ", ".join(_name(entry["effect"]) for entry in after.state["effects"]) or "none"
     typer.echo(f"{model}: one step taken back; effects now: {names}")
@@ -85,12 +86,12 @@ def _name(declared: Declaration) -> str:
 def declaration_of(text: str) -> tuple[Declaration, Effect]:
     """What the person named, and the effect it stands for. Raises CompdError with every problem."""
     from compd.configuration.document import read
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
     if Path(text).suffix in (".yaml", ".yml"):
         declared = read(Path(text)).data
-        return declared, find(declared, text)
-    return text, find(text, "compd effect add")
+        return declared, find_effect(declared, text)
+    return text, find_effect(text, "compd effect add")
 
 
 def _opened(path: Path, aligned: AlignedRecording) -> ModelFile:
@@ -130,19 +131,21 @@ def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )
     ranges = {
-        (one.effect.id, column.name): column.parameter
-        for one in change.file.fitted
-        for column in one.effect.columns(links)
+        (fitted.effect.id, column.name): column.parameter
+        for fitted in change.file.fitted
+        for column in fitted.effect.columns(links)
     }
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
     for effect, number in parameter_estimates(change.file.fitted, links):
         parameter = ranges[effect, number["name"]]
         inside = parameter.low <= number["value"] <= parameter.high
-        said = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
-        table.add_row(effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], said)
-    for one in change.file.fitted:
-        for name, value in one.constants.items():
-            unit = next(constant.unit for constant in one.effect.constants if constant.name == name)
-            table.add_row(one.effect.id, name, f"{value:.5g}", "searched", unit, "")
+        plausible = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
+        table.add_row(
+            effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], plausible
+        )
+    for fitted in change.file.fitted:
+        for name, value in fitted.constants.items():
+            unit = next(constant.unit for constant in fitted.effect.constants if constant.name == name)
+            table.add_row(fitted.effect.id, name, f"{value:.5g}", "searched", unit, "")
     console.print(table)
     typer.echo(after.verdict)

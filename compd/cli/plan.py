@@ -34,7 +34,7 @@ def plan(
     from compd.diagnosis.measurement_programmes import recorded_limits
     from compd.diagnosis.next_measurement import plan_measurement
     from compd.errors import CompdError, Problem
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
     names = [name.strip() for name in rivals.split(",")]
     if len(names) != 2 or names[0] == names[1]:
@@ -47,10 +47,10 @@ def plan(
                 next_step="`compd diagnose` names rivals",
             )
         )
-    effects = [find(name, "--rivals") for name in names]
+    effects = [find_effect(name, "--rivals") for name in names]
     aligned = open_recording(recording, machine)
     file = open_model(model, aligned)
-    present = [one.effect.id for one in file.fitted if one.effect.id in names]
+    present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in names]
     if present:
         raise CompdError(
             Problem(
@@ -76,24 +76,24 @@ def plan(
         limits = limits._replace(speed_mm_per_s=speed)
     sigma_um = compare(aligned, file.fitted, file.covariance).floor.by_axis_um
     first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
-    found = plan_measurement(aligned, file.fitted, (first, second), sigma_um, limits, rows)
+    planned = plan_measurement(aligned, file.fitted, (first, second), sigma_um, limits, rows)
     if out is None:
-        found.write_to(sys.stdout)
+        planned.write_to(sys.stdout)
     else:
-        found.write(out)
+        planned.write(out)
     typer.echo(
-        f"{names[0]} and {names[1]} differ by {found.before:.2g} times the noise on what was measured, by "
-        f"{found.separation:.2g} times with these {len(found.rows)} rows.",
+        f"{names[0]} and {names[1]} differ by {planned.before:.2g} times the noise on what was measured, by "
+        f"{planned.separation:.2g} times with these {len(planned.rows)} rows.",
         err=out is None,
     )
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
-    """Raises CompdError where these are not so many numbers, each pair rising."""
+    """The numbers of an option, in rising pairs. Raises CompdError where there are not `count`, or a pair falls."""
     from compd.errors import CompdError, Problem
 
     try:
-        values = [float(one) for one in text.split(",")]
+        values = [float(number) for number in text.split(",")]
     except ValueError:
         values = []
     rising = all(low < high for low, high in zip(values[::2], values[1::2], strict=False))

@@ -11,7 +11,7 @@ fit is repeated until they no longer change. Standard errors: `cluster_covarianc
 
 Example::
 
-    model = [initial_effect(library()["link_expansion"], {}, links=3)]
+    model = [initial_effect(load_library()["link_expansion"], {}, links=3)]
     result = fit(align_recording(recording, configuration), model)
     result.fitted[0].theta          # (1,) in the unit of fit
     np.sqrt(result.covariance)      # (1, 1) its standard error

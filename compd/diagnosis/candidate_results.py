@@ -15,7 +15,7 @@ from compd.diagnosis.verdict import CandidateResult, DiagnosisStep, ParameterEst
 def candidate_results(
     problem: DiagnosisProblem, search: SubsetSearch, steps: Sequence[DiagnosisStep], p_values: Mapping[str, float]
 ) -> tuple[CandidateResult, ...]:
-    """One result per effect, tried alone at its best shape constants: the best first, then those not testable.
+    """One result per effect, tried alone at its best nonlinear constants: the best first, then those not testable.
 
     steps : the effects that were named.  p_values : by effect, corrected for all that were tried.
     """
@@ -34,7 +34,7 @@ def candidate_results(
 def _result_alone(
     problem: DiagnosisProblem, search: SubsetSearch, subset: Subset, steps: Sequence[DiagnosisStep], p_value: float
 ) -> CandidateResult:
-    """The result of one effect at its best shape constants."""
+    """The result of one effect at its best nonlinear constants."""
     candidate = search.candidates[subset.members[0]]
     theta, covariance = search.estimates(subset.members)[0]
     links = problem.aligned.rows.links

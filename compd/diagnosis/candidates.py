@@ -17,17 +17,17 @@ from compd.units import UM_PER_MM
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect at one choice of its shape constants.
+    """One effect at one choice of its nonlinear constants.
 
     name : the effect's id, which variants of one effect share; of an empirical term, its covariate and form.
     columns_um : (N, m, P) by how many um each parameter moves the prediction.
     limits : (P, 2) plausible range of each parameter; infinite where nothing is known of it.
-    searched_parameters : for how many parameters the search for its shape constants counts.
+    searched_parameters : for how many parameters the search for its nonlinear constants counts.
     """
 
     name: str
     effect: Effect
-    shape: ConstantValues
+    constants: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
     searched_parameters: int
@@ -65,7 +65,7 @@ class CandidatePool:
 def library_pool(
     aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str], criteria: Criteria
 ) -> CandidatePool:
-    """Every effect at every choice of its shape constants, except those whose ids are `present` in the model."""
+    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
     candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
     usable, _ = aligned.usable
@@ -76,13 +76,13 @@ def library_pool(
         if reason:
             untestable[effect.id] = reason
             continue
-        shapes = effect.constant_grid(aligned.rows)
+        grid = effect.constant_grid(aligned.rows)
         searched_parameters = sum(
             criteria.choice_parameters if constant.choice else criteria.searched_constant_parameters
             for constant in effect.constants
-            if len({shape[constant.name] for shape in shapes}) > 1
+            if len({constants[constant.name] for constants in grid}) > 1
         )
-        variants = [_candidate(effect, shape, aligned, searched_parameters) for shape in shapes]
+        variants = [_candidate(effect, constants, aligned, searched_parameters) for constants in grid]
         reason = _reason_for_no_motion(variants, usable, criteria)
         if reason:
             untestable[effect.id] = reason
@@ -91,10 +91,12 @@ def library_pool(
     return CandidatePool(tuple(candidates), untestable)
 
 
-def _candidate(effect: Effect, shape: ConstantValues, aligned: AlignedRecording, searched_parameters: int) -> Candidate:
+def _candidate(
+    effect: Effect, constants: ConstantValues, aligned: AlignedRecording, searched_parameters: int
+) -> Candidate:
     limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
-    columns_um = aligned.columns(effect, shape) * UM_PER_MM
-    return Candidate(effect.id, effect, shape, columns_um, limits, searched_parameters)
+    columns_um = aligned.columns(effect, constants) * UM_PER_MM
+    return Candidate(effect.id, effect, constants, columns_um, limits, searched_parameters)
 
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:

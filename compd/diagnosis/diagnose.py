@@ -60,7 +60,7 @@ def diagnose(
 
     Example::
 
-        diagnosis = diagnose(aligned, (), None, list(library().values()))
+        diagnosis = diagnose(aligned, (), None, list(load_library().values()))
         diagnosis.verdict  # "identified"
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
@@ -182,7 +182,7 @@ def _depends_on(
 
 
 def _p_values(search: SubsetSearch, effects: tuple[int, ...]) -> dict[str, float]:
-    """p-value of each effect of the library, corrected for all of them and for their shape constants.
+    """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
 
     The noise is what the named effects leave; where none is named, what the best candidate leaves.
     """

@@ -13,7 +13,7 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.criteria import Criteria
 from compd.model.effect import Effect
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
 # Times at which a step is looked for first; then between the best one's neighbours.
@@ -74,10 +74,10 @@ class EmpiricalTerm:
 
     def effect(self) -> Effect:
         """The formula as an effect, its constant a parameter; along the first axis where there are several."""
-        return find(self.declaration(self.axes[0]), "description")
+        return find_effect(self.declaration(self.axes[0]), "description")
 
-    def shape(self, value: float | None) -> dict[str, float]:
-        """Shape constants of `effect` at a value of the nonlinear constant; None for a term without one."""
+    def constant_values(self, value: float | None) -> dict[str, float]:
+        """The nonlinear constants of `effect`, by name, at a value of the term's; None for a term without one."""
         return {} if value is None else {self.constant: value}
 
     def columns_um(self, aligned: AlignedRecording, effect: Effect, value: float | None) -> FloatArray:
@@ -85,10 +85,10 @@ class EmpiricalTerm:
 
         effect : as from `effect`.  value : of the nonlinear constant; None for a term without one.
         """
-        shape = self.shape(value)
+        constants = self.constant_values(value)
         if self.axes == ("",):
-            return aligned.columns(effect, shape) * UM_PER_MM
-        basis, _ = effect.basis(aligned.rows, shape, None)
+            return aligned.columns(effect, constants) * UM_PER_MM
+        basis, _ = effect.basis(aligned.rows, constants, None)
         factors = basis[:, "xyz".index(self.axes[0])] * UM_PER_MM
         along = self._measured_along_axes(aligned)
         return np.asarray((along[:, :, :, None] * factors[:, None, None, :]).reshape(*along.shape[:2], -1))

@@ -15,7 +15,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
@@ -29,7 +29,7 @@ class Change:
 
 
 def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording, date: str) -> Change:
-    """Add an effect and fit all effects together; its shape constants are searched.
+    """Add an effect and fit all effects together; its nonlinear constants are searched.
 
     declared : how the file declares the effect.  date : of the step, as it is to be written.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
@@ -67,7 +67,7 @@ def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str
 
 
 def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
-    """Fit all effects again from zero, shape constants as they are. Raises StateError where there are none."""
+    """Fit all effects again from zero, nonlinear constants as they are. Raises StateError where there are none."""
     if not file.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, file.fitted, file.covariance)
@@ -111,7 +111,7 @@ def _change(
     aligned = before.aligned
     criteria = Criteria()
     fitted_ids = [fitted.effect.id for fitted in result.fitted]
-    others = library_pool(aligned, list(library().values()), fitted_ids, criteria)
+    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria)
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(

@@ -41,7 +41,7 @@ def p_values(families: Sequence[Sequence[FloatArray]], y: FloatArray, noise: Flo
         t_k = (score_k - mean_b score_kb) / std_b score_kb
         p_k = (1 + #{b : max_j t_jb >= t_k}) / (SIGN_FLIPS + 1)
 
-    which controls the probability of even one false finding among all that were tried, shape constants included
+    which controls the probability of even one false finding among all that were tried, nonlinear constants included
     (max-T: Westfall and Young, Resampling-Based Multiple Testing (1993); Romano and Wolf, Econometrica 73 (2005)
     1237).
 

@@ -90,7 +90,7 @@ class SubsetSearch:
 
     @cached_property
     def best_variants(self) -> dict[str, Subset]:
-        """By effect, its best choice of shape constants, alone."""
+        """By effect, its best choice of nonlinear constants, alone."""
         variants: dict[str, Subset] = {}
         for subset in self.singles:
             variants.setdefault(self.name(subset.members[0]), subset)

@@ -1,4 +1,4 @@
-"""The machine frame: the pose of {B} in {M} from nine distances, and what it does to targets and tips."""
+"""The machine frame: the pose of {B} in {M} from nine distances, and where the base joints are."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import MATRIX, VECTOR, kernel
-from compd.model.kernels.octahedron import edges, octahedron, place_base
-from compd.model.transform import to_inner, to_outer
+from compd.model.kernels.octahedron import edge_lengths, octahedron, place_base
 
 
 class FrameGeometry(NamedTuple):
@@ -99,25 +98,7 @@ def distances_mm(supports_M_mm: ArrayLike, plate_points_M_mm: ArrayLike) -> tupl
 def _distances(
     supports_M: FloatArray, plate_points_M: FloatArray, nine: FloatArray, lengths_mm: FloatArray, J: FloatArray
 ) -> None:
-    """`nine` says nothing but how long the result is: a gufunc takes its sizes from what goes in."""
-    if not edges(supports_M, plate_points_M, lengths_mm, J):
+    """See `distances_mm`. `nine` is not read: a gufunc takes the length of its result from an argument."""
+    if not edge_lengths(supports_M, plate_points_M, lengths_mm, J):
         lengths_mm[:] = math.nan
         J[:, :] = math.nan
-
-
-def target_now(geometry: FrameGeometry, frame: Frame, target_B0_mm: ArrayLike) -> FloatArray:
-    """Equation (8): the target (..., 3) of {B0} in today's {B}, in mm; it keeps its place on the surface plate.
-
-    target_B = T_M_B^-1 T_M_B0 target_B0; nan where the frame is.
-    """
-    target_M_mm = to_outer(geometry.zero_rotation_M_B, geometry.zero_origin_M_mm, target_B0_mm)
-    return np.asarray(to_inner(frame.rotation_M_B, frame.origin_M_mm, target_M_mm))
-
-
-def tip_at_zero(geometry: FrameGeometry, frame: Frame, tip_B_mm: ArrayLike) -> FloatArray:
-    """Equation (9): the tip (..., 3) of today's {B} in {B0}, in mm; nan where the frame is.
-
-    tip_B0 = T_M_B0^-1 T_M_B tip_B.
-    """
-    tip_M_mm = to_outer(frame.rotation_M_B, frame.origin_M_mm, tip_B_mm)
-    return np.asarray(to_inner(geometry.zero_rotation_M_B, geometry.zero_origin_M_mm, tip_M_mm))

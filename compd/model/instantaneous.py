@@ -1,6 +1,14 @@
-"""The frame by instantaneous kinematics, equations (4) and (5): one constant matrix, exact to first order.
+"""The frame by instantaneous kinematics, the paper's equations (4) and (5): exact to first order.
+
+    U = J X                 (4)
+    X = J^-1 U              (5)
+
+U (9,) are the changes of t1..t3, u1..u6 since machine zero and X (9,) the displacements of b1, b2, b3 in {M}. Row e of
+J is the unit vector along edge e, at its near support positive, at its far support negative: d|b - m| = (b - m) . db /
+|b - m|. J is constant, that of machine zero.
 
 The exact solution costs five microseconds, so the daemon uses that; this is the paper's other way, kept to compare.
+Example, on the tripod: u1 longer by 0.1 mm displaces {B} by 0.0862 mm, and the two ways differ by 7 nm and 0.02 urad.
 """
 
 from __future__ import annotations
@@ -61,7 +69,16 @@ def inverse_frame_jacobian(geometry: FrameGeometry) -> FloatArray:
 
 
 def base_pose_jacobian(geometry: FrameGeometry) -> FloatArray:
-    """d (displacement, rotation vector) / d (b1, b2, b3) of {B} at machine zero, (6, 9); rows 3..5 in rad/mm."""
+    """d (displacement, rotation vector) / d (b1, b2, b3) of {B} at machine zero, (6, 9); rows 3..5 in rad/mm.
+
+    The origin is the centroid: a third of each support's displacement. A rotation w of {B} moves its axes by w x y_B
+    and w x z_B; written in {B} these are (-w_z, 0, w_x) and (w_y, -w_x, 0), so that
+
+        w_x = z_B . dy_B,   w_y = x_B . dz_B,   w_z = -x_B . dy_B,
+
+    with dy_B = (db1 - d origin) / |b1 - origin| and dz_B = d((b2 - b1) x (b3 - b1)) / |(b2 - b1) x (b3 - b1)|, each
+    but for a part along the axis itself, which the products leave out.
+    """
     b1, b2, b3 = geometry.zero_supports_M_mm
     axes = geometry.zero_rotation_M_B
     x_B, z_B = axes[:, 0], axes[:, 2]
@@ -70,17 +87,16 @@ def base_pose_jacobian(geometry: FrameGeometry) -> FloatArray:
     to_b1 = (np.hstack([np.eye(3), np.zeros((3, 6))]) - thirds) / arm_mm
     normal = np.cross(b2 - b1, b3 - b1)
     area_mm2 = float(np.linalg.norm(normal))
-    # rows of x . d(normal): (b2-b1) x (b3-b1), each support moved in turn
+    # x_B . d((b2-b1) x (b3-b1)) by b1, b2 and b3 in turn, a scalar triple product each
     normal_along_x = np.concatenate([np.cross(b2 - b3, x_B), np.cross(b3 - b1, x_B), np.cross(x_B, b2 - b1)]) / area_mm2
-    # d y_B = w x y_B and d z_B = w x z_B for a rotation w, written in {B} axes
     turn_B = np.vstack([z_B @ to_b1, normal_along_x, -x_B @ to_b1])
     return np.vstack([thirds, axes @ turn_B])
 
 
 def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> InstantaneousFrame:
-    """Equations (4) and (5): X = J^-1 U with the constant J of machine zero.
+    """Equation (5): X = J^-1 U with the constant J of machine zero.
 
-    changes_mm : (..., 9), of t1..t3, u1..u6 since machine zero. nan in, nan out.
+    changes_mm : (..., 9), U, of t1..t3, u1..u6 since machine zero. nan in, nan out.
     Raises KinematicsError where the frame at machine zero is near-singular.
     """
     changes = np.asarray(changes_mm, dtype=np.float64)
@@ -90,7 +106,7 @@ def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> Insta
     return InstantaneousFrame(supports, pose[..., :3], pose[..., 3:])
 
 
-def difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
+def frame_difference(exact: Frame, instantaneous: InstantaneousFrame) -> FrameDifference:
     """How far the two ways of the paper differ, row by row; nan where the exact one failed."""
 
     def length(vector: FloatArray) -> FloatArray:

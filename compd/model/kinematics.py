@@ -68,7 +68,7 @@ class Closure(NamedTuple):
     reason: IntArray
 
 
-def checked(mechanism: Mechanism) -> Mechanism:
+def check_mechanism(mechanism: Mechanism) -> Mechanism:
     """The mechanism, if its arrays have the shapes of a tripod or a hexapod; else ValueError."""
     base, axes = mechanism.base_joints_M_mm, mechanism.revolute_axes_P
     if (base.shape[-2:], axes.shape[-2:]) not in (((3, 3), (3, 3)), ((6, 3), (0, 3))):
@@ -93,7 +93,7 @@ def forward_kinematics(
     between guess and solution, or the platform has turned by more than a right angle).
     Raises ValueError for arrays of a wrong shape.
     """
-    return Pose(*forward(*checked(mechanism), link_length_mm, guess_origin_M_mm, guess_rotation_M_P))
+    return Pose(*forward(*check_mechanism(mechanism), link_length_mm, guess_origin_M_mm, guess_rotation_M_P))
 
 
 def inverse_kinematics(mechanism: Mechanism, tip_M_mm: ArrayLike, tip_P_mm: ArrayLike, rotation_M_P: ArrayLike) -> Pose:
@@ -107,7 +107,7 @@ def inverse_kinematics(mechanism: Mechanism, tip_M_mm: ArrayLike, tip_P_mm: Arra
     NEAR_SINGULAR (the lengths exist, but would not hold the pose).
     Raises ValueError for arrays of a wrong shape.
     """
-    return Pose(*inverse(*checked(mechanism), tip_M_mm, tip_P_mm, rotation_M_P))
+    return Pose(*inverse(*check_mechanism(mechanism), tip_M_mm, tip_P_mm, rotation_M_P))
 
 
 def closure_at(mechanism: Mechanism, origin_M_mm: ArrayLike, rotation_M_P: ArrayLike) -> Closure:
@@ -117,4 +117,4 @@ def closure_at(mechanism: Mechanism, origin_M_mm: ArrayLike, rotation_M_P: Array
     A row fails as NOT_FINITE, or NEAR_SINGULAR where a link has no length.
     Raises ValueError for arrays of a wrong shape.
     """
-    return Closure(*closure(*checked(mechanism), origin_M_mm, rotation_M_P))
+    return Closure(*closure(*check_mechanism(mechanism), origin_M_mm, rotation_M_P))

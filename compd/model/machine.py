@@ -13,13 +13,12 @@ from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
 from compd.model.effect import FittedEffect
 from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_frame
-from compd.model.kernels.rotation import compose
+from compd.model.kernels.rotation import compose, to_inner, to_outer
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
 from compd.model.observations import MachineConstants, MachineDetails
 from compd.model.solve_status import require
 from compd.model.statics import link_forces
 from compd.model.tool import Arrangement, Contact
-from compd.model.transform import to_inner, to_outer
 
 
 class AtZero(NamedTuple):

@@ -1,6 +1,6 @@
-"""What follows slowly: temperatures behind their surroundings in time, friction behind its scale in distance.
+"""Effects with memory: a first-order lag in time (temperatures) and dry friction along a distance.
 
-Both take their state and give it back, so that N rows at once and row after row are the same.
+Both take their state and return it, so that N rows at once and row after row give the same bits.
 """
 
 from __future__ import annotations
@@ -33,9 +33,10 @@ def _lag(
     value_after: FloatArray,
     lagged_after: FloatArray,
 ) -> None:
+    """One column of `lag`; the state's three parts apart."""
     for k in range(time_s.shape[0]):
         if math.isnan(value[k]):
-            lagged[k] = math.nan  # a missing value is not remembered: the next one bridges the gap
+            lagged[k] = math.nan  # a missing value leaves the state as it is
             continue
         steps = (time_s[k] - time_before_s) / tau_s
         if start[k] != 0.0 or math.isnan(time_before_s):
@@ -56,10 +57,19 @@ def _lag(
 def lag(
     time_s: FloatArray, value: FloatArray, session_start: BoolArray, tau_s: float, state: State | None
 ) -> tuple[FloatArray, State]:
-    """First-order lag, tau dy/dt = x - y, solved exactly between rows for an input that runs straight there.
+    """First-order lag, tau dy/dt = x - y, solved exactly for an input x that is linear between rows.
 
-    time_s (N,), value (N, n), session_start (N,): there y starts at x.
-    Returns y (N, n) and the state after; nan where the value is nan, which leaves no trace in the state.
+    With s = (t1 - t0) / tau (Incropera, Fundamentals of Heat and Mass Transfer, chapter 5, for a step; integrated by
+    parts for a ramp):
+
+        y1 = x1 + (y0 - x0) exp(-s) - (x1 - x0) (1 - exp(-s)) / s
+
+    time_s (N,), value (N, n) is x, session_start (N,): there y starts at x.  tau_s : above 0.
+    state : (time, x, y), (n,) each, after the last row before; None at the start.
+    Returns y (N, n) and the state after. A value that is nan gives nan and is left out: the next one follows on the
+    last that was known.
+
+    Example: an input that rises from 0 to 1 within tau leaves y = 1 - (1 - exp(-1)) = 0.368 at its end.
     """
     if state is None:
         state = (np.full(value.shape[1], np.nan),) * 3
@@ -84,6 +94,7 @@ def _friction(
     position_after_mm: FloatArray,
     strain_after: FloatArray,
 ) -> None:
+    """One column of `friction`; the state's two parts apart."""
     for k in range(position_mm.shape[0]):
         if math.isnan(position_mm[k]):
             strain[k] = math.nan
@@ -114,15 +125,23 @@ def friction(
     least_mm: float,
     state: State | None,
 ) -> tuple[FloatArray, State]:
-    """How far dry friction has bent what it holds, -1..1, while it is dragged along.
+    """Elastic deflection of what dry friction holds, as a share z of the deflection at which it slides, -1..1.
 
-    position_mm, direction (N, n): a session starts fully bent in its direction, at 0 where that is not +1 or -1.
-    rounded : 0 for the stop operator (one spring: elastic up to `distance_mm` of travel, then sliding; Visintin,
-    Differential Models of Hysteresis, 1994, chapter III), 1 for many springs that slide one after another, which
-    `distance_mm` brings nearer to the end by a factor e (Dahl, A solid friction model, 1968).
-    A move beyond least_mm counts in the direction of its end: approached from one side, a link may have
-    gone farther than the two rows tell.
-    Returns (N, n) and the state after.
+    For a move dx from one row to the next:
+
+        rounded = 0, stop operator, one spring that slides at its limit (Visintin, Differential Models of Hysteresis,
+            1994, chapter III):                      z1 = min(1, max(-1, z0 + dx / distance))
+        rounded = 1, many springs that slide one after another (Dahl, A solid friction model, 1968), with s = sgn(dx):
+                                                     z1 = s - (s - z0) exp(-|dx| / distance)
+
+    position_mm, direction (N, n): a session starts at z = direction, at 0 where that is not +1 or -1.
+    session_start (N,).  distance_mm : above 0.
+    least_mm : a longer move counts in the direction of the row where it ends: a link that was approached from one
+        side may have overshot between two rows.
+    state : (position, z), (n,) each, after the last row before; None at the start.
+    Returns z (N, n) and the state after; nan where the position is nan, which is left out of the state.
+
+    Example, stop operator with a distance of 1 mm from rest: positions 0, 0.5, 1.5, 1.25 mm give z = 0, 0.5, 1, 0.75.
     """
     if state is None:
         state = (np.full(position_mm.shape[1], np.nan),) * 2

@@ -12,9 +12,9 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
+from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
 from compd.model.statics import link_forces
-from compd.model.transform import to_outer
 
 # ISO 1: lengths are stated at 20 degC.
 REFERENCE_TEMPERATURE_degC = 20.0

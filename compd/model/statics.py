@@ -1,4 +1,13 @@
-"""Forces in the links, for a load and the platform's weight."""
+"""Forces in the links, for a load and the platform's weight, by virtual work.
+
+With x the pose and J = d(l, o)/dx the closure's derivatives (`kernels.closure`), l the link lengths and o the offsets
+of the revolute axes, a virtual displacement dx lets the load do the work W . dx and the links take J dx times their
+forces. Equilibrium for every dx is
+
+    J^T (axial, -lateral) = W,   W = (force, moment about the origin of {P}).
+
+It is solved with moments divided by the platform's radius, so that all entries of J are pure numbers.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.closure import close, known, platform_radius
+from compd.model.kernels.closure import evaluate_closure, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, solve
-from compd.model.kinematics import Mechanism, checked
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve
+from compd.model.kinematics import Mechanism, check_mechanism
 from compd.model.solve_status import AMPLIFICATION_LIMIT, Reason
 
 OK = int(Reason.OK)
@@ -51,12 +60,13 @@ def _forces(
     lateral_N: FloatArray,
     reason: IntArray,
 ) -> None:
+    """See `link_forces`. The lateral force is that on the platform, which the constraint's multiplier opposes."""
     n = axial_N.shape[0]
     axial_N[:] = math.nan
     lateral_N[:] = math.nan
     radius_mm = platform_radius(platform_joints_P)
     load = all_finite(force_M) and all_finite(at_M) and all_finite(weight_N) and all_finite(weight_at_P)
-    if not (load and known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
+    if not (load and pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
         reason[0] = NOT_FINITE
         return
     J = np.empty((6, 6))
@@ -65,13 +75,14 @@ def _forces(
     reason[0] = NEAR_SINGULAR
     if not radius_mm > 0.0:
         return
-    if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
         return
-    for i in range(6):
+    for i in range(6):  # J^T
         for j in range(i):
             J[i, j], J[j, i] = J[j, i], J[i, j]
-    if factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
         return
+    # arms of the load and of the weight about the origin of {P}, along {M}'s axes
     rx, ry, rz = at_M[0] - origin_M[0], at_M[1] - origin_M[1], at_M[2] - origin_M[2]
     wx = R[0, 0] * weight_at_P[0] + R[0, 1] * weight_at_P[1] + R[0, 2] * weight_at_P[2]
     wy = R[1, 0] * weight_at_P[0] + R[1, 1] * weight_at_P[1] + R[1, 2] * weight_at_P[2]
@@ -79,7 +90,7 @@ def _forces(
     x[3] = (ry * force_M[2] - rz * force_M[1] - wy * weight_N[0]) / radius_mm
     x[4] = (rz * force_M[0] - rx * force_M[2] + wx * weight_N[0]) / radius_mm
     x[5] = (rx * force_M[1] - ry * force_M[0]) / radius_mm
-    solve(J, pivot, x)
+    lu_solve(J, pivot, x)
     for i in range(n):
         axial_N[i] = x[i]
     for i in range(n, 6):
@@ -96,16 +107,19 @@ def link_forces(
     weight_N: ArrayLike,
     weight_at_P_mm: ArrayLike,
 ) -> LinkForces:
-    """Equilibrium of the moving platform: J^T axial = load. Links weigh nothing; weight pulls along -z of {M}.
+    """Equilibrium of the moving platform (module docstring). Links weigh nothing; weight pulls along -z of {M}.
 
     A link's force passes through its base joint, a sphere, in the plane of the link and its revolute axis: so it has
     an axial part and, on the tripod, one lateral part along the revolute axis, which is square to the link.
 
     origin_M_mm (..., 3), rotation_M_P (..., 3, 3): the pose.  force_M_N (..., 3): the external force on whatever the
     platform carries, acting at at_M_mm (..., 3).  weight_N (...): the platform's, at weight_at_P_mm (..., 3).
-    A row fails as NOT_FINITE, or NEAR_SINGULAR where links without bound would be needed to hold the load.
+    A row fails as NOT_FINITE, or NEAR_SINGULAR where finite link forces cannot hold the load.
+
+    Example: the tripod at machine zero carries its platform of 80 N alone. Its links lean by 450 mm down on a length of
+    481.04 mm, so that each pulls with 80 / 3 x 481.04 / 450 = 28.5 N, and no lateral force is left.
     Raises ValueError for arrays of a wrong shape.
     """
     return LinkForces(
-        *_forces(*checked(mechanism), origin_M_mm, rotation_M_P, force_M_N, at_M_mm, weight_N, weight_at_P_mm)
+        *_forces(*check_mechanism(mechanism), origin_M_mm, rotation_M_P, force_M_N, at_M_mm, weight_N, weight_at_P_mm)
     )

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.model.frame import FrameGeometry
+from compd.model.kernels.rotation import to_inner, to_outer
 from compd.model.kinematics import Pose
-from compd.model.transform import to_inner, to_outer
 
 
 class Contact(NamedTuple):

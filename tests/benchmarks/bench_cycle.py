@@ -12,7 +12,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
-from compd.model.library import library
+from compd.model.library import load_library
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 
@@ -68,7 +68,7 @@ def _target(measured: Machine) -> Target:
 
 def _with_effects(measured: Machine, count: int) -> Models:
     """The first `count` effects, with numbers so small that no limit is reached."""
-    effects = [library()[name] for name in EFFECTS[:count]]
+    effects = [load_library()[name] for name in EFFECTS[:count]]
     links = measured.model.links
     fitted = tuple(
         FittedEffect(effect, np.full(len(effect.columns(links)), 0.01), {c.name: c.grid[0] for c in effect.constants})

@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 from compd.diagnosis.diagnose import diagnose
-from compd.model.library import library
+from compd.model.library import load_library
 from tests.benchmarks.figures import show
-from tests.support.diagnosed import recorded
+from tests.support.hidden_effects import record_with_effects
 
 VISITS = 480  # every fourth is repeated: 600 rows
 BUDGET_S = 5.0
@@ -27,13 +27,13 @@ CASES: dict[str, dict[str, tuple[float, ...]]] = {
 
 def main() -> None:
     """Print a table: wall and processor time of each case, and how often it fits into the budget."""
-    effects = list(library().values())
+    effects = list(load_library().values())
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.csv"
-        diagnose(recorded(path, 1, CASES["one effect"]), (), None, effects)  # compiles the kernels
+        diagnose(record_with_effects(path, 1, CASES["one effect"]), (), None, effects)  # compiles the kernels
         for name, hidden in CASES.items():
-            aligned = recorded(path, 1, hidden, visits=VISITS)
+            aligned = record_with_effects(path, 1, hidden, visits=VISITS)
             wall_s, processor_s = time.perf_counter(), time.process_time()
             found = diagnose(aligned, (), None, effects)
             wall_s, processor_s = time.perf_counter() - wall_s, time.process_time() - processor_s

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.model.frame import distances_mm, solve_frame
+from compd.model.kernels.rotation import to_inner
 from compd.model.kinematics import forward_kinematics, inverse_kinematics
-from compd.model.transform import to_inner
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.model_machines import tripod
 

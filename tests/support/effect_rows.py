@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from compd.model.deltas import effect_deltas
 from compd.model.effect import Effect
 from compd.model.kinematics import inverse_kinematics
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.model.library.scale import PERIODS_MM
 from compd.model.machine import MachineModel, machine_constants
 from compd.model.motion import Movement
@@ -22,7 +22,7 @@ from tests.support.model_machines import Floats, hexapod, tips, tripod
 
 DETAILS = MachineDetails(plate_thickness_mm=200.0, scale_signal_period_mm=0.020)
 TRIPOD, HEXAPOD = tripod(), hexapod()
-LIBRARY = library()
+LIBRARY = load_library()
 PLACES = ("room", "base", "frame", "platform", "tool", "plate_top", "plate_bottom")
 
 

@@ -13,7 +13,7 @@ from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 
@@ -29,7 +29,7 @@ def tripod() -> Configuration:
 
 def hidden(effect: str, *values: float, **shape: float) -> FittedEffect:
     """A library effect with its numbers in the unit that people read."""
-    declared = library()[effect]
+    declared = load_library()[effect]
     theta = [column.parameter.to_theta(value) for column, value in zip(declared.columns(3), values, strict=True)]
     return FittedEffect(declared, np.array(theta), shape)
 

@@ -14,16 +14,9 @@ TAIL = ("approach_1", "approach_2", "approach_3", "speed_mm_per_s")
 
 
 def plan_file(path: Path, rows: Sequence[Mapping[str, object]], quantities: Sequence[str] = ()) -> Path:
-    """As `compd plan --out` writes it; what a row does not say: at rest, at the tripod's machine zero, as it comes."""
-    usual = (
-        dict.fromkeys((*quantities, *TAIL), 0)
-        | {"purpose": "a test", "time_s": 0.0}
-        | {
-            "tip_x_mm": 0.0,
-            "tip_y_mm": 0.0,
-            "tip_z_mm": 190.0,
-        }
-    )
+    """A plan as `compd plan --out` writes it; what a row leaves out is that of a tripod at rest at its machine zero."""
+    at_rest = dict.fromkeys((*quantities, *TAIL), 0)
+    usual = at_rest | {"purpose": "a test", "time_s": 0.0, "tip_x_mm": 0.0, "tip_y_mm": 0.0, "tip_z_mm": 190.0}
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, [*HEAD, *quantities, *TAIL], lineterminator="\n")
         writer.writeheader()
@@ -33,13 +26,13 @@ def plan_file(path: Path, rows: Sequence[Mapping[str, object]], quantities: Sequ
 
 
 def thin(path: Path, out: Path, keep: Callable[[Mapping[str, str]], bool]) -> None:
-    """A recording with a share of its rows without a load, and of the others those that are kept."""
+    """Copy about UNLOADED of a recording's rows without a load, and the rows with a load for which `keep` is true."""
     with path.open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    loaded = [any(float(row[f"force_{axis}_N"]) for axis in "xyz") for row in rows]
-    every = (len(rows) - sum(loaded)) // UNLOADED
-    without = [k for k, one in enumerate(loaded) if not one][::every]
-    kept = sorted([*without, *(k for k, one in enumerate(loaded) if one and keep(rows[k]))])
+    is_loaded = [any(float(row[f"force_{axis}_N"]) for axis in "xyz") for row in rows]
+    every = (len(rows) - sum(is_loaded)) // UNLOADED
+    unloaded = [k for k, loaded in enumerate(is_loaded) if not loaded][::every]
+    kept = sorted([*unloaded, *(k for k, loaded in enumerate(is_loaded) if loaded and keep(rows[k]))])
     with out.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
         writer.writeheader()

@@ -1,9 +1,10 @@
-"""An effect that a person writes into a file, with no code: a port, a formula, parameters with plausible ranges."""
+"""An effect declared in a file without code: a port, a formula, parameters with plausible ranges."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,12 +20,12 @@ from compd.model.observations import Observations
 
 PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
 VECTORS: tuple[Port, ...] = ("base_joint", "platform_joint", "plate", "tool", "reference")
-# A parameter of which nothing but its range is known is searched at so many places.
+# How many values of a nonlinear parameter are tried within its plausible range.
 GRID = 9
 UM = 1e-3  # mm
 TO_MM: Mapping[str, float] = {"um": UM, "mm": 1.0}
 
-# Columns that the machine itself gives: at ports that have a link, and everywhere.
+# Columns that every machine has: at ports with one value per link, and at all ports.
 OF_LINK = ("scale_mm", "link_mm", "direction", "velocity_mm_per_s", "axial_force_N", "temperature_link")
 ANYWHERE = ("time_s", "tip_x_mm", "tip_y_mm", "tip_z_mm")
 _PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
@@ -45,7 +46,7 @@ class FormulaParameter(BaseModel):
 
 
 class FormulaDeclaration(BaseModel):
-    """What a person writes. The formula gives what is added at the port, in the unit `gives`."""
+    """The keys of a declaration. The formula gives what is added at the port, in the unit `gives`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -62,79 +63,77 @@ class FormulaDeclaration(BaseModel):
     separated_by: str = "rows in which the formula's columns change on their own"
 
 
-def formula_effect(declaration: Mapping[str, Any], where: str) -> Effect:
-    """An effect from its declaration (a mapping, as YAML gives it).
+def formula_effect(source: Mapping[str, Any], where: str) -> Effect:
+    """An effect from its declaration, a mapping as YAML gives it.
 
     The formula's value is in um, or in mm with `gives: mm`; at the ports of vectors `axis` says along which axis.
     Raises ConfigurationError with every problem found, at `where`.
     """
     try:
-        written = FormulaDeclaration.model_validate(dict(declaration))
+        declaration = FormulaDeclaration.model_validate(dict(source))
     except ValidationError as error:
-        raise ConfigurationError([_invalid(detail, where) for detail in error.errors(include_url=False)]) from error
-    formula = parse(written.formula, tuple(written.parameters), f"{where}, formula of {written.id}")
-    problems = [*_about_port(written, where), *_about_parameters(written, formula, where)]
+        raise ConfigurationError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
+    formula = parse(declaration.formula, tuple(declaration.parameters), f"{where}, formula of {declaration.id}")
+    problems = [*_port_problems(declaration, where), *_parameter_problems(declaration, formula, where)]
     needs: list[str] = ["time", "order"] if formula.lags else []
     for name in formula.columns:
-        found = _need(name, written.port)
-        if isinstance(found, Problem):
-            problems.append(
-                Problem(where=f"{where}, formula of {written.id}", what=found.what, value=name, allowed=found.allowed)
-            )
+        needed = _needs_of_column(name, declaration.port)
+        if isinstance(needed, Problem):
+            problems.append(replace(needed, where=f"{where}, formula of {declaration.id}", value=name))
         else:
-            needs += found
+            needs += needed
     if problems:
         raise ConfigurationError(problems)
     return Effect(
-        id=written.id,
-        ports=(written.port,),
-        physics=written.physics,
-        equation=f"delta = {written.formula}" + (f", along {written.axis}" if written.axis else ""),
+        id=declaration.id,
+        ports=(declaration.port,),
+        physics=declaration.physics,
+        equation=f"delta = {declaration.formula}" + (f", along {declaration.axis}" if declaration.axis else ""),
         symbols={
-            **{name: f"parameter, {parameter.unit}" for name, parameter in written.parameters.items()},
+            **{name: f"parameter, {parameter.unit}" for name, parameter in declaration.parameters.items()},
             **dict.fromkeys(formula.columns, "as measured or modelled"),
         },
-        source="; ".join(dict.fromkeys(parameter.source for parameter in written.parameters.values())),
+        source="; ".join(dict.fromkeys(parameter.source for parameter in declaration.parameters.values())),
         needs=tuple(dict.fromkeys(needs)),
         parameters=tuple(
-            Parameter(name, one.unit, *one.plausible, one.source, one.per)
-            for name, one in ((name, written.parameters[name]) for name in formula.linear)
+            Parameter(name, parameter.unit, *parameter.plausible, parameter.source, parameter.per)
+            for name, parameter in ((name, declaration.parameters[name]) for name in formula.linear)
         ),
-        mistaken_for=written.mistaken_for,
-        separated_by=written.separated_by,
-        basis=_basis(written, formula),
-        constants=tuple(_constant(name, written.parameters[name]) for name in formula.shape),
+        mistaken_for=declaration.mistaken_for,
+        separated_by=declaration.separated_by,
+        basis=_basis(declaration, formula),
+        constants=tuple(_constant(name, declaration.parameters[name]) for name in formula.constants),
         remembers=formula.lags > 0,
     )
 
 
-def _invalid(detail: ErrorDetails, where: str) -> Problem:
+def _problem(detail: ErrorDetails, where: str) -> Problem:
     keys = ", ".join(FormulaDeclaration.model_fields) if detail["type"] == "extra_forbidden" else ""
     place = ".".join(str(part) for part in detail["loc"])
     return Problem(where=f"{where}, {place}", what=detail["msg"], value=str(detail["input"])[:80], allowed=keys)
 
 
-def _about_port(written: FormulaDeclaration, where: str) -> list[Problem]:
-    if (written.axis is not None) == (written.port in VECTORS):
+def _port_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]:
+    if (declaration.axis is not None) == (declaration.port in VECTORS):
         return []
-    allowed = "x, y or z" if written.port in VECTORS else "none: this port has no direction"
+    allowed = "x, y or z" if declaration.port in VECTORS else "none: this port has no direction"
     return [
         Problem(
             where=f"{where}, axis",
-            what=f"does not fit the port {written.port}",
-            value=str(written.axis),
+            what=f"does not fit the port {declaration.port}",
+            value=str(declaration.axis),
             allowed=allowed,
         )
     ]
 
 
-def _about_parameters(written: FormulaDeclaration, formula: Formula, where: str) -> list[Problem]:
-    found = []
-    for name, one in written.parameters.items():
+def _parameter_problems(declaration: FormulaDeclaration, formula: Formula, where: str) -> list[Problem]:
+    problems = []
+    for name, parameter in declaration.parameters.items():
         place = f"{where}, parameters.{name}"
-        low, high = one.plausible
+        low, high = parameter.plausible
         if not low < high:
-            found.append(
+            problems.append(
                 Problem(
                     where=place,
                     what="the plausible range is empty",
@@ -143,17 +142,17 @@ def _about_parameters(written: FormulaDeclaration, formula: Formula, where: str)
                 )
             )
         if name in (*OF_LINK, *ANYWHERE, "pi", "reading_mm"):
-            found.append(
+            problems.append(
                 Problem(
                     where=place, what="this name is a column's", value=name, next_step="call the parameter otherwise"
                 )
             )
-        if one.per == "link" and (name in formula.shape or written.port not in PER_LINK):
+        if parameter.per == "link" and (name in formula.constants or declaration.port not in PER_LINK):
             allowed = f"a parameter that the formula is proportional to, at {', '.join(PER_LINK)}"
-            found.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
-        exponents = re.search(rf"\*\*\s*{name}\b", written.formula)
-        if exponents and max(abs(low), abs(high)) > LARGEST_EXPONENT:
-            found.append(
+            problems.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
+        is_exponent = re.search(rf"\*\*\s*{name}\b", declaration.formula)
+        if is_exponent and max(abs(low), abs(high)) > LARGEST_EXPONENT:
+            problems.append(
                 Problem(
                     where=place,
                     what="is an exponent",
@@ -161,16 +160,17 @@ def _about_parameters(written: FormulaDeclaration, formula: Formula, where: str)
                     allowed=f"within +-{LARGEST_EXPONENT:g}",
                 )
             )
-        if re.search(rf",\s*{name}\s*\)", written.formula) and formula.lags and low <= 0 and name in formula.shape:
-            found.append(
+        is_time_constant = formula.lags and re.search(rf",\s*{name}\s*\)", declaration.formula)
+        if is_time_constant and low <= 0 and name in formula.constants:
+            problems.append(
                 Problem(
                     where=place, what="is a time constant", value=f"[{low:g}, {high:g}]", allowed="a range above 0 s"
                 )
             )
-    return found
+    return problems
 
 
-def _need(name: str, port: Port) -> list[str] | Problem:
+def _needs_of_column(name: str, port: Port) -> list[str] | Problem:
     """What has to be measured for a column of a formula."""
     if name in ANYWHERE:
         return ["time"] if name == "time_s" else []
@@ -197,41 +197,43 @@ def _need(name: str, port: Port) -> list[str] | Problem:
     return [name]
 
 
-def _constant(name: str, one: FormulaParameter) -> Constant:
-    low, high = one.plausible
+def _constant(name: str, parameter: FormulaParameter) -> Constant:
+    """A nonlinear parameter as a constant that is searched: evenly, or in equal ratios over more than a decade and a
+    half."""
+    low, high = parameter.plausible
     wide = low > 0 and high / low >= 30
     grid = np.geomspace(low, high, GRID) if wide else np.linspace(low, high, GRID)
-    return Constant(name, one.unit, low, high, one.source, tuple(float(value) for value in grid))
+    return Constant(name, parameter.unit, low, high, parameter.source, tuple(float(value) for value in grid))
 
 
-def _basis(written: FormulaDeclaration, formula: Formula) -> Any:
-    axis = "xyz".index(written.axis) if written.axis else None
-    to_mm = TO_MM[written.gives]
+def _basis(declaration: FormulaDeclaration, formula: Formula) -> Any:
+    axis = "xyz".index(declaration.axis) if declaration.axis else None
+    to_mm = TO_MM[declaration.gives]
 
-    def basis(rows: Observations, shape: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
+    def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
         places = {"joint": rows.joint_mm.shape[1], "frame": 9, "plate": 3, "tool": 1, "reference": 1}.get(
-            written.port, rows.links
+            declaration.port, rows.links
         )
-        states = _unpacked(memory, formula.lags)
-        columns = {name: _column(rows, name, written.port) for name in formula.columns}
-        factors, after = formula.evaluate(columns, shape, rows.time_s, rows.session_start, states)
+        states = _lag_states(memory, formula.lags)
+        columns = {name: _column(rows, name, declaration.port) for name in formula.columns}
+        factors, after = formula.evaluate(columns, constants, rows.time_s, rows.session_start, states)
         parts = []
         for name, factor in factors.items():
-            values = to_mm * np.broadcast_to(factor, (len(rows), places))
-            single = written.parameters[name].per == "machine"
-            parts.append(values[:, :, None] if single else values[:, :, None] * np.eye(places))
-        together = np.concatenate(parts, axis=2)
+            column = to_mm * np.broadcast_to(factor, (len(rows), places))
+            single = declaration.parameters[name].per == "machine"
+            parts.append(column[:, :, None] if single else column[:, :, None] * np.eye(places))
+        values = np.concatenate(parts, axis=2)
         if axis is not None:
-            directed = np.zeros((len(rows), places, 6 if written.port == "reference" else 3, together.shape[2]))
-            directed[:, :, axis] = together
-            together = directed.reshape(len(rows), -1, together.shape[2])
-        return together, tuple(array for state in after if state is not None for array in state) or None
+            directed = np.zeros((len(rows), places, 6 if declaration.port == "reference" else 3, values.shape[2]))
+            directed[:, :, axis] = values
+            values = directed.reshape(len(rows), -1, values.shape[2])
+        return values, tuple(array for state in after if state is not None for array in state) or None
 
     return basis
 
 
-def _unpacked(memory: Memory, lags: int) -> tuple[tuple[FloatArray, ...] | None, ...]:
-    """A lag's state is three arrays."""
+def _lag_states(memory: Memory, lags: int) -> tuple[tuple[FloatArray, ...] | None, ...]:
+    """The states of so many lags, three arrays each, from an effect's memory."""
     return tuple(None if memory is None else memory[3 * i : 3 * i + 3] for i in range(lags))
 
 
@@ -248,6 +250,6 @@ def _column(rows: Observations, name: str, port: Port) -> FloatArray:
     if name == "temperature_link":
         name = "temperature_link_degC"
     if _PER_LINK_COLUMN.match(name):
-        named = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(rows.links)]
-        return np.stack([rows.quantity(one) for one in named], axis=1)
+        names = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(rows.links)]
+        return np.stack([rows.quantity(link_name) for link_name in names], axis=1)
     return rows.quantity(name)[:, None]

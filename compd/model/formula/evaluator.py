@@ -1,4 +1,4 @@
-"""What a checked formula is, and its value: our own evaluator over the tree; nothing is compiled or executed."""
+"""A checked formula and its value, by walking its syntax tree; nothing is compiled or executed."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ Terms = dict[str | None, FloatArray]
 class Formula:
     """A checked formula.
 
-    linear : parameters to which it is proportional, in the order declared.  shape : the other parameters.
+    linear : parameters to which it is proportional, in the order declared.  constants : the other parameters.
     columns : names of everything else in it.  lags : how many lag(x, tau) it holds.
     """
 
     text: str
     tree: ast.expr
     linear: tuple[str, ...]
-    shape: tuple[str, ...]
+    constants: tuple[str, ...]
     columns: tuple[str, ...]
     lags: int
 
@@ -60,16 +60,16 @@ class Formula:
     ) -> tuple[dict[str, FloatArray], tuple[State | None, ...]]:
         """What each linear parameter is multiplied by: (N, m) or what broadcasts to it; and the lags' states after.
 
-        columns : (N, m) or (N, 1) by name, all of one m or 1.  constants : the shape parameters.
+        columns : (N, m) or (N, 1) by name, all of one m or 1.  constants : values of the other parameters.
         states : one per lag, None at the start.  Where the arithmetic fails (log of a negative) the value is nan.
         """
-        run = _Run(self, columns, constants, time_s, session_start, list(states))
+        evaluation = _Evaluation(self, columns, constants, time_s, session_start, list(states))
         with np.errstate(all="ignore"):
-            terms = run.terms(self.tree)
-        return {name: terms[name] for name in self.linear}, tuple(run.after)
+            terms = evaluation.terms(self.tree)
+        return {name: terms[name] for name in self.linear}, tuple(evaluation.after)
 
 
-def finite(value: object) -> float:
+def to_float(value: object) -> float:
     """The number as a float; infinite where it is too large for one."""
     try:
         return float(value)  # type: ignore[arg-type]
@@ -77,8 +77,8 @@ def finite(value: object) -> float:
         return math.inf
 
 
-class _Run:
-    """One evaluation: walks the tree, every value a set of terms."""
+class _Evaluation:
+    """One evaluation: walks the tree; the value of each node is a sum of terms, by parameter."""
 
     def __init__(
         self,
@@ -98,28 +98,28 @@ class _Run:
     def terms(self, node: ast.AST) -> Terms:
         match node:
             case ast.Constant(value=value):
-                return {None: np.full((1, 1), finite(value))}
+                return {None: np.full((1, 1), to_float(value))}
             case ast.Name(id=name):
-                return self._named(name)
+                return self._value_of_name(name)
             case ast.UnaryOp(op=op, operand=operand):
                 sign = -1.0 if isinstance(op, ast.USub) else 1.0
                 return {name: sign * value for name, value in self.terms(operand).items()}
             case ast.BinOp(left=left, op=op, right=right):
-                return self._combined(self.terms(left), op, self.terms(right))
+                return self._combine(self.terms(left), op, self.terms(right))
             case ast.Call(func=ast.Name(id="lag"), args=[value, tau]):
-                return {None: self._lagged(self.terms(value)[None], float(self.terms(tau)[None][0, 0]))}
+                return {None: self._apply_lag(self.terms(value)[None], float(self.terms(tau)[None][0, 0]))}
             case ast.Call(func=ast.Name(id=name), args=arguments):
                 return {None: FUNCTIONS[name][1](*(self.terms(argument)[None] for argument in arguments))}
-        raise AssertionError("parse lets no other node pass")
+        raise AssertionError("`parse` refuses every other node")
 
-    def _named(self, name: str) -> Terms:
+    def _value_of_name(self, name: str) -> Terms:
         if name in self._linear:
             return {name: np.ones((1, 1))}
         if name in self._constants:
             return {None: np.full((1, 1), self._constants[name])}
         return {None: np.full((1, 1), math.pi) if name == "pi" else self._columns[name]}
 
-    def _combined(self, left: Terms, op: ast.operator, right: Terms) -> Terms:
+    def _combine(self, left: Terms, op: ast.operator, right: Terms) -> Terms:
         function = OPERATORS[type(op)]
         if isinstance(op, ast.Add | ast.Sub):
             sign = -1.0 if isinstance(op, ast.Sub) else 1.0
@@ -131,7 +131,7 @@ class _Run:
             return {name: function(value, right[None]) for name, value in left.items()}
         return {name: left[None] * value for name, value in right.items()}
 
-    def _lagged(self, value: FloatArray, tau_s: float) -> FloatArray:
+    def _apply_lag(self, value: FloatArray, tau_s: float) -> FloatArray:
         values = np.broadcast_to(value, (len(self._time_s), value.shape[1]))
         lagged, state = lag(self._time_s, values, self._session_start, tau_s, self._before[len(self.after)])
         self.after.append(state)

@@ -2,7 +2,7 @@
 
 Nothing is ever compiled or executed: a formula is text until `parse` has checked every node of its tree against a
 list, and then numbers (`compd.model.formula.evaluator`). An effect must be linear in its fitted parameters; a
-parameter in which the formula is not linear becomes a shape constant.
+parameter in which the formula is not linear becomes a nonlinear constant, which is searched.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Iterator
 
 from compd.errors import ConfigurationError, Problem
-from compd.model.formula.evaluator import FUNCTIONS, OPERATORS, Formula, finite
+from compd.model.formula.evaluator import FUNCTIONS, OPERATORS, Formula, to_float
 
 # A formula that a person reads at a glance; the bounds keep any text from taking time or stack.
 LONGEST = 300
@@ -34,10 +34,10 @@ def parse(text: str, parameters: tuple[str, ...], where: str) -> Formula:
             tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = getattr(error, "offset", None) or 1
-        raise _refused(where, text, column, "is not a formula", ALLOWED) from error
-    check = _Check(text.strip(), parameters, where)
-    check.node(tree, 1)
-    unused = [name for name in parameters if name not in check.names]
+        raise _formula_error(where, text, column, "is not a formula", ALLOWED) from error
+    checker = _Checker(text.strip(), parameters, where)
+    checker.node(tree, 1)
+    unused = [name for name in parameters if name not in checker.names]
     if unused:
         raise ConfigurationError(
             Problem(
@@ -47,9 +47,9 @@ def parse(text: str, parameters: tuple[str, ...], where: str) -> Formula:
                 next_step="use it, or remove it",
             )
         )
-    shape = _shape_parameters(tree, set(parameters))
-    terms = _proportional(tree, set(parameters) - shape)
-    if None in terms:
+    nonlinear = _nonlinear_parameters(tree, set(parameters))
+    factors = _linear_factors(tree, set(parameters) - nonlinear)
+    if None in factors:
         raise ConfigurationError(
             Problem(
                 where=where,
@@ -62,14 +62,14 @@ def parse(text: str, parameters: tuple[str, ...], where: str) -> Formula:
     return Formula(
         text,
         tree,
-        tuple(name for name in parameters if name not in shape),
-        tuple(name for name in parameters if name in shape),
-        tuple(name for name in check.names if name not in parameters and name != "pi"),
-        check.lags,
+        tuple(name for name in parameters if name not in nonlinear),
+        tuple(name for name in parameters if name in nonlinear),
+        tuple(name for name in checker.names if name not in parameters and name != "pi"),
+        checker.lags,
     )
 
 
-def _refused(where: str, text: str, column: int, what: str, allowed: str) -> ConfigurationError:
+def _formula_error(where: str, text: str, column: int, what: str, allowed: str) -> ConfigurationError:
     return ConfigurationError(
         Problem(where=f"{where}, character {column}", what=what, value=text[:LONGEST], allowed=allowed)
     )
@@ -77,15 +77,15 @@ def _refused(where: str, text: str, column: int, what: str, allowed: str) -> Con
 
 def _check_text(text: str, where: str) -> None:
     if len(text) > LONGEST:
-        raise _refused(where, text, LONGEST + 1, "is too long", f"{LONGEST} characters")
+        raise _formula_error(where, text, LONGEST + 1, "is too long", f"{LONGEST} characters")
     good = CHARACTERS.match(text)
     end = good.end() if good else 0
     if end < len(text):
-        raise _refused(where, text, end + 1, f"the character {text[end]!r} is not part of a formula", ALLOWED)
+        raise _formula_error(where, text, end + 1, f"the character {text[end]!r} is not part of a formula", ALLOWED)
 
 
-class _Check:
-    """Walks the tree once and refuses whatever is not on the list."""
+class _Checker:
+    """Walks the tree once and raises ConfigurationError for whatever is not allowed; collects the names in it."""
 
     def __init__(self, text: str, parameters: tuple[str, ...], where: str) -> None:
         self._text, self._parameters, self._where = text, parameters, where
@@ -94,7 +94,7 @@ class _Check:
 
     def node(self, node: ast.AST, depth: int) -> None:
         if depth > DEEPEST:
-            raise self._no(node, "is nested too deeply", f"{DEEPEST} levels")
+            raise self._error(node, "is nested too deeply", f"{DEEPEST} levels")
         match node:
             case ast.Constant():
                 self._number(node)
@@ -110,77 +110,78 @@ class _Check:
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 self._call(node, name, arguments, depth)
             case _:
-                raise self._no(node, "is not allowed in a formula", ALLOWED)
+                raise self._error(node, "is not allowed in a formula", ALLOWED)
 
     def _number(self, node: ast.Constant) -> None:
         # bool is an int, and no number that a person would write here
-        if type(node.value) not in (int, float) or not math.isfinite(finite(node.value)):
-            raise self._no(node, "is not a finite real number", "numbers such as 12, 0.5 or 1e-6")
+        if type(node.value) not in (int, float) or not math.isfinite(to_float(node.value)):
+            raise self._error(node, "is not a finite real number", "numbers such as 12, 0.5 or 1e-6")
 
     def _name(self, node: ast.AST, name: str) -> None:
         if name in FUNCTIONS or name == "lag":
-            raise self._no(node, "is a function and needs its arguments", f"{name}(...)")
+            raise self._error(node, "is a function and needs its arguments", f"{name}(...)")
         if name.startswith(("reference_", "model_")):
-            raise self._no(node, "would show the effect the answer", "measured columns other than the reference's")
+            raise self._error(node, "would show the effect the answer", "measured columns other than the reference's")
         self.names[name] = None
 
     def _call(self, node: ast.AST, name: str, arguments: list[ast.expr], depth: int) -> None:
         if name == "lag":
             if len(arguments) != 2:
-                raise self._no(node, "needs two arguments", "lag(x, tau), tau in s")
+                raise self._error(node, "needs two arguments", "lag(x, tau), tau in s")
             self.node(arguments[0], depth + 1)
             self._time_constant(arguments[1])
             self.lags += 1
             return
         if name not in FUNCTIONS:
-            raise self._no(node, f"there is no function {name!r}", ALLOWED)
+            raise self._error(node, f"there is no function {name!r}", ALLOWED)
         count = FUNCTIONS[name][0]
         if len(arguments) != count:
-            raise self._no(node, f"{name} has {len(arguments)} arguments", f"{count}")
+            raise self._error(node, f"{name} has {len(arguments)} arguments", f"{count}")
         for argument in arguments:
             self.node(argument, depth + 1)
 
     def _time_constant(self, node: ast.expr) -> None:
         match node:
-            case ast.Constant(value=value) if type(value) in (int, float) and 0 < finite(value) < math.inf:
+            case ast.Constant(value=value) if type(value) in (int, float) and 0 < to_float(value) < math.inf:
                 return
             case ast.Name(id=name) if name in self._parameters:
                 self.names[name] = None
             case _:
-                raise self._no(node, "is no time constant", "a positive number of seconds, or a parameter")
+                raise self._error(node, "is no time constant", "a positive number of seconds, or a parameter")
 
     def _exponent(self, node: ast.expr) -> None:
         match node:
             case ast.Constant(value=value) | ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=value)):
-                if abs(finite(value)) <= LARGEST_EXPONENT:
+                if abs(to_float(value)) <= LARGEST_EXPONENT:
                     return
             case ast.Name(id=name) if name in self._parameters:
                 return
-        raise self._no(node, "is no exponent", f"a number up to {LARGEST_EXPONENT:g}, or a parameter")
+        raise self._error(node, "is no exponent", f"a number up to {LARGEST_EXPONENT:g}, or a parameter")
 
-    def _no(self, node: ast.AST, what: str, allowed: str) -> ConfigurationError:
+    def _error(self, node: ast.AST, what: str, allowed: str) -> ConfigurationError:
         column = getattr(node, "col_offset", 0)
         piece = ast.get_source_segment(self._text, node) if hasattr(node, "lineno") else ""
         error = f"{piece[:40]!r} {what}" if piece else what
-        return _refused(self._where, self._text, column + 1, error, allowed)
+        return _formula_error(self._where, self._text, column + 1, error, allowed)
 
 
-def _shape_parameters(tree: ast.expr, parameters: set[str]) -> set[str]:
+def _nonlinear_parameters(tree: ast.expr, parameters: set[str]) -> set[str]:
     """The parameters in which the formula is not linear; of two that are multiplied, those in the second factor."""
-    shape: set[str] = set()
+    nonlinear: set[str] = set()
     while True:
-        found = next(_not_linear(tree, parameters - shape), None)
-        if found is None:
-            return shape
-        shape |= found
+        more = next(_find_nonlinear(tree, parameters - nonlinear), None)
+        if more is None:
+            return nonlinear
+        nonlinear |= more
 
 
-def _not_linear(node: ast.AST, parameters: set[str]) -> Iterator[set[str]]:
+def _find_nonlinear(node: ast.AST, parameters: set[str]) -> Iterator[set[str]]:
+    """Sets of parameters that stand where the formula is not linear in them, inner nodes first."""
     match node:
         case ast.BinOp(left=left, op=op, right=right):
-            yield from _not_linear(left, parameters)
-            yield from _not_linear(right, parameters)
-            in_left, in_right = _within(left, parameters), _within(right, parameters)
+            yield from _find_nonlinear(left, parameters)
+            yield from _find_nonlinear(right, parameters)
+            in_left, in_right = _names_in(left, parameters), _names_in(right, parameters)
             if isinstance(op, ast.Mult) and in_left and in_right:
                 yield in_right - in_left or in_right
             if isinstance(op, ast.Div) and in_right:
@@ -188,28 +189,29 @@ def _not_linear(node: ast.AST, parameters: set[str]) -> Iterator[set[str]]:
             if isinstance(op, ast.Pow) and in_left | in_right:
                 yield in_left | in_right
         case ast.Call(args=arguments):
-            inside = set().union(*(_within(argument, parameters) for argument in arguments))
+            inside = set().union(*(_names_in(argument, parameters) for argument in arguments))
             if inside:
                 yield inside
         case ast.UnaryOp(operand=operand):
-            yield from _not_linear(operand, parameters)
+            yield from _find_nonlinear(operand, parameters)
 
 
-def _within(node: ast.AST, names: set[str]) -> set[str]:
+def _names_in(node: ast.AST, names: set[str]) -> set[str]:
+    """Those of these names that stand anywhere in the node."""
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} & names
 
 
-def _proportional(node: ast.AST, linear: set[str]) -> set[str | None]:
+def _linear_factors(node: ast.AST, linear: set[str]) -> set[str | None]:
     """Which linear parameters the terms hold, None for a term without."""
     match node:
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
-            return _proportional(left, linear) | _proportional(right, linear)
+            return _linear_factors(left, linear) | _linear_factors(right, linear)
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
-            return _proportional(right if _within(right, linear) else left, linear)
+            return _linear_factors(right if _names_in(right, linear) else left, linear)
         case ast.BinOp(left=left):
-            return _proportional(left, linear)
+            return _linear_factors(left, linear)
         case ast.UnaryOp(operand=operand):
-            return _proportional(operand, linear)
+            return _linear_factors(operand, linear)
         case ast.Name(id=name) if name in linear:
             return {name}
     return {None}

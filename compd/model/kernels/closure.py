@@ -1,8 +1,12 @@
 """The closure of the links: what a pose makes of link lengths and revolute axes, and the derivatives.
 
 One mechanism in two sizes, n + k = 6: the tripod (3-SPR) has n = 3 links and k = 3 revolute axes, the hexapod
-(6-UPS) n = 6 links and k = 0. With d_i = p + R c_i - a_i the link vector, the rows are |d_i| for every link and
-d_i . (R e_i) for every revolute axis; axis i belongs to link i.
+(6-UPS) n = 6 links and k = 0. With d_i = p + R c_i - a_i the link vector and u_i = d_i / |d_i|, the rows are
+
+    |d_i|            for every link,            d|d_i| = u_i . v + (R c_i x u_i) . w
+    d_i . R e_i      for every revolute axis,   d(d_i . R e_i) = R e_i . v + (R e_i x (p - a_i)) . w
+
+for a displacement v and a rotation w of the platform about {M}'s axes through its origin; axis i belongs to link i.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ SHORTEST_LINK_MM = 1e-6
 
 
 @helper
-def close(
+def evaluate_closure(
     origin_M: FloatArray,
     R: FloatArray,
     base_joints_M: FloatArray,
@@ -92,14 +96,14 @@ def platform_radius(platform_joints_P: FloatArray) -> float:
 
 
 @helper
-def known(
+def pose_is_finite(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
     origin_M: FloatArray,
     R: FloatArray,
 ) -> bool:
-    """The mechanism and a pose (or the guess of one) are all numbers."""
+    """Whether all numbers of the mechanism and of a pose, or of a guess of one, are finite."""
     for i in range(3):
         if not all_finite(R[i]):
             return False
@@ -113,8 +117,8 @@ def known(
 
 
 @helper
-def turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
-    """R lies more than a right angle from the guess, about whatever axis: trace(R^T guess) = 1 + 2 cos < 1."""
+def is_turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
+    """Whether R lies more than a right angle from the guess, about any axis: trace(R^T guess) = 1 + 2 cos < 1."""
     trace = 0.0
     for i in range(3):
         for j in range(3):
@@ -146,9 +150,9 @@ def closure(
     value_mm = np.empty(6)
     J = np.empty((6, 6))
     reason[0] = OK
-    if not known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R):
+    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R):
         reason[0] = NOT_FINITE
-    elif not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, 1.0, value_mm, J):
+    elif not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, 1.0, value_mm, J):
         reason[0] = NEAR_SINGULAR
     if reason[0] != OK:
         value_mm[:] = math.nan

@@ -1,4 +1,12 @@
-"""Forward kinematics as a kernel: from link lengths to the pose of the moving platform."""
+"""Forward kinematics as a kernel: from link lengths to the pose of the moving platform.
+
+Newton's method in the six coordinates of the pose, v in mm and w in rad times the platform's radius,
+
+    (v, w) = J^-1 (l - |d_i|, -d_i . R e_i),   p <- p + v,   R <- R(w) R,
+
+with the closure and its derivatives J from `kernels.closure`. A step longer than STEP_LIMIT times the platform's radius
+is shortened to that.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +15,10 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.closure import close, known, platform_radius, turned_over
+from compd.model.kernels.closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, largest, solve
-from compd.model.kernels.rotation import orthonormalise, turn
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.rotation import orthonormalise, rotate_in_place
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -60,7 +68,7 @@ def _newton(
     iterations: IntArray,
     J: FloatArray,
 ) -> int:
-    """Newton in the six coordinates of the pose, from what `origin_M` and `R` hold; J is left factored."""
+    """Newton in the six coordinates of the pose, from the guess in `origin_M` and `R`, in place; leaves J factored."""
     n = lengths_mm.shape[0]
     limit_mm = STEP_LIMIT * radius_mm
     x = np.empty(6)
@@ -71,22 +79,22 @@ def _newton(
     while step > STEP_TOLERANCE_MM:
         if iterations[0] == ITERATION_LIMIT:
             return NO_CONVERGENCE
-        if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+        if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
             return NEAR_SINGULAR
         for i in range(6):
             x[i] = lengths_mm[i] - x[i] if i < n else -x[i]
-        sign = factor(J, pivot)
+        sign = lu_factor(J, pivot)
         if iterations[0] == 0:
             first_sign = sign
         if sign == 0.0:
             return NEAR_SINGULAR
-        solve(J, pivot, x)
-        step = largest(x)
+        lu_solve(J, pivot, x)
+        step = max_abs(x)
         shortened = limit_mm / max(step, limit_mm)
         for i in range(3):
             origin_M[i] += shortened * x[i]
         shortened /= radius_mm
-        turn(R, shortened * x[3], shortened * x[4], shortened * x[5])
+        rotate_in_place(R, shortened * x[3], shortened * x[4], shortened * x[5])
         iterations[0] += 1
     orthonormalise(R)
     # between two assemblies lies a singular one, where the determinant changes its sign
@@ -104,7 +112,7 @@ def _pose_from(
     iterations: IntArray,
     residual_mm: FloatArray,
 ) -> int:
-    """Solve from what `origin_M` and `R` hold, and judge the solution; returns the reason."""
+    """Solve from the guess in `origin_M` and `R`, in place, and check the solution; returns the reason."""
     n = lengths_mm.shape[0]
     radius_mm = platform_radius(platform_joints_P)
     J = np.empty((6, 6))
@@ -119,11 +127,11 @@ def _pose_from(
     if inverse_norm(J, X) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     x = X[0]
-    if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
         return NEAR_SINGULAR
     for i in range(n):
         x[i] -= lengths_mm[i]
-    residual_mm[0] = largest(x)
+    residual_mm[0] = max_abs(x)
     return NO_CONVERGENCE if residual_mm[0] > RESIDUAL_TOLERANCE_MM else reason
 
 
@@ -153,7 +161,7 @@ def forward(
     closed_lengths_mm[:] = lengths_mm
     iterations[0] = 0
     residual_mm[0] = math.nan
-    if not known(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R) or not all_finite(lengths_mm):
+    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R) or not all_finite(lengths_mm):
         reason[0] = NOT_FINITE
     elif np.min(lengths_mm) <= 0.0:
         reason[0] = UNREACHABLE
@@ -161,7 +169,7 @@ def forward(
         reason[0] = _pose_from(
             base_joints_M, platform_joints_P, revolute_axes_P, lengths_mm, origin_M, R, iterations, residual_mm
         )
-    if reason[0] == OK and turned_over(R, guess_R):
+    if reason[0] == OK and is_turned_over(R, guess_R):
         reason[0] = OTHER_ASSEMBLY
     if reason[0] != OK:
         origin_M[:] = math.nan

@@ -1,4 +1,8 @@
-"""Inverse kinematics as a kernel: from the place of the tip to the pose and the link lengths."""
+"""Inverse kinematics as a kernel: from the place of the tip to the pose and the link lengths.
+
+The hexapod's attitude R is chosen, so that p = tip_M - R tip_P and l_i = |p + R c_i - a_i| follow at once. The tripod's
+attitude follows from the tip: three equations d_i . R e_i = 0 in three angles, by Newton's method.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,10 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.closure import close, known, platform_radius, turned_over
+from compd.model.kernels.closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, largest, solve
-from compd.model.kernels.rotation import orthonormalise, turn
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.rotation import orthonormalise, rotate_in_place
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -38,9 +42,10 @@ def _attitude_from(
     R: FloatArray,
     iterations: IntArray,
 ) -> int:
-    """The tripod's attitude at a tip: Newton in three angles, from what `R` holds; returns the reason.
+    """The tripod's attitude at a tip: Newton in three angles, from the guess in `R`, in place; returns the reason.
 
-    With the tip fixed only the attitude is free, and d_i . R e_i = (tip - a_i) . R e_i + (c_i - tip_P) . e_i.
+    With p = tip_M - R tip_P the equations are d_i . R e_i = (tip_M - a_i) . R e_i + (c_i - tip_P) . e_i = 0; their
+    derivative by a rotation w about {M}'s axes is (R e_i x (tip_M - a_i)) . w.
     """
     J = np.empty((3, 3))
     x = np.empty(3)
@@ -65,15 +70,15 @@ def _attitude_from(
             x[i] = -(vx * ax + vy * ay + vz * az)
             for j in range(3):
                 x[i] -= (platform_joints_P[i, j] - tip_P[j]) * revolute_axes_P[i, j]
-        sign = factor(J, pivot)
+        sign = lu_factor(J, pivot)
         if sign == 0.0:
             return NEAR_SINGULAR
         if iterations[0] == 0:
             first_sign = sign
-        solve(J, pivot, x)
-        step = largest(x)
+        lu_solve(J, pivot, x)
+        step = max_abs(x)
         shortened = STEP_LIMIT / max(step, STEP_LIMIT)
-        turn(R, shortened * x[0], shortened * x[1], shortened * x[2])
+        rotate_in_place(R, shortened * x[0], shortened * x[1], shortened * x[2])
         iterations[0] += 1
         if step * reach_mm <= STEP_TOLERANCE_MM:
             step = 0.0
@@ -99,7 +104,7 @@ def _lengths_at(
     pivot = np.empty(6, np.int64)
     if not radius_mm > 0.0:
         return NEAR_SINGULAR
-    if not close(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
         return UNREACHABLE
     for i in range(n):
         lengths_mm[i] = x[i]
@@ -108,7 +113,7 @@ def _lengths_at(
         residual_mm[0] = max(residual_mm[0], abs(x[i]))
     if residual_mm[0] > RESIDUAL_TOLERANCE_MM:
         return NO_CONVERGENCE
-    if factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     return OK
 
@@ -138,11 +143,11 @@ def inverse(
     iterations[0] = 0
     residual_mm[0] = math.nan
     reason[0] = OK
-    if not (known(base_joints_M, platform_joints_P, revolute_axes_P, tip_M, R) and all_finite(tip_P)):
+    if not (pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, tip_M, R) and all_finite(tip_P)):
         reason[0] = NOT_FINITE
     elif revolute_axes_P.shape[0] == 3:
         reason[0] = _attitude_from(base_joints_M, platform_joints_P, revolute_axes_P, tip_M, tip_P, R, iterations)
-        if reason[0] == OK and turned_over(R, attitude_R):
+        if reason[0] == OK and is_turned_over(R, attitude_R):
             reason[0] = OTHER_ASSEMBLY
     if reason[0] == OK:
         for i in range(3):

@@ -15,7 +15,7 @@ SMALLEST_PIVOT = 1e-12
 
 
 @helper
-def finite(value: float) -> bool:
+def is_finite(value: float) -> bool:
     """Neither nan nor infinite, nor so large that its square soon would be.
 
     Unlike math.isfinite it raises no floating-point flag, which NumPy would turn into a warning.
@@ -28,12 +28,12 @@ def all_finite(x: FloatArray) -> bool:
     """Every entry of x (n,) is finite."""
     result = True
     for i in range(x.shape[0]):
-        result = result and finite(x[i])
+        result = result and is_finite(x[i])
     return result
 
 
 @helper
-def largest(x: FloatArray) -> float:
+def max_abs(x: FloatArray) -> float:
     """Greatest absolute value in x (n,); nan if any entry is."""
     result = 0.0
     for i in range(x.shape[0]):
@@ -43,7 +43,7 @@ def largest(x: FloatArray) -> float:
 
 
 @helper
-def factor(A: FloatArray, pivot: IntArray) -> float:
+def lu_factor(A: FloatArray, pivot: IntArray) -> float:
     """LU with partial pivoting, in place.
 
     A : (n, n), overwritten by L (below the diagonal, unit diagonal implied) and U.
@@ -79,7 +79,7 @@ def factor(A: FloatArray, pivot: IntArray) -> float:
 
 
 @helper
-def solve(LU: FloatArray, pivot: IntArray, x: FloatArray) -> None:
+def lu_solve(LU: FloatArray, pivot: IntArray, x: FloatArray) -> None:
     """Solve A x = b with A factored; x (n,) holds b on entry."""
     n = LU.shape[0]
     for k in range(n):

@@ -1,7 +1,20 @@
 """The frame from nine distances, as one kernel: supports, {B}, the base joints, and how {B} has moved.
 
-Six reference points, three on the surface plate and three on the base platform, span an octahedron; nine of its
-edges are measured. (Oiwa, figures 7 and 8.)
+Six reference points, m1..m3 on the surface plate and b1..b3 on the base platform, span an octahedron (paper, figures 7
+and 8); nine of its twelve edges are measured, the other three lie in the plate. Equation (3) and its triangle b1 b2 b3,
+
+    |b_i - b_j| = t,  |b_i - m_j| = u    (nine equations),
+
+is solved for the nine coordinates of b1..b3 by Newton's method,
+
+    b <- b + c J^-1 (measured - computed),   J = d(lengths)/d(b1, b2, b3)   (9 x 9, pure numbers),
+
+where c <= 1 shortens a step that is longer than STEP_LIMIT times the shortest edge. Three checks follow:
+
+- amplification |J^-1| (Frobenius norm) at most AMPLIFICATION_LIMIT: root of the sum of squares of the supports' errors
+  for independent errors of one unit on each distance; 4.6 for the tripod at machine zero;
+- det J has the same sign at guess and solution: between two assemblies lies a singular one, where it changes;
+- {B} is not farther from machine zero than FURTHEST.
 """
 
 from __future__ import annotations
@@ -12,8 +25,8 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, factor, inverse_norm, largest, solve
-from compd.model.kernels.rotation import vector_of
+from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.rotation import set_rotation_vector
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -42,9 +55,11 @@ SHORTEST_EDGE_MM = 1e-6
 
 
 @helper
-def edges(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatArray, J: FloatArray) -> bool:
-    """Lengths t1..t3, u1..u6 (9,) of the edges, equation (3), and their derivatives J (9, 9).
+def edge_lengths(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatArray, J: FloatArray) -> bool:
+    """Lengths t1..t3, u1..u6 (9,) of the edges, equation (3), and their derivatives J (9, 9) by b1, b2, b3.
 
+    Row e of J holds the unit vector of edge e: positive at its near support, negative at its far one if that is a
+    support too.
     False where two points coincide.
     """
     for i in range(9):
@@ -74,7 +89,9 @@ def edges(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm: FloatA
 
 @helper
 def place_base(supports_M: FloatArray, R: FloatArray, origin_M: FloatArray) -> bool:
-    """{B} by its convention: origin in the centroid, z_B = (b2-b1) x (b3-b1), y_B from the origin to b1.
+    """{B} by its convention: origin in the centroid, z_B along (b2-b1) x (b3-b1), y_B from the origin to b1.
+
+    supports_M (3, 3) -> R (3, 3), its columns x_B, y_B, z_B in {M}, and origin_M (3,).
 
     False where the supports lie on one line.
     """
@@ -132,7 +149,7 @@ def _input_reason(lengths_mm: FloatArray, plate_points_M: FloatArray, guess_supp
 def _newton(
     lengths_mm: FloatArray, plate_points_M: FloatArray, supports_M: FloatArray, iterations: IntArray, J: FloatArray
 ) -> int:
-    """Newton in the nine coordinates of the supports, from what `supports_M` holds; J is left factored."""
+    """Newton in the nine coordinates of the supports, from the guess in `supports_M`, in place; leaves J factored."""
     limit_mm = STEP_LIMIT * np.min(lengths_mm)
     x = np.empty(9)
     pivot = np.empty(9, np.int64)
@@ -142,17 +159,17 @@ def _newton(
     while step > STEP_TOLERANCE_MM:
         if iterations[0] == ITERATION_LIMIT:
             return NO_CONVERGENCE
-        if not edges(supports_M, plate_points_M, x, J):
+        if not edge_lengths(supports_M, plate_points_M, x, J):
             return NEAR_SINGULAR
         for i in range(9):
             x[i] = lengths_mm[i] - x[i]
-        sign = factor(J, pivot)
+        sign = lu_factor(J, pivot)
         if iterations[0] == 0:
             first_sign = sign
         if sign == 0.0:
             return NEAR_SINGULAR
-        solve(J, pivot, x)
-        step = largest(x)
+        lu_solve(J, pivot, x)
+        step = max_abs(x)
         shortened = limit_mm / max(step, limit_mm)
         for i in range(3):
             for j in range(3):
@@ -170,7 +187,7 @@ def _supports_from(
     iterations: IntArray,
     residual_mm: FloatArray,
 ) -> int:
-    """Solve from what `supports_M` holds, and judge the solution; returns the reason."""
+    """Solve from the guess in `supports_M`, in place, and check the solution; returns the reason."""
     reason = _input_reason(lengths_mm, plate_points_M, supports_M)
     if reason != OK:
         return reason
@@ -182,11 +199,11 @@ def _supports_from(
     if inverse_norm(J, X) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     x = X[0]
-    if not edges(supports_M, plate_points_M, x, J):
+    if not edge_lengths(supports_M, plate_points_M, x, J):
         return NEAR_SINGULAR
     for i in range(9):
         x[i] -= lengths_mm[i]
-    residual_mm[0] = largest(x)
+    residual_mm[0] = max_abs(x)
     return NO_CONVERGENCE if residual_mm[0] > RESIDUAL_TOLERANCE_MM else reason
 
 
@@ -205,7 +222,7 @@ def _compare(
         displacement_M[i] = origin_M[i] - zero_origin_M[i]
         for j in range(3):
             turned[i, j] = R[i, 0] * zero_R[j, 0] + R[i, 1] * zero_R[j, 1] + R[i, 2] * zero_R[j, 2]
-    vector_of(turned, rotation_M)
+    set_rotation_vector(turned, rotation_M)
 
 
 @kernel(
@@ -258,7 +275,7 @@ def octahedron(
         reason[0] = NEAR_SINGULAR
     if reason[0] == OK:
         _compare(origin_M, R, zero_origin_M, zero_R, displacement_M, rotation_M)
-        if max(largest(displacement_M) / np.min(lengths_mm), largest(rotation_M)) > FURTHEST:
+        if max(max_abs(displacement_M) / np.min(lengths_mm), max_abs(rotation_M)) > FURTHEST:
             reason[0] = OTHER_ASSEMBLY
     if reason[0] != OK:
         supports_M[:, :] = math.nan

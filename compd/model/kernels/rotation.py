@@ -1,4 +1,4 @@
-"""Rotations: matrices inside, rotation vectors at the boundaries."""
+"""Rotations, as matrices inside and as rotation vectors at the boundaries, and points from one frame to another."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SMALLEST = 1e-300
 
 
 @helper
-def turn(R: FloatArray, x_rad: float, y_rad: float, z_rad: float) -> None:
+def rotate_in_place(R: FloatArray, x_rad: float, y_rad: float, z_rad: float) -> None:
     """Turn R (3, 3) in place by a small vector about the fixed axes.
 
     The quaternion (1, v/2), normalised, agrees with the exponential to second order, which is all that
@@ -50,7 +50,7 @@ def orthonormalise(R: FloatArray) -> None:
 
 
 @helper
-def vector_of(R: FloatArray, vector_rad: FloatArray) -> None:
+def set_rotation_vector(R: FloatArray, vector_rad: FloatArray) -> None:
     """Rotation vector (3,) of R (3, 3), angle 0 to pi, by its quaternion (Shepperd's choice of the divisor)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace > 0.0:
@@ -77,7 +77,7 @@ def vector_of(R: FloatArray, vector_rad: FloatArray) -> None:
 @kernel([MATRIX, VECTOR], "(d,d)->(d)")
 def rotation_vector(R: FloatArray, vector_rad: FloatArray) -> None:
     """R (..., 3, 3) -> its rotation vector (..., 3) in rad, angle 0 to pi."""
-    vector_of(R, vector_rad)
+    set_rotation_vector(R, vector_rad)
 
 
 @kernel([VECTOR, MATRIX], "(d)->(d,d)")
@@ -107,3 +107,31 @@ def compose(first: FloatArray, second: FloatArray, product: FloatArray) -> None:
     for i in range(3):
         for j in range(3):
             product[i, j] = first[i, 0] * second[0, j] + first[i, 1] * second[1, j] + first[i, 2] * second[2, j]
+
+
+@kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
+def to_outer(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, outer_mm: FloatArray) -> None:
+    """Point in the inner frame -> in the outer one: origin + R point, equation (2).
+
+    R (..., 3, 3) and origin (..., 3): the inner frame's axes and origin in the outer one; point (..., 3).
+    nan if the point is not finite.
+    """
+    if not all_finite(point_mm):
+        outer_mm[:] = math.nan
+        return
+    for i in range(3):
+        outer_mm[i] = origin_mm[i] + (R[i, 0] * point_mm[0] + R[i, 1] * point_mm[1] + R[i, 2] * point_mm[2])
+
+
+@kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
+def to_inner(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, inner_mm: FloatArray) -> None:
+    """Point in the outer frame -> in the inner one: R^T (point - origin); the inverse of `to_outer`.
+
+    nan if the point is not finite.
+    """
+    if not all_finite(point_mm):
+        inner_mm[:] = math.nan
+        return
+    x, y, z = point_mm[0] - origin_mm[0], point_mm[1] - origin_mm[1], point_mm[2] - origin_mm[2]
+    for i in range(3):
+        inner_mm[i] = R[0, i] * x + R[1, i] * y + R[2, i] * z

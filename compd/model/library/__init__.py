@@ -1,5 +1,9 @@
-"""The library: one file per port, one entry per physical cause. Anybody's effects are found the same way as drivers:
-by entry point (`compd.effects`), by path, or written as a formula."""
+"""The library of effects: one file per port, one entry in its EFFECTS per physical cause.
+
+To add an effect, write its entry into the file of its port, a test of its physics (tests/unit/library/test_physics.py),
+and a hidden cause of the same id in compd/simulation/causes; nothing else names it. Effects of other people are found
+as drivers are: by entry point (`compd.effects`), by path, or written as a formula.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from compd.model.formula.declaration import formula_effect
 from compd.model.library import base_joint, frame, joint, link, platform_joint, reference, scale, tool
 from compd.plugins import EFFECTS, load, names
 
-# Along the way of the datum: readings, links, joints, tool, and what the reference instrument adds.
+# In the order of the kinematics: readings, links, joints, tool, and what the reference instrument adds.
 BUNDLED: tuple[Effect, ...] = (
     *scale.EFFECTS,
     *joint.EFFECTS,
@@ -25,16 +29,16 @@ BUNDLED: tuple[Effect, ...] = (
 )
 
 
-def library() -> dict[str, Effect]:
+def load_library() -> dict[str, Effect]:
     """Every effect that is installed, by id: the bundled ones, then those of other packages.
 
     Raises PluginError where a package's effect cannot be loaded, is no Effect, or takes an id that is in use.
     """
-    found = {effect.id: effect for effect in BUNDLED}
+    effects = {effect.id: effect for effect in BUNDLED}
     for name in names(EFFECTS):
         where = f"entry point {name} in {EFFECTS}"
-        effect = _checked(load(EFFECTS, name, where), where)
-        if effect.id in found:
+        effect = _require_effect(load(EFFECTS, name, where), where)
+        if effect.id in effects:
             raise PluginError(
                 Problem(
                     where=where,
@@ -44,11 +48,11 @@ def library() -> dict[str, Effect]:
                     next_step="rename it, or remove the package",
                 )
             )
-        found[effect.id] = effect
-    return found
+        effects[effect.id] = effect
+    return effects
 
 
-def find(declaration: str | Mapping[str, Any], where: str) -> Effect:
+def find_effect(declaration: str | Mapping[str, Any], where: str) -> Effect:
     """An effect by its id, as /absolute/file.py:NAME, or written out as a formula.
 
     where : the place in the person's file, for errors.  Raises PluginError, or ConfigurationError for a formula.
@@ -56,22 +60,23 @@ def find(declaration: str | Mapping[str, Any], where: str) -> Effect:
     if not isinstance(declaration, str):
         return formula_effect(declaration, where)
     if ":" in declaration:
-        return _checked(load(EFFECTS, declaration, where), where)
-    known = library()
-    if declaration not in known:
+        return _require_effect(load(EFFECTS, declaration, where), where)
+    effects = load_library()
+    if declaration not in effects:
         raise PluginError(
             Problem(
                 where=where,
                 what="no such effect",
                 value=declaration,
-                allowed=", ".join(known),
+                allowed=", ".join(effects),
                 next_step="choose one of these, write /absolute/file.py:NAME, or write a formula",
             )
         )
-    return known[declaration]
+    return effects[declaration]
 
 
-def _checked(thing: Any, where: str) -> Effect:
+def _require_effect(thing: Any, where: str) -> Effect:
+    """The loaded object, if it is an Effect; else PluginError."""
     if not isinstance(thing, Effect):
         raise PluginError(
             Problem(

@@ -16,11 +16,11 @@ from compd.comparison.prediction_uncertainty import first_order_uncertainty, gau
 from compd.comparison.shape_search import search_constants
 from compd.errors import CompdError
 from compd.model.effect import FittedEffect
-from compd.model.library import library
+from compd.model.library import load_library
 from tests.support.measured import SIGMA_UM, aligned, gauges, hidden, record
 
 Floats = NDArray[np.float64]
-LIBRARY = library()
+LIBRARY = load_library()
 
 
 @pytest.fixture(scope="module")

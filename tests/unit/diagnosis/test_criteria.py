@@ -15,7 +15,7 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.selection import explained_fraction, is_at_floor, is_plausible, is_undetermined, penalty
-from tests.support.diagnosed import LIBRARY, recorded
+from tests.support.hidden_effects import LIBRARY, record_with_effects
 
 ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis")]
 THRESHOLDS = [*fields(Criteria), *fields(ComparisonCriteria)]
@@ -45,7 +45,7 @@ def test_every_threshold_is_used() -> None:
     ids=lambda value: ", ".join(value) if isinstance(value, dict) else value,
 )
 def test_a_changed_threshold_changes_the_verdict(tmp_path: Path, changed: dict[str, float], verdict: str) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 30,)})
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 30,)})
     criteria = replace(Criteria(), **changed)
     assert diagnose(aligned, (), None, list(LIBRARY.values()), criteria=criteria).verdict == verdict
 

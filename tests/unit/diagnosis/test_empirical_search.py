@@ -13,8 +13,8 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.library import find
-from tests.support.diagnosed import LIBRARY, recorded
+from compd.model.library import find_effect
+from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
 
 EFFECTS = list(LIBRARY.values())
@@ -46,8 +46,8 @@ def drag_at_one_side(aligned: AlignedRecording) -> FloatArray:
 
 def diagnose_with_cause(path: Path, cause: Cause, effects: dict[str, tuple[float, ...]], seed: int = 1) -> Diagnosis:
     """The diagnosis of a recording on which a cause outside the library acts beside the effects."""
-    still = recorded(path / "still.csv", seed, {})
-    aligned = recorded(path / "run.csv", seed, effects, extra_um=cause(still))
+    still = record_with_effects(path / "still.csv", seed, {})
+    aligned = record_with_effects(path / "run.csv", seed, effects, extra_um=cause(still))
     return diagnose(aligned, (), None, EFFECTS)
 
 
@@ -79,7 +79,7 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     finding = diagnosis.depends_on[0].as_json()
     assert finding["port"] == "link"
     assert finding["note"] == "a description, not a cause"
-    effect = find(finding["formula_effect"], "pasted")
+    effect = find_effect(finding["formula_effect"], "pasted")
     aligned = diagnosis.before.aligned
     result = fit(aligned, [initial_effect(effect, {}, aligned.rows.links)], diagnosis.before.floor.by_axis_um)
     assert result.rms_um < 1.1 * diagnosis.before.floor.um

@@ -19,59 +19,61 @@ from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_lim
 from compd.diagnosis.next_measurement import MeasurementPlan, plan_measurement
 from compd.errors import CompdError, RecordingError
 from compd.model.effect import FittedEffect
-from tests.support.diagnosed import LIBRARY, NOISE_UM, recorded
+from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 SIGMA_UM = np.full(3, NOISE_UM)
 
 
 def app() -> typer.Typer:
-    found = typer.Typer()
-    found.command("diagnose")(diagnose_command)
-    found.command("plan")(plan_command)
-    return found
+    commands = typer.Typer()
+    commands.command("diagnose")(diagnose_command)
+    commands.command("plan")(plan_command)
+    return commands
 
 
-def rivals(aligned: AlignedRecording, *names: str) -> tuple[FittedEffect, FittedEffect]:
+def fit_rivals(aligned: AlignedRecording, *names: str) -> tuple[FittedEffect, FittedEffect]:
     first, second = (search_constants(aligned, (), LIBRARY[name], SIGMA_UM).fitted[-1] for name in names)
     return first, second
 
 
-def planned(
+def plan_rivals(
     aligned: AlignedRecording, names: tuple[str, str], rows: int = 30, limits: ProgrammeLimits | None = None
 ) -> MeasurementPlan:
-    return plan_measurement(aligned, (), rivals(aligned, *names), SIGMA_UM, limits or recorded_limits(aligned), rows)
+    return plan_measurement(
+        aligned, (), fit_rivals(aligned, *names), SIGMA_UM, limits or recorded_limits(aligned), rows
+    )
 
 
 def test_a_plan_separates_spring_and_contact_by_loads(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
     limits = recorded_limits(aligned)._replace(force_N=120.0)
-    found = planned(aligned, ("link_elasticity", "joint_contact"), 30, limits)
-    assert found.separation > 1.5 * found.before
-    assert len(found.rows) <= 30
-    loads = np.array([[row[f"force_{axis}_N"] for axis in "xyz"] for row in found.rows])
+    plan = plan_rivals(aligned, ("link_elasticity", "joint_contact"), 30, limits)
+    assert plan.separation > 1.5 * plan.before
+    assert len(plan.rows) <= 30
+    loads = np.array([[row[f"force_{axis}_N"] for axis in "xyz"] for row in plan.rows])
     assert np.abs(loads).max() == pytest.approx(120.0)
     assert len(np.unique(np.abs(loads[loads != 0]).round(1))) >= 2  # a line and a curve differ in the middle
 
 
 def test_a_plan_separates_backlash_and_friction_by_growing_reversals(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {"friction_hysteresis": (0.8,)})
-    found = planned(aligned, ("friction_hysteresis", "backlash"))
-    assert found.separation > found.before
-    assert "reversals in growing steps" in {row["purpose"] for row in found.rows}
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"friction_hysteresis": (0.8,)})
+    plan = plan_rivals(aligned, ("friction_hysteresis", "backlash"))
+    assert plan.separation > plan.before
+    assert "reversals in growing steps" in {row["purpose"] for row in plan.rows}
 
 
 def test_more_rows_separate_more(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 2, {"tool_offset": (0.5, -0.4, 0.3)})
-    few, many = (planned(aligned, ("tool_offset", "link_zero"), rows) for rows in (6, 30))
+    aligned = record_with_effects(tmp_path / "run.csv", 2, {"tool_offset": (0.5, -0.4, 0.3)})
+    few, many = (plan_rivals(aligned, ("tool_offset", "link_zero"), rows) for rows in (6, 30))
     assert few.before < few.separation < many.separation
 
 
 def test_a_plan_stays_within_its_limits(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
     low, high = np.array([-20.0, -15.0, 170.0]), np.array([25.0, 20.0, 200.0])
     limits = ProgrammeLimits(low, high, 30.0, (18.0, 23.0), 0.0)
-    found = planned(aligned, ("link_expansion", "link_elasticity"), 40, limits)
-    for row in found.rows:
+    plan = plan_rivals(aligned, ("link_expansion", "link_elasticity"), 40, limits)
+    for row in plan.rows:
         tip = np.array([row[f"tip_{axis}_mm"] for axis in "xyz"])
         assert (low - 1e-3 <= tip).all()
         assert (tip <= high + 1e-3).all()
@@ -80,15 +82,15 @@ def test_a_plan_stays_within_its_limits(tmp_path: Path) -> None:
         assert row["speed_mm_per_s"] == 0.0
 
 
-def test_a_place_out_of_reach_is_said(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {})
+def test_a_place_out_of_reach_is_refused(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {})
     far = recorded_limits(aligned)._replace(tip_high_M_mm=np.array([5000.0, 5000.0, 5000.0]))
     with pytest.raises(RecordingError, match="out of reach"):
-        planned(aligned, ("tool_offset", "link_zero"), 10, far)
+        plan_rivals(aligned, ("tool_offset", "link_zero"), 10, far)
 
 
 def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
-    recorded(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
+    record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
     out = tmp_path / "next.csv"
     arguments = ["plan", str(tmp_path / "run.csv"), "--rivals", "link_elasticity,joint_contact", "--rows", "24"]
     result = CliRunner().invoke(app(), [*arguments, "--force", "100", "--out", str(out)])
@@ -103,7 +105,7 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("options", "message"),
     [
         (["--rivals", "link_zero"], "needs two effects"),
         (["--rivals", "link_zero,no_such"], "no such effect"),
@@ -111,16 +113,16 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
         (["--rivals", "link_zero,tool_offset", "--workspace", "1,2,3"], "is not understood"),
     ],
 )
-def test_mistakes_are_said(tmp_path: Path, given: list[str], said: str) -> None:
-    recorded(tmp_path / "run.csv", 1, {})
-    result = CliRunner().invoke(app(), ["plan", str(tmp_path / "run.csv"), *given])
+def test_mistakes_are_refused(tmp_path: Path, options: list[str], message: str) -> None:
+    record_with_effects(tmp_path / "run.csv", 1, {})
+    result = CliRunner().invoke(app(), ["plan", str(tmp_path / "run.csv"), *options])
     assert isinstance(result.exception, CompdError)
-    assert said in str(result.exception)
+    assert message in str(result.exception)
 
 
 def test_the_diagnose_command_prints_verdict_json_and_page(tmp_path: Path) -> None:
     for name, seed in (("run.csv", 1), ("other.csv", 2)):
-        recorded(tmp_path / name, seed, {"link_elasticity": (1 / 30,)})
+        record_with_effects(tmp_path / name, seed, {"link_elasticity": (1 / 30,)})
     page = tmp_path / "page.html"
     paths = [str(tmp_path / "run.csv"), str(tmp_path / "other.csv")]
     result = CliRunner().invoke(app(), ["diagnose", *paths, "--html", str(page)])

@@ -11,7 +11,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.significance import SIGN_FLIPS, OrthogonalComplement, p_values
-from tests.support.diagnosed import recorded
+from tests.support.hidden_effects import record_with_effects
 
 
 def random_data(seed: int, rows: int = 120) -> RegressionData:
@@ -72,7 +72,7 @@ def test_a_column_that_acts_in_one_fold_alone_is_not_testable_there() -> None:
 
 
 def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
-    aligned = recorded(tmp_path / "run.csv", 1, {})
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {})
     by_session, by_sector = row_splits(aligned, Criteria())
     assert len(np.unique(by_session)) == 4
     assert len(np.unique(by_sector)) == Criteria().sectors

@@ -22,7 +22,7 @@ from compd.live.loop.model_loader import ModelLoader, Models
 from compd.live.loop.setpoint import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.model.effect import FittedEffect
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.model_file import ModelFile, write_model_file
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, Machine, machine
 from tests.unit.live.test_daemon import StillGauges, configuration, first, running
@@ -35,7 +35,7 @@ def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Pat
     """A model file with these effects; numbers by id, else ones."""
     fitted = []
     for one in declared:
-        effect = find(one, "here")
+        effect = find_effect(one, "here")
         columns = effect.columns(links)
         numbers = np.broadcast_to(theta.get(effect.id, 1.0), (len(columns),)).astype(float)
         shape = {constant.name: constant.grid[0] for constant in effect.constants}
@@ -157,9 +157,9 @@ def test_an_effect_of_faulty_code_is_refused_before_the_loop_meets_it(tripod, tm
     code = tmp_path / "mine.py"
     code.write_text(
         "from dataclasses import replace\n"
-        "from compd.model.library import library\n"
+        "from compd.model.library import load_library\n"
         "def basis(rows, shape, memory):\n    return rows.scale_mm[:, :2, None], memory\n"
-        "MINE = replace(library()['link_sag'], id='mine', basis=basis)\n"
+        "MINE = replace(load_library()['link_sag'], id='mine', basis=basis)\n"
     )
     code.chmod(0o644)
     with pytest.raises(StateError, match="an effect fails: ValueError"):

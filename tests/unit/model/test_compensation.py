@@ -9,11 +9,10 @@ import pytest
 
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import KinematicsError
-from compd.model.kernels.rotation import rotation_matrix, rotation_vector
+from compd.model.kernels.rotation import rotation_matrix, rotation_vector, to_inner
 from compd.model.machine import MachineModel, machine_model
 from compd.model.solve_status import Reason, require
 from compd.model.tool import Contact, ToolOnPlate
-from compd.model.transform import to_inner
 from tests.support.model_machines import Floats, about, hexapod, hexapod_parts, moved, tips, tripod, tripod_parts
 
 ROWS = 25

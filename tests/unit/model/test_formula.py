@@ -18,7 +18,7 @@ from compd.model.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.formula.evaluator import FUNCTIONS, Formula
 from compd.model.formula.parser import DEEPEST, LONGEST, parse
-from compd.model.library import find
+from compd.model.library import find_effect
 from compd.model.prediction import predict
 from compd.model.sensitivity import effect_sensitivity, sensitivities
 from tests.support.effect_rows import HEXAPOD, TRIPOD, at_zero, rows_of, varied
@@ -184,7 +184,7 @@ def nothing_but_arithmetic(text: str) -> None:
     assert not any(name.startswith(("reference_", "model_")) for name in formula.columns)
     found, _ = formula.evaluate(
         {name: np.array([[0.5], [-2.0]]) for name in formula.columns},
-        dict.fromkeys(formula.shape, 3.0),
+        dict.fromkeys(formula.constants, 3.0),
         np.array([0.0, 10.0]),
         np.array([True, False]),
         (None,) * formula.lags,
@@ -300,7 +300,7 @@ def test_a_formulas_value_is_pythons(made: Made) -> None:
 def test_parameters_are_linear_or_searched(text: str, linear: list[str], shape: list[str]) -> None:
     formula = parse(text, tuple(sorted((*linear, *shape), key=text.index)), "test")
     assert sorted(formula.linear) == sorted(linear)
-    assert list(formula.shape) == shape
+    assert list(formula.constants) == shape
 
 
 def test_each_parameter_gets_its_own_factor() -> None:
@@ -319,7 +319,7 @@ def test_arithmetic_that_fails_gives_nan_and_no_warning() -> None:
 
 
 def test_the_persons_example() -> None:
-    effect = find(GRANITE, "model.yaml:12")
+    effect = find_effect(GRANITE, "model.yaml:12")
     assert effect.needs == ("humidity_pct",)
     rows = at_zero(values={"humidity_pct": 53.0})
     found, _ = effect_deltas(FittedEffect(effect, np.array([0.1])), rows)
@@ -411,7 +411,7 @@ def test_one_parameter_per_link() -> None:
 )
 def test_a_wrong_declaration_is_refused_with_its_place(change: dict[str, Any], said: str) -> None:
     with pytest.raises(ConfigurationError, match=said) as refused:
-        find({**GRANITE, **change}, "model.yaml:12")
+        find_effect({**GRANITE, **change}, "model.yaml:12")
     assert all(problem.where.startswith("model.yaml:12") for problem in refused.value.problems)
 
 

@@ -57,7 +57,7 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     code = (
-        "import numpy as np; from compd.model.kernels import jit; from compd.model.transform import to_outer;"
+        "import numpy as np; from compd.model.kernels import jit; from compd.model.kernels.rotation import to_outer;"
         "print(repr(jit.CACHE_DIRECTORY), to_outer(np.eye(3), np.ones(3), np.zeros(3)).tolist())"
     )
     done = subprocess.run(

@@ -68,10 +68,10 @@ def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
 
 def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
     from compd.model.effect import FittedEffect
-    from compd.model.library import find
+    from compd.model.library import find_effect
 
     path = tmp_path / "m.yaml"
-    effect = find(FORMULA, "here")
+    effect = find_effect(FORMULA, "here")
     file = ModelFile("tripod-cmm", (FORMULA,), (FittedEffect(effect, np.array([0.1])),), np.full((1, 1), 1e-4))
     write_model_file(path, file, 3)
     found = read_model_file(path, "tripod-cmm", 3)

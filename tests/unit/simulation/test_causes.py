@@ -70,10 +70,10 @@ def moved_um(world: World) -> FloatArray:
 
 
 def test_every_cause_that_the_library_has_is_in_the_truth_and_others_besides() -> None:
-    from compd.model.library import library
+    from compd.model.library import load_library
 
     ours = {name for name, kind in CAUSES.items() if kind.in_library}
-    assert ours == set(library())
+    assert ours == set(load_library())
     assert len(CAUSES) - len(ours) >= 5
     assert all(kind.follows for name, kind in CAUSES.items() if name not in ours)
 

@@ -1,4 +1,4 @@
-"""A small campaign on the drawing's tripod for tests of the diagnosis: the model's own physics, noise, outliers."""
+"""Recordings of the drawing's tripod on which effects of the library act, with noise and outliers, for tests."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect
-from compd.model.library import library
+from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 
-LIBRARY = library()
+LIBRARY = load_library()
 NOISE_UM = 0.15
 PLACES = ("room", "link_1", "link_2", "link_3", "base", "frame", "platform", "tool", "plate_top", "plate_bottom")
 SIDECAR = {
@@ -65,7 +65,7 @@ def _wander(rng: np.random.Generator, time_s: FloatArray, size: float) -> FloatA
     return np.asarray(size * waves.sum(axis=1) / np.sqrt(1.5))
 
 
-def recorded(
+def record_with_effects(
     path: Path,
     seed: int,
     effects: Mapping[str, tuple[float, ...]],
@@ -76,7 +76,7 @@ def recorded(
 ) -> AlignedRecording:
     """A recording of a machine on which `effects` act (theta by id; compliances for stiffnesses), written and read.
 
-    extra_um : (N, 3) what else the reference shows.  outliers : so many rows, one in twenty and no repeat, off by 6 um.
+    extra_um : (N, 3) what else the reference shows.  outliers : number of rows, every twentieth, that are off by 6 um.
     """
     columns = campaign(seed, visits)
     rng = np.random.default_rng([seed, 1])
