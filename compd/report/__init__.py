@@ -1,1 +1,1 @@
-"""Pages that work offline: comparisons, diagnoses, effects."""
+"""Pages that work offline: comparison, diagnosis, effect and ledger, all from one template (`page`)."""

@@ -29,37 +29,37 @@ def tripod() -> Configuration:
 
 def hidden(effect: str, *values: float, **shape: float) -> FittedEffect:
     """A library effect with its numbers in the unit that people read."""
-    one = load_library()[effect]
-    theta = [column.parameter.to_theta(value) for column, value in zip(one.columns(3), values, strict=True)]
-    return FittedEffect(one, np.array(theta), shape)
+    declared = load_library()[effect]
+    theta = [column.parameter.to_theta(value) for column, value in zip(declared.columns(3), values, strict=True)]
+    return FittedEffect(declared, np.array(theta), shape)
 
 
 def gauges(rows: int, seed: int, links: int = 3, joints: int = 9) -> dict[str, Floats]:
-    """What is measured at the machine, in four sessions; every third row repeats the row before: the same visit."""
+    """Columns of a recording's gauges, in four sessions; every third row repeats the row before: the same visit."""
     rng = np.random.default_rng(seed)
     repeat = np.arange(rows) % 3 == 2
     source = np.arange(rows) - repeat
     hours = np.arange(rows) * 25.0 / 3600.0
-    found: dict[str, Floats] = {
+    columns: dict[str, Floats] = {
         "time_s": np.arange(rows) * 25.0,
         "session": 1.0 + np.arange(rows) * 4 // rows,
         "visit": np.cumsum(~repeat).astype(float),
     }
     for i in range(1, links + 1):
-        found[f"scale_{i}_mm"] = np.round(rng.uniform(-60, 60, rows), 6)[source]
-        found[f"approach_{i}"] = rng.choice([-1.0, 1.0], rows)[source]
+        columns[f"scale_{i}_mm"] = np.round(rng.uniform(-60, 60, rows), 6)[source]
+        columns[f"approach_{i}"] = rng.choice([-1.0, 1.0], rows)[source]
     for k in range(1, joints + 1):
-        found[f"joint_{k}_um"] = rng.uniform(-8, 8, rows)[source]
+        columns[f"joint_{k}_um"] = rng.uniform(-8, 8, rows)[source]
     for name in ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"):
-        found[f"frame_{name}_um"] = np.cumsum(rng.normal(0, 0.3, rows))[source]
+        columns[f"frame_{name}_um"] = np.cumsum(rng.normal(0, 0.3, rows))[source]
     for place in PLACES:
         walk = np.cumsum(rng.normal(0, 0.05, rows))
-        found[f"temperature_{place}_degC"] = 20 + walk[source] + 0.3 * np.sin(hours + rng.uniform(0, 6))
+        columns[f"temperature_{place}_degC"] = 20 + walk[source] + 0.3 * np.sin(hours + rng.uniform(0, 6))
     for axis in "xyz":
         loaded = rng.random(rows) < 0.4
-        found[f"force_{axis}_N"] = (loaded * rng.uniform(-40, 40, rows))[source]
-    found["humidity_pct"] = 50 + np.cumsum(rng.normal(0, 0.4, rows))[source]
-    return found
+        columns[f"force_{axis}_N"] = (loaded * rng.uniform(-40, 40, rows))[source]
+    columns["humidity_pct"] = 50 + np.cumsum(rng.normal(0, 0.4, rows))[source]
+    return columns
 
 
 def record(

@@ -30,21 +30,21 @@ def shared(*parts: str) -> Path:
 
 @pytest.mark.parametrize("name", ["train.csv", "valid.csv"])
 def test_with_nothing_missing_the_residual_is_the_noise(name: str) -> None:
-    found = compare(aligned(shared("recordings", "example-nothing-missing", name)))
-    assert found.floor_ratio < AT_FLOOR
-    assert found.at_floor
-    assert found.floor.source == "repeats"
-    assert found.floor.um == pytest.approx(SIGMA_UM, rel=0.08)
-    assert not found.trends
-    assert not found.outlier.any()
+    comparison = compare(aligned(shared("recordings", "example-nothing-missing", name)))
+    assert comparison.floor_ratio < AT_FLOOR
+    assert comparison.at_floor
+    assert comparison.floor.source == "repeats"
+    assert comparison.floor.um == pytest.approx(SIGMA_UM, rel=0.08)
+    assert not comparison.trends
+    assert not comparison.outlier.any()
 
 
 @pytest.mark.parametrize("case", ["link-expansion", "plate-bending", "not-in-the-library", "elastic-and-backlash"])
 def test_a_missing_cause_is_seen(case: str) -> None:
-    found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
-    assert found.floor_ratio > 5
-    assert not found.at_floor
-    assert found.trends
+    comparison = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
+    assert comparison.floor_ratio > 5
+    assert not comparison.at_floor
+    assert comparison.trends
 
 
 @pytest.mark.parametrize(
@@ -56,8 +56,8 @@ def test_a_missing_cause_is_seen(case: str) -> None:
     ],
 )
 def test_words_name_what_the_error_follows(case: str, coordinate: str, covariate: str) -> None:
-    found = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
-    first = found.trends[0]
+    comparison = compare(aligned(shared("recordings", f"example-{case}", "train.csv")))
+    first = comparison.trends[0]
     assert (first.coordinate, first.covariate) == (coordinate, covariate)
     assert first.text.startswith(f"{coordinate} error follows {covariate}, ")
     assert first.explained > 0.9
@@ -72,12 +72,12 @@ def test_a_hexapod_reaches_the_floor(tmp_path: Path) -> None:
 
 
 def test_a_real_machine_with_a_model_of_its_own() -> None:
-    found = compare(align_recording(read_recording(shared("real", "voron-frame-expansion.csv")), None))
-    assert found.aligned.labels == ("z",)
-    assert found.floor.um == pytest.approx(1.2, abs=0.2)  # repeats scatter less than the declared motor step
-    assert found.rms_um > 50
-    assert any(one.covariate == "temperature_frame" for one in found.trends)
-    assert found.as_json()["prediction_std_um"]["gauges"] is None
+    comparison = compare(align_recording(read_recording(shared("real", "voron-frame-expansion.csv")), None))
+    assert comparison.aligned.labels == ("z",)
+    assert comparison.floor.um == pytest.approx(1.2, abs=0.2)  # repeats scatter less than the declared motor step
+    assert comparison.rms_um > 50
+    assert any(trend.covariate == "temperature_frame" for trend in comparison.trends)
+    assert comparison.as_json()["prediction_std_um"]["gauges"] is None
 
 
 def test_an_instrument_in_a_frame_of_its_own(tmp_path: Path) -> None:
@@ -86,11 +86,11 @@ def test_an_instrument_in_a_frame_of_its_own(tmp_path: Path) -> None:
     in_M = compare(aligned(path))
     turned = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()
     moved = _move(path, turned, np.array([1500.0, -320.0, 80.0]), {"quantity": "tool_position", "frame": "instrument"})
-    found = compare(aligned(moved))
-    assert found.aligned.registration is not None
-    np.testing.assert_allclose(found.aligned.registration.rotation, turned.T, atol=1e-6)
-    assert found.rms_um == pytest.approx(in_M.rms_um, rel=0.01)
-    assert "registration" in found.as_json()
+    comparison = compare(aligned(moved))
+    assert comparison.aligned.registration is not None
+    np.testing.assert_allclose(comparison.aligned.registration.rotation, turned.T, atol=1e-6)
+    assert comparison.rms_um == pytest.approx(in_M.rms_um, rel=0.01)
+    assert "registration" in comparison.as_json()
 
 
 def test_gross_rows_do_not_bend_the_instruments_frame(tmp_path: Path) -> None:
@@ -118,10 +118,10 @@ def _move(path: Path, turned: Floats, by_mm: Floats, reference: dict[str, object
 
 def test_one_axis_alone(tmp_path: Path) -> None:
     path = record(tmp_path, gauges(300, 6), axes="z")
-    found = compare(aligned(path))
-    assert found.aligned.labels == ("z",)
-    assert found.floor_ratio < AT_FLOOR
-    assert list(found.as_json()["residual_rms_xyz_um"]) == ["z"]
+    comparison = compare(aligned(path))
+    assert comparison.aligned.labels == ("z",)
+    assert comparison.floor_ratio < AT_FLOOR
+    assert list(comparison.as_json()["residual_rms_xyz_um"]) == ["z"]
 
 
 def test_links_measured_by_interferometer(tmp_path: Path) -> None:
@@ -138,11 +138,11 @@ def test_links_measured_by_interferometer(tmp_path: Path) -> None:
     reference = {"quantity": "link_length", "sigma_um": 0.1}
     path = tmp_path / "links.csv"
     write_recording(path, {**gone, **lengths}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(aligned(path))
-    assert found.aligned.labels == ("link 1", "link 3")
-    assert found.rms_um == pytest.approx(0.1, rel=0.1)
-    assert found.floor_ratio < AT_FLOOR
-    assert found.contributions["joints"].without_rms_um > 5
+    comparison = compare(aligned(path))
+    assert comparison.aligned.labels == ("link 1", "link 3")
+    assert comparison.rms_um == pytest.approx(0.1, rel=0.1)
+    assert comparison.floor_ratio < AT_FLOOR
+    assert comparison.contributions["joints"].without_rms_um > 5
 
 
 def test_a_ball_plate(tmp_path: Path) -> None:
@@ -157,10 +157,10 @@ def test_a_ball_plate(tmp_path: Path) -> None:
     path = tmp_path / "balls.csv"
     reference = {"quantity": "ball_plate", "balls": "plate.csv", "sigma_um": SIGMA_UM}
     write_recording(path, {**columns, "ball": np.arange(90.0)}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(aligned(path))
-    assert found.aligned.registered
-    assert found.floor.source == "declared"
-    assert found.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
+    comparison = compare(aligned(path))
+    assert comparison.aligned.registered
+    assert comparison.floor.source == "declared"
+    assert comparison.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
 
 
 def test_attitude_is_compared_too(tmp_path: Path) -> None:
@@ -173,9 +173,9 @@ def test_attitude_is_compared_too(tmp_path: Path) -> None:
     pose = tmp_path / "pose.csv"
     reference = {"quantity": "tool_pose", "frame": "machine", "sigma_um": SIGMA_UM}
     write_recording(pose, {**recording.columns, **attitude}, {"machine": "tripod-cmm", "reference": reference})
-    found = compare(aligned(pose)).as_json()
-    assert found["attitude_rms_urad"] == pytest.approx(20 / np.sqrt(3), rel=1e-3)
-    assert found["floor_ratio"] < 1.3
+    report = compare(aligned(pose)).as_json()
+    assert report["attitude_rms_urad"] == pytest.approx(20 / np.sqrt(3), rel=1e-3)
+    assert report["floor_ratio"] < 1.3
 
 
 @pytest.mark.parametrize("size_um", [3.0, 50.0, 5000.0])
@@ -189,11 +189,11 @@ def test_one_per_cent_of_gross_rows_moves_nothing(tmp_path: Path, size_um: float
     spoilt["reference_y_mm"] = spoilt["reference_y_mm"].copy()
     spoilt["reference_y_mm"][rows] += size_um / 1e3
     write_recording(path, spoilt, {"machine": "tripod-cmm", "reference": _plain()}, overwrite=True)
-    found = compare(aligned(path))
-    assert found.as_json()["outlier_rows"] == (rows + 2).tolist()
-    assert found.rms_um == pytest.approx(clean.rms_um, rel=0.01)
-    assert found.floor.um == pytest.approx(clean.floor.um, rel=0.03)
-    assert found.as_json()["excluded_by_reason"] == {"beyond all noise": 6}
+    comparison = compare(aligned(path))
+    assert comparison.as_json()["outlier_rows"] == (rows + 2).tolist()
+    assert comparison.rms_um == pytest.approx(clean.rms_um, rel=0.01)
+    assert comparison.floor.um == pytest.approx(clean.floor.um, rel=0.03)
+    assert comparison.as_json()["excluded_by_reason"] == {"beyond all noise": 6}
 
 
 def _plain() -> dict[str, object]:
@@ -204,9 +204,9 @@ def test_a_rare_load_that_bends_the_machine_is_not_gross(tmp_path: Path) -> None
     columns = gauges(600, 12)
     loaded = np.repeat(np.arange(200) % 4 == 0, 3)
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
-    found = compare(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])))
-    assert found.outlier.sum() <= 0.03 * 600
-    assert not found.at_floor
+    comparison = compare(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])))
+    assert comparison.outlier.sum() <= 0.03 * 600
+    assert not comparison.at_floor
 
 
 def test_empty_cells_leave_their_row_out_and_are_counted(tmp_path: Path) -> None:
@@ -218,22 +218,22 @@ def test_empty_cells_leave_their_row_out_and_are_counted(tmp_path: Path) -> None
         cells[index] = ""
         lines[row] = ",".join(cells)
     path.write_text("\n".join(lines) + "\n")
-    found = compare(aligned(path)).as_json()
-    assert found["rows_used"] == 57
-    assert found["rows_excluded"] == 3
-    assert found["excluded_by_reason"] == {"scale_2_mm is empty": 3}
+    report = compare(aligned(path)).as_json()
+    assert report["rows_used"] == 57
+    assert report["rows_excluded"] == 3
+    assert report["excluded_by_reason"] == {"scale_2_mm is empty": 3}
 
 
 def test_switching_the_joints_off_is_what_unmoved_joints_predict(tmp_path: Path) -> None:
     columns = gauges(60, 14)
     path = record(tmp_path, columns)
-    one = aligned(path)
+    with_joints = aligned(path)
     unmoved = {name: np.zeros(60) if name.startswith("joint_") else values for name, values in columns.items()}
     for axis in "xyz":
-        unmoved[f"reference_{axis}_mm"] = one.recording.columns[f"reference_{axis}_mm"]
+        unmoved[f"reference_{axis}_mm"] = with_joints.recording.columns[f"reference_{axis}_mm"]
     write_recording(tmp_path / "still.csv", unmoved, {"machine": "tripod-cmm", "reference": _plain()})
     still = compare(aligned(tmp_path / "still.csv"))
-    assert compare(one).contributions["joints"].without_rms_um == pytest.approx(still.rms_um, rel=1e-3)
+    assert compare(with_joints).contributions["joints"].without_rms_um == pytest.approx(still.rms_um, rel=1e-3)
 
 
 def test_an_effect_that_lacks_its_quantity_is_refused_in_words(tmp_path: Path) -> None:
@@ -251,10 +251,10 @@ def test_rows_without_a_pose_are_counted_with_the_reason(tmp_path: Path) -> None
     text[5] = ",".join(cells)
     path.write_text("\n".join(text) + "\n")
     with_configuration = read_recording(path)
-    found = compare(align_recording(with_configuration, tripod()))
-    (reason,) = found.left_out
+    comparison = compare(align_recording(with_configuration, tripod()))
+    (reason,) = comparison.left_out
     assert reason.startswith("no pose: ")
-    assert found.used.sum() == 29
+    assert comparison.used.sum() == 29
 
 
 def test_too_few_rows_are_refused(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def white(blank: AlignedRecording, seed: int) -> Floats:
 
 
 def fresh(*effects: str) -> list[FittedEffect]:
-    return [initial_effect(LIBRARY[one], {}, 3) for one in effects]
+    return [initial_effect(LIBRARY[effect], {}, 3) for effect in effects]
 
 
 @pytest.mark.parametrize(
@@ -54,31 +54,33 @@ def fresh(*effects: str) -> list[FittedEffect]:
         hidden("plate_bending", 8.0),
         hidden("joint_comparator_gain", 0.05),
     ],
-    ids=lambda one: one.effect.id,
+    ids=lambda truth: truth.effect.id,
 )
 def test_without_noise_the_numbers_come_back(blank: AlignedRecording, truth: FittedEffect) -> None:
-    found = fit(measured(blank, [truth], 0 * white(blank, 0)), fresh(truth.effect.id))
-    np.testing.assert_allclose(found.fitted[0].theta, truth.theta, rtol=1e-6)
-    assert found.rms_um < 1e-5
+    result = fit(measured(blank, [truth], 0 * white(blank, 0)), fresh(truth.effect.id))
+    np.testing.assert_allclose(result.fitted[0].theta, truth.theta, rtol=1e-6)
+    assert result.rms_um < 1e-5
 
 
 def test_two_effects_are_fitted_together(blank: AlignedRecording) -> None:
     truth = [hidden("link_elasticity", 28.0), hidden("backlash", 0.9, 1.1, 0.8)]
-    found = fit(measured(blank, truth, white(blank, 1)), fresh("link_elasticity", "backlash"))
-    std = np.sqrt(np.diag(found.covariance))
-    assert found.names == ("link_elasticity.k", "backlash.b_1", "backlash.b_2", "backlash.b_3")
-    off = (np.concatenate([one.theta for one in found.fitted]) - np.concatenate([one.theta for one in truth])) / std
+    result = fit(measured(blank, truth, white(blank, 1)), fresh("link_elasticity", "backlash"))
+    std = np.sqrt(np.diag(result.covariance))
+    assert result.names == ("link_elasticity.k", "backlash.b_1", "backlash.b_2", "backlash.b_3")
+    off = (
+        np.concatenate([effect.theta for effect in result.fitted]) - np.concatenate([effect.theta for effect in truth])
+    ) / std
     assert np.abs(off).max() < 4
-    assert found.rms_um == pytest.approx(SIGMA_UM, rel=0.05)
+    assert result.rms_um == pytest.approx(SIGMA_UM, rel=0.05)
 
 
 def test_a_95_percent_interval_covers_the_truth_in_95_percent(blank: AlignedRecording) -> None:
     truth = hidden("backlash", 0.9, 1.1, 0.8)
     inside = []
     for seed in range(120):
-        found = fit(measured(blank, [truth], white(blank, 100 + seed)), fresh("backlash"))
-        std = np.sqrt(np.diag(found.covariance))
-        inside += (np.abs(found.fitted[0].theta - truth.theta) < 1.96 * std).tolist()
+        result = fit(measured(blank, [truth], white(blank, 100 + seed)), fresh("backlash"))
+        std = np.sqrt(np.diag(result.covariance))
+        inside += (np.abs(result.fitted[0].theta - truth.theta) < 1.96 * std).tolist()
     assert 0.925 <= np.mean(inside) <= 0.985  # 360 intervals: two standard deviations are 2.3 %
 
 
@@ -96,26 +98,28 @@ def test_gross_rows_are_listed_and_move_nothing(blank: AlignedRecording) -> None
     noise = white(blank, 4)
     clean = fit(measured(blank, [truth], noise), fresh("link_expansion"))
     noise[[50, 100, 200], 2] += [30.0, -4000.0, 3.0]
-    found = fit(measured(blank, [truth], noise), fresh("link_expansion"))
-    assert np.flatnonzero(found.outlier).tolist() == [50, 100, 200]
+    result = fit(measured(blank, [truth], noise), fresh("link_expansion"))
+    assert np.flatnonzero(result.outlier).tolist() == [50, 100, 200]
     std = np.sqrt(clean.covariance[0, 0])
-    assert abs(found.fitted[0].theta[0] - clean.fitted[0].theta[0]) < 0.3 * std
+    assert abs(result.fitted[0].theta[0] - clean.fitted[0].theta[0]) < 0.3 * std
 
 
 def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> None:
     columns = gauges(600, 41)
     loaded = np.repeat(np.arange(200) % 6 == 0, 3)
     columns |= {f"force_{axis}_N": np.where(loaded, columns[f"force_{axis}_N"], 0.0) for axis in "xyz"}
-    found = fit(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
-    assert not found.outlier.any()
-    assert found.fitted[0].effect.parameters[0].from_theta(found.fitted[0].theta[0])[0] == pytest.approx(20.0, rel=0.02)
+    result = fit(aligned(record(tmp_path, columns, [hidden("link_elasticity", 20.0)])), fresh("link_elasticity"))
+    assert not result.outlier.any()
+    assert result.fitted[0].effect.parameters[0].from_theta(result.fitted[0].theta[0])[0] == pytest.approx(
+        20.0, rel=0.02
+    )
 
 
 def test_what_the_data_cannot_tell_apart_has_no_error(blank: AlignedRecording) -> None:
     # on a gauge that never moves its gain does nothing at all
     still = replace(blank, rows=replace(blank.rows, frame_mm=np.zeros_like(blank.rows.frame_mm)))
-    found = fit(measured(still, [], white(blank, 5)), fresh("frame_comparator_gain"))
-    assert np.isnan(found.covariance).all()
+    result = fit(measured(still, [], white(blank, 5)), fresh("frame_comparator_gain"))
+    assert np.isnan(result.covariance).all()
 
 
 def test_a_time_constant_is_searched(tmp_path: Path) -> None:
@@ -124,30 +128,30 @@ def test_a_time_constant_is_searched(tmp_path: Path) -> None:
         steps = np.repeat(np.random.default_rng(i).normal(0, 1.5, 12), 50)
         columns[f"temperature_link_{i}_degC"] = 20 + steps
     truth = hidden("link_expansion_lag", 8.0, tau=1300.0)
-    one = aligned(record(tmp_path, columns, [truth]))
-    (found,) = search_constants(one, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
-    assert found.constants["tau"] == pytest.approx(1300.0, rel=0.05)
-    assert found.theta[0] == pytest.approx(8.0, rel=0.02)
+    recording = aligned(record(tmp_path, columns, [truth]))
+    (fitted,) = search_constants(recording, (), LIBRARY["link_expansion_lag"], np.ones(3)).fitted
+    assert fitted.constants["tau"] == pytest.approx(1300.0, rel=0.05)
+    assert fitted.theta[0] == pytest.approx(8.0, rel=0.02)
 
 
 def test_too_few_rows_for_the_numbers(tmp_path: Path) -> None:
-    one = aligned(record(tmp_path, gauges(3, 43)))
+    recording = aligned(record(tmp_path, gauges(3, 43)))
     with pytest.raises(CompdError, match="numbers to fit"):
-        fit(one, fresh("base_joint_position", "link_zero"))
+        fit(recording, fresh("base_joint_position", "link_zero"))
 
 
 def test_first_order_uncertainty_agrees_with_monte_carlo(blank: AlignedRecording) -> None:
     truth = [hidden("link_elasticity", 28.0), hidden("backlash", 0.9, 1.1, 0.8)]
-    one = measured(blank, truth, white(blank, 6))
-    found = fit(one, fresh("link_elasticity", "backlash"))
-    noise = gauge_noise(one)
-    first = first_order_uncertainty(one, noise, found.fitted, found.covariance).total_um
+    recording = measured(blank, truth, white(blank, 6))
+    result = fit(recording, fresh("link_elasticity", "backlash"))
+    noise = gauge_noise(recording)
+    first = first_order_uncertainty(recording, noise, result.fitted, result.covariance).total_um
     index = np.arange(0, 300, 30)
-    trials = monte_carlo(one, noise, found.fitted, found.covariance, index, trials=2000, seed=1)
+    trials = monte_carlo(recording, noise, result.fitted, result.covariance, index, trials=2000, seed=1)
     np.testing.assert_allclose(trials, first[index], rtol=0.08)  # 2000 trials: 1.6 % each
 
 
 def test_an_unknown_error_is_nan_in_the_prediction_too(blank: AlignedRecording) -> None:
-    found = compare(blank, [hidden("link_expansion", 1.1)])
-    assert np.isnan(found.uncertainty.parameters_um).all()
-    assert found.as_json()["prediction_std_um"]["total"] is None
+    result = compare(blank, [hidden("link_expansion", 1.1)])
+    assert np.isnan(result.uncertainty.parameters_um).all()
+    assert result.as_json()["prediction_std_um"]["total"] is None
