@@ -1,18 +1,17 @@
-"""Arrays as the whole program names them in annotations, their shapes in the docstrings; their root mean square."""
+"""Array types for annotations (docstrings give the shapes), and their root mean square."""
 
 from __future__ import annotations
 
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 
-def rms(values: ArrayLike) -> float:
-    """Root mean square of all values; nan of none."""
-    array = np.asarray(values, dtype=float)
-    return float(np.sqrt(np.mean(np.square(array)))) if array.size else float("nan")
+def rms(values: FloatArray) -> float:
+    """Root of the mean square over all values; nan of none."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

@@ -1,4 +1,4 @@
-"""Time, injected: the program takes the monotonic clock, tests a clock that they turn by hand."""
+"""The clock that is passed to whatever needs the time: the monotonic one in the program, a simulated one in tests."""
 
 from __future__ import annotations
 

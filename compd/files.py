@@ -23,7 +23,8 @@ def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -
     Raises
     ------
     OSError
-        Where the disk refuses; the directories must exist.
+        Where the disk refuses; the directories must exist. Only after an error of the last step, the sync of the
+        directories, the new files are in place all the same.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Units: millimetres into micrometres, and the units at the end of column names with what converts them."""
+"""Units: the factor between millimetres and micrometres, and the units in which column names end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 UM_PER_MM = 1e3
 
 # Factor to the first unit of each kind (SI brochure, 9th edition; kgf and inch by definition).
-KINDS: tuple[Mapping[str, float], ...] = (
+UNIT_KINDS: tuple[Mapping[str, float], ...] = (
     {"mm": 1.0, "nm": 1e-6, "um": 1e-3, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4},
     {"s": 1.0, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0},
     {"rad": 1.0, "urad": 1e-6, "mrad": 1e-3, "deg": 0.017453292519943295, "arcsec": 4.84813681109536e-6},
@@ -22,52 +22,39 @@ _TEMPERATURES = {
     "F": "convert the values: (value - 32) / 1.8",
     "K": "convert the values: value - 273.15",
 }
-# Others that a covariate may end in; a name that ends in none of all these gets a warning, not a refusal.
+# Others that a covariate may end in; a name that ends in no unit of this module gets a warning, not a refusal.
 _OTHERS = (
-    "1",
-    "pct",
-    "ppm",
-    "V",
-    "mV",
-    "A",
-    "mA",
-    "W",
-    "Hz",
-    "kHz",
-    "rpm",
-    "Nm",
-    "g",
-    "kg",
-    "mm_per_s",
-    "um_per_m",
-    "m_per_s",
-    "m_per_s2",
-    "l_per_min",
-    "K_per_h",
-    "counts",
+    *("1", "pct", "ppm", "counts"),
+    *("V", "mV", "A", "mA", "W"),
+    *("Hz", "kHz", "rpm"),
+    *("Nm", "g", "kg"),
+    *("mm_per_s", "um_per_m", "m_per_s", "m_per_s2", "l_per_min", "K_per_h"),
 )
-KNOWN = frozenset([*(unit for kind in KINDS for unit in kind), *_TEMPERATURES, *_OTHERS])
+KNOWN_UNITS = frozenset([*(unit for kind in UNIT_KINDS for unit in kind), *_TEMPERATURES, *_OTHERS])
 
 
 def unit_of(name: str) -> str:
-    """The known unit that `name` ends in, the longest that fits; "" if none."""
-    fits = [unit for unit in KNOWN if name.endswith(f"_{unit}")]
-    return max(fits, key=len, default="")
+    """The longest known unit in which `name` ends; "" if it ends in none. Example: "flow_l_per_min" -> "l_per_min"."""
+    units = [unit for unit in KNOWN_UNITS if name.endswith(f"_{unit}")]
+    return max(units, key=len, default="")
 
 
-def factor(unit: str, wanted: str) -> float | None:
-    """What to multiply a value in `unit` by to have it in `wanted`; None where they measure different things."""
-    for kind in KINDS:
+def unit_factor(unit: str, wanted: str) -> float | None:
+    """The factor from values in `unit` to values in `wanted`; None where these are units of different kinds.
+
+    Example: "um" to "mm" is 1e-3. Temperatures are not converted by a factor: None.
+    """
+    for kind in UNIT_KINDS:
         if unit in kind and wanted in kind:
             return kind[unit] / kind[wanted]
     return None
 
 
-def conversion(unit: str, wanted: str) -> str:
-    """How a person turns values in `unit` into `wanted`, in words; "" where it cannot be said."""
+def conversion_text(unit: str, wanted: str) -> str:
+    """How a person converts values in `unit` into `wanted`, in words; "" where these are units of different kinds."""
     if wanted == "degC":
         return _TEMPERATURES.get(unit, "")
-    ratio = factor(unit, wanted)
+    ratio = unit_factor(unit, wanted)
     if ratio is None:
         return "the values stay" if (unit, wanted) == ("%", "pct") else ""
     if ratio == 1.0:

@@ -48,6 +48,7 @@ def campaign(
 
     from compd.configuration import load
     from compd.errors import CompdError, Problem
+    from compd.recording.ball_plate import write_plate
     from compd.recording.writer import write_recording
     from compd.simulation.campaign.plan_reader import read_plan
     from compd.simulation.campaign.simulated_recording import record
@@ -75,8 +76,7 @@ def campaign(
     recorded = record(configuration, seed, wanted, reference.value, plate.name, other_days, given)
     write_recording(path, recorded.columns, recorded.sidecar, overwrite)
     if recorded.balls_M is not None:
-        lines = [f"{k},{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(recorded.balls_M, 1)]
-        plate.write_text("\n".join(["ball,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
+        write_plate(plate, recorded.balls_M)
     answer = path.with_name(f"{path.stem}.answer.json")
     seal(answer, [one.cause for one in recorded.hidden], [one.floors for one in recorded.hidden], recorded.weak, seed)
     rows = len(recorded.columns["time_s"])

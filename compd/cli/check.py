@@ -16,7 +16,7 @@ def check(
 ) -> None:
     """Check a configuration; report every error at once, with file, line, key, value, what is allowed, next step."""
     if schema:
-        from compd.configuration.schema import schema as json_schema
+        from compd.configuration.schema import json_schema
 
         typer.echo(json.dumps(json_schema(), indent=2))
         return

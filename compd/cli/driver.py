@@ -86,7 +86,7 @@ def _print_table(name: str, found: list[tuple[str, Result]]) -> None:
 
 
 def _read_options(path: Path) -> dict[str, Any]:
-    from compd.configuration.document import read
+    from compd.configuration.document import read_document
 
-    data = read(path).data
+    data = read_document(path).data
     return {key: value for key, value in data.items() if key not in ("driver", "line")}

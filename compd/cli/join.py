@@ -38,14 +38,13 @@ def join(
 ) -> None:
     """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
     from compd.recording.instrument_export import read_track
-    from compd.recording.join import Instrument
-    from compd.recording.join import join as put_together
+    from compd.recording.join import Instrument, join_reference
     from compd.recording.reader import read_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
     recording = read_recording(gauges, needs_reference=False)
     track = read_track(export, {role: name for role, name in roles.items() if name is not None}, unit)
-    joined = put_together(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
+    joined = join_reference(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
     typer.echo(f"{export}: " + ", ".join(f"{role} from {name!r}" for role, name in track.names.items()))
     found = joined.offset
     if math.isnan(found.std_s):

@@ -85,11 +85,11 @@ def _name(declared: Declaration) -> str:
 
 def declaration_of(text: str) -> tuple[Declaration, Effect]:
     """What the person named, and the effect it stands for. Raises CompdError with every problem."""
-    from compd.configuration.document import read
+    from compd.configuration.document import read_document
     from compd.model.library import find_effect
 
     if Path(text).suffix in (".yaml", ".yml"):
-        declared = read(Path(text)).data
+        declared = read_document(Path(text)).data
         return declared, find_effect(declared, text)
     return text, find_effect(text, "compd effect add")
 

@@ -21,8 +21,7 @@ def merge(
     """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
     from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
-    from compd.recording.merge import ASSUMED_GAP_S
-    from compd.recording.merge import merge as put_together
+    from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
 
     if len(recordings) < 2:
         raise CompdError(
@@ -38,7 +37,7 @@ def merge(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
-    merged = put_together(found, path, overwrite)
+    merged = merge_recordings(found, path, overwrite)
     if not merged.gap_known:
         typer.echo(f"when each began is not recorded: {ASSUMED_GAP_S / 3600:g} h is put between them")
     each = ", ".join(f"{one.path} {rows}" for one, rows in zip(found, merged.rows, strict=True))

@@ -1,5 +1,5 @@
 """The machine configuration: written by a person, checked whole, never rewritten by the program."""
 
-from compd.configuration.load import Configuration, load
+from compd.configuration.machine_configuration import Configuration, load
 
 __all__ = ["Configuration", "load"]

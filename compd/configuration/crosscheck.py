@@ -1,4 +1,4 @@
-"""What no single section can know: does the wiring fit the gauges, the gauges the lines, the lines the ports?"""
+"""Checks across sections: the wiring against the gauges, the gauges against the lines, the lines against each other."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from compd.gauge import Gauge, GaugeOptions
 
 
 @dataclass(frozen=True)
-class Parts:
-    """The sections that could be read; None for those that could not."""
+class Sections:
+    """What could be read of a document; None, or left out of the mapping, where a section or a gauge has a problem.
+
+    gauges : options by name. drivers : the gauges' driver classes by name.
+    """
 
     document: Document
     geometry: Geometry | None
@@ -27,99 +30,108 @@ class Parts:
     wiring: Wiring | None
 
 
-def problems(parts: Parts) -> list[Problem]:
-    """Everything that contradicts; checks only what could be read."""
-    found = [*_ports(parts), *_gauges_on_lines(parts)]
-    if parts.wiring is not None:
-        found += [*_channels(parts, parts.wiring), *_completeness(parts, parts.wiring)]
-    return found
+def problems(sections: Sections) -> list[Problem]:
+    """Every contradiction between sections that could be read."""
+    contradictions = [*_port_problems(sections), *_line_problems(sections)]
+    if sections.wiring is not None:
+        contradictions += [
+            *_channel_problems(sections, sections.wiring),
+            *_completeness_problems(sections, sections.wiring),
+        ]
+    return contradictions
 
 
-def warnings(parts: Parts) -> list[Problem]:
-    """What works but is probably not meant."""
-    found: list[Problem] = []
-    used = {options.line for options in parts.gauges.values()}
-    found += [
+def warnings(sections: Sections) -> list[Problem]:
+    """What can be used but is probably a mistake: lines without gauges, gauges without wires."""
+    used_lines = {options.line for options in sections.gauges.values()}
+    unused = [
         Problem(
-            where=parts.document.where(("lines", name)),
+            where=sections.document.where(("lines", name)),
             what="no gauge uses this line",
             next_step="remove it or wire a gauge",
         )
-        for name in parts.lines or {}
-        if name not in used
+        for name in sections.lines or {}
+        if name not in used_lines
     ]
-    if parts.wiring is not None:
-        wired = {reference.split(".")[0] for _, reference, _ in _references(parts.wiring)}
-        found += [
+    if sections.wiring is not None:
+        wired_gauges = {channel.split(".")[0] for _, channel, _ in _wires(sections.wiring)}
+        unused += [
             Problem(
-                where=parts.document.where(("gauges", name)),
+                where=sections.document.where(("gauges", name)),
                 what="polled but wired to nothing",
                 next_step="name it under `wiring:` or remove it",
             )
-            for name in parts.gauges
-            if name not in wired
+            for name in sections.gauges
+            if name not in wired_gauges
         ]
-    return found
+    return unused
 
 
-def resolve(reference: str, gauges: Mapping[str, GaugeOptions], drivers: Mapping[str, type[Gauge[Any]]]) -> str | None:
-    """ "gauge" or "gauge.channel" -> "gauge.channel"; None if there is no such channel, or more than one fits."""
-    name, _, channel = reference.partition(".")
-    if name not in gauges:
+def resolve_channel(
+    channel: str, gauges: Mapping[str, GaugeOptions], drivers: Mapping[str, type[Gauge[Any]]]
+) -> str | None:
+    """The full name "gauge.channel" of a channel, which may be written "gauge" where the gauge has only one.
+
+    None if there is no such channel, or if several fit.
+    """
+    gauge, _, channel_name = channel.partition(".")
+    if gauge not in gauges:
         return None
-    channels = [c.name for c in drivers[name](gauges[name]).channels]
-    if not channel:
-        return f"{name}.{channels[0]}" if len(channels) == 1 else None
-    return reference if channel in channels else None
+    names = [channel.name for channel in drivers[gauge](gauges[gauge]).channels]
+    if not channel_name:
+        return f"{gauge}.{names[0]}" if len(names) == 1 else None
+    return channel if channel_name in names else None
 
 
-def _ports(parts: Parts) -> Iterator[Problem]:
-    seen: dict[str, str] = {}
-    for name, line in (parts.lines or {}).items():
+def _port_problems(sections: Sections) -> Iterator[Problem]:
+    """A port that two lines name."""
+    line_of_port: dict[str, str] = {}
+    for name, line in (sections.lines or {}).items():
         match line:
             case SerialLine() | ModbusRtuLine():
                 port = line.port
             case TcpLine() | ModbusTcpLine():
                 port = f"{line.host}:{line.port}"
-        if port in seen:
+        if port in line_of_port:
             yield Problem(
-                where=parts.document.where(("lines", name, "port")),
-                what=f"line `{seen[port]}` has the same port",
+                where=sections.document.where(("lines", name, "port")),
+                what=f"line `{line_of_port[port]}` has the same port",
                 value=port,
                 allowed="one line per port",
                 next_step="hang both gauges on one line",
             )
-        seen[port] = name
+        line_of_port[port] = name
 
 
-def _gauges_on_lines(parts: Parts) -> Iterator[Problem]:
-    if parts.lines is None:
+def _line_problems(sections: Sections) -> Iterator[Problem]:
+    """A gauge whose line does not exist, or carries registers where the driver needs bytes or the other way round."""
+    if sections.lines is None:
         return
-    for name, options in parts.gauges.items():
+    for name, options in sections.gauges.items():
         location: Location = ("gauges", name, "line")
-        line = parts.lines.get(options.line)
+        line = sections.lines.get(options.line)
         if line is None:
-            if options.line not in (parts.document.data.get("lines") or {}):
+            if options.line not in (sections.document.data.get("lines") or {}):
                 yield Problem(
-                    where=parts.document.where(location),
+                    where=sections.document.where(location),
                     what="no such line",
                     value=options.line,
-                    allowed=", ".join(parts.lines),
+                    allowed=", ".join(sections.lines),
                     next_step="write the name of a line under `lines:`",
                 )
             continue
         carries: Literal["bytes", "registers"] = "registers" if line.kind.startswith("modbus") else "bytes"
-        if carries != parts.drivers[name].line_kind:
+        if carries != sections.drivers[name].line_kind:
             yield Problem(
-                where=parts.document.where(location),
-                what=f"driver {options.driver} needs a line that carries {parts.drivers[name].line_kind}",
+                where=sections.document.where(location),
+                what=f"driver {options.driver} needs a line that carries {sections.drivers[name].line_kind}",
                 value=f"{options.line} (kind {line.kind})",
                 allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
 
 
-def _references(wiring: Wiring) -> Iterator[tuple[Location, str, str]]:
-    """Every wire: where it stands, the gauge it names, the unit it must have."""
+def _wires(wiring: Wiring) -> Iterator[tuple[Location, str, str]]:
+    """Every wire: its location in the document, the channel that it names, the unit that it must have."""
     for kind in ("scale", "joint", "frame"):
         for i, wire in enumerate(getattr(wiring, kind)):
             yield ("wiring", kind, i, "gauge"), wire.gauge, "mm"
@@ -127,48 +139,50 @@ def _references(wiring: Wiring) -> Iterator[tuple[Location, str, str]]:
         yield ("wiring", "quantities", i, "gauge"), quantity.gauge, quantity.name.rsplit("_", 1)[1]
 
 
-def _channels(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
-    seen: dict[str, Location] = {}
-    written = parts.document.data.get("gauges") or {}
-    for location, reference, unit in _references(wiring):
-        name = reference.split(".")[0]
-        where = parts.document.where(location)
-        if name not in parts.gauges:
-            if name not in written:  # a gauge with a problem of its own is reported there
+def _channel_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
+    """A wire whose channel does not exist, has another unit, or is wired already."""
+    location_of_channel: dict[str, Location] = {}
+    gauges_in_file = sections.document.data.get("gauges") or {}
+    for location, channel, unit in _wires(wiring):
+        name = channel.split(".")[0]
+        where = sections.document.where(location)
+        if name not in sections.gauges:
+            if name not in gauges_in_file:  # a gauge with a problem of its own is reported already
                 yield Problem(
                     where=where,
                     what="no such gauge",
-                    value=reference,
-                    allowed=", ".join(written),
+                    value=channel,
+                    allowed=", ".join(gauges_in_file),
                     next_step="write a name under `gauges:`",
                 )
             continue
-        channels = {c.name: c.unit for c in parts.drivers[name](parts.gauges[name]).channels}
-        full = resolve(reference, parts.gauges, parts.drivers)
-        if full is None:
+        units = {channel.name: channel.unit for channel in sections.drivers[name](sections.gauges[name]).channels}
+        full_name = resolve_channel(channel, sections.gauges, sections.drivers)
+        if full_name is None:
             yield Problem(
                 where=where,
                 what=f"gauge `{name}` has no such single channel",
-                value=reference,
-                allowed=", ".join(f"{name}.{channel}" for channel in channels),
+                value=channel,
+                allowed=", ".join(f"{name}.{channel_name}" for channel_name in units),
                 next_step="write gauge.channel",
             )
             continue
-        delivers = channels[full.split(".")[1]]
+        delivers = units[full_name.split(".")[1]]
         if delivers != unit:
-            yield Problem(where=where, what=f"needs a gauge in {unit}, this one delivers {delivers}", value=reference)
-        if full in seen:
+            yield Problem(where=where, what=f"needs a gauge in {unit}, this one delivers {delivers}", value=channel)
+        if full_name in location_of_channel:
             yield Problem(
                 where=where,
-                what=f"wired already at {parts.document.where(seen[full])}",
-                value=reference,
+                what=f"wired already at {sections.document.where(location_of_channel[full_name])}",
+                value=channel,
                 allowed="each channel once",
             )
-        seen[full] = location
+        location_of_channel[full_name] = location
 
 
-def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
-    where = parts.document.where
+def _completeness_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
+    """Frame distances, quantities, scales and joint comparators that are wired too rarely or too often."""
+    where = sections.document.where
     counts: Counter[str] = Counter(wire.distance for wire in wiring.frame)
     for distance in FRAME_DISTANCES:
         if counts[distance] != 1:
@@ -183,9 +197,9 @@ def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
             yield Problem(
                 where=where(("wiring", "quantities")), what=f"{name} is wired {count} times", allowed="each name once"
             )
-    if parts.geometry is None:
+    if sections.geometry is None:
         return
-    links = parts.geometry.links
+    links = sections.geometry.links
     scales = Counter(wire.link for wire in wiring.scale)
     for link in sorted({*range(1, links + 1), *scales}):
         if scales[link] != (1 if link <= links else 0):
@@ -194,10 +208,10 @@ def _completeness(parts: Parts, wiring: Wiring) -> Iterator[Problem]:
                 what=f"link {link} has {scales[link]} scales",
                 allowed=f"links 1..{links}, each exactly one",
             )
-    by_link: dict[int, list[JointWire]] = defaultdict(list)
+    joints_by_link: dict[int, list[JointWire]] = defaultdict(list)
     for wire in wiring.joint:
-        by_link[wire.link].append(wire)
-    for link, wires in sorted(by_link.items()):
+        joints_by_link[wire.link].append(wire)
+    for link, wires in sorted(joints_by_link.items()):
         roles = Counter(wire.role for wire in wires)
         if link > links:
             yield Problem(where=where(("wiring", "joint")), what=f"there is no link {link}", allowed=f"1..{links}")

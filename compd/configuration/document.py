@@ -1,4 +1,4 @@
-"""A YAML document with the line of every key, so that an error can point at it."""
+"""A YAML document with the line of every key, so that a problem can name it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Location = tuple[str | int, ...]
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML 1.2 scalars: `on` is a word, 1e-6 a number."""
+    """A loader with the scalars of YAML 1.2: `on` is a word, 1e-6 a number."""
 
 
 _Loader.yaml_implicit_resolvers = {
@@ -37,7 +37,10 @@ _Loader.add_implicit_resolver(
 
 @dataclass(frozen=True)
 class Document:
-    """Parsed YAML: plain data, and the 1-based line of every location in it."""
+    """Parsed YAML.
+
+    data : the top level's keys and values. lines : location -> line, from 1.
+    """
 
     path: Path
     data: dict[str, Any]
@@ -51,14 +54,14 @@ class Document:
         return f"{self.path} {dotted(location)}".rstrip()
 
     def value(self, location: Location) -> Any:
-        """What the file says at `location`; None where it says nothing."""
-        found: Any = self.data
+        """The value at `location`; None where the file has none."""
+        value: Any = self.data
         for part in location:
             try:
-                found = found[part]
+                value = value[part]
             except (KeyError, IndexError, TypeError):
                 return None
-        return found
+        return value
 
 
 def dotted(location: Location) -> str:
@@ -69,8 +72,11 @@ def dotted(location: Location) -> str:
     return text
 
 
-def read(path: Path) -> Document:
-    """Read a configuration; ConfigurationError for a file that is missing, not YAML, or says a key twice."""
+def read_document(path: Path) -> Document:
+    """Read a YAML file of sections: a configuration, a sidecar, a preset.
+
+    Raises ConfigurationError for a file that is missing, is not YAML, or has a key twice.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -109,7 +115,7 @@ def _plain(
     problems: list[Problem],
     path: Path,
 ) -> Any:
-    """Data below `node`; notes the line of every key, and keys said twice."""
+    """Data below `node`; the line of every key goes to `lines`, keys that come twice to `problems`."""
     lines.setdefault(location, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         result: dict[Any, Any] = {}

@@ -9,22 +9,22 @@ from pydantic import AfterValidator, Field, model_validator
 
 from compd.configuration.section import Number, Positive, Section
 
-# Coordinates in a drawing are given to 1 nm at best; a frame that misses its convention by more was
-# measured or typed wrongly.
+# A drawing gives coordinates to 1 nm at best: a frame that misses its convention by more was measured or typed wrongly.
 CONVENTION_TOLERANCE_MM = 1e-6
 
 
 Vector = tuple[Number, Number, Number]
 
 
-def _direction(vector: Vector) -> Vector:
+def _unit_vector(vector: Vector) -> Vector:
+    """The vector itself; ValueError where its length is not 1."""
     length = math.hypot(*vector)
     if not math.isclose(length, 1.0, abs_tol=1e-6):
         raise ValueError(f"must have length 1, has {length:.9g}")
     return vector
 
 
-Direction = Annotated[Vector, AfterValidator(_direction)]
+Direction = Annotated[Vector, AfterValidator(_unit_vector)]
 
 
 class BasePlatform(Section):
@@ -45,6 +45,7 @@ class BasePlatform(Section):
 
     @model_validator(mode="after")
     def _frame_convention(self) -> Self:
+        """Check that {B} is the frame of its supports: origin at their centroid, z_B their normal, y_B towards b1."""
         b1, b2, b3 = self.supports_B_mm
         for axis in range(3):
             mean = (b1[axis] + b2[axis] + b3[axis]) / 3
@@ -118,16 +119,17 @@ class Geometry(Section):
         return 3 if self.kinematics == "tripod_3spr" else 6
 
     @model_validator(mode="after")
-    def _counts(self) -> Self:
+    def _one_entry_per_link(self) -> Self:
+        """Check the number of joints and axes against the number of links, and what a tripod cannot have."""
         n = self.links
         counts = {
             "base.joints_B_mm": len(self.base.joints_B_mm),
             "platform.joints_P_mm": len(self.platform.joints_P_mm),
             "platform.revolute_axes_P": len(self.platform.revolute_axes_P),
         }
-        wanted = {**dict.fromkeys(counts, n), "platform.revolute_axes_P": n if n == 3 else 0}
+        needed = {**dict.fromkeys(counts, n), "platform.revolute_axes_P": n if n == 3 else 0}
         wrong = [
-            f"{key} has {counts[key]} entries, needs {wanted[key]}" for key in counts if counts[key] != wanted[key]
+            f"{key} has {counts[key]} entries, needs {needed[key]}" for key in counts if counts[key] != needed[key]
         ]
         if wrong:
             raise ValueError(f"{self.kinematics}: " + "; ".join(wrong))

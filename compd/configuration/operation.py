@@ -1,4 +1,4 @@
-"""How the daemon runs: wiring, loop, limits, sockets, state."""
+"""Sections on how the daemon runs: wiring, loop, limits, sockets, state."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class QuantityWire(Section):
 
 
 class Wiring(Section):
-    """From gauges to the machine's quantities."""
+    """Which gauge measures which quantity of the machine."""
 
     scale: tuple[ScaleWire, ...]
     joint: tuple[JointWire, ...]

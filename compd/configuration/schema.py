@@ -1,4 +1,4 @@
-"""A JSON Schema for editors, from the same models that check the file."""
+"""The JSON Schema of a configuration, for editors, from the same models that validate the file."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from compd.configuration.load import SECTIONS
+from compd.configuration.machine_configuration import SECTIONS
 from compd.plugins import GAUGES, load, names
 
 
-def schema() -> dict[str, Any]:
+def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a configuration, with the options of every installed driver."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = {}
@@ -39,7 +39,7 @@ def schema() -> dict[str, Any]:
 
 
 def _collect(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    """One model's schema; what it defines goes to the common place."""
+    """The schema of one model or type; its own definitions go to `definitions`."""
     part = TypeAdapter(kind).json_schema(ref_template="#/$defs/{model}")
     definitions.update(part.pop("$defs", {}))
     return part

@@ -1,4 +1,4 @@
-"""Where the configurations that come with compd are: in the checkout, or inside the installed package."""
+"""The configurations that come with compd, in the checkout or inside the installed package."""
 
 from __future__ import annotations
 

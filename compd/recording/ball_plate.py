@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem
+from compd.files import write_files
 from compd.recording.csv_table import CsvTable, read_table
 from compd.recording.problem_list import ProblemList, rows_text, values_text
 
@@ -16,36 +17,49 @@ _COLUMNS = ("ball", "x_mm", "y_mm", "z_mm")
 
 
 class BallPlate(NamedTuple):
-    """number (B,) int, each once; position_mm (B, 3) in the plate's own frame; the file's path and bytes."""
+    """A plate's calibration.
+
+    path, content : the file and its bytes. number : (B,) int, each once. position_mm : (B, 3) in the plate's own frame.
+    """
 
     path: Path
     content: bytes
     number: IntArray
     position_mm: FloatArray
 
-    def places_mm(self, ball: IntArray) -> FloatArray:
-        """(N, 3) calibrated place of the balls `ball` (N,); nan for -1, no ball. Numbers must be the plate's."""
+    def positions_of_mm(self, ball: IntArray) -> FloatArray:
+        """(N, 3) calibrated position of the balls numbered `ball` (N,); nan for -1, no ball.
+
+        Other numbers must be the plate's.
+        """
         order = np.argsort(self.number)
         index = order[np.searchsorted(self.number, ball, sorter=order).clip(max=len(order) - 1)]
         return np.where((ball >= 0)[:, None], self.position_mm[index], np.nan)
 
 
 def read_plate(path: Path, problems: list[Problem]) -> BallPlate | None:
-    """Read a plate's file: every cell filled, every ball once; what is wrong goes to `problems`."""
-    faults = ProblemList(path)
-    table = read_table(path, faults, lambda cells: "ball" in cells or "x_mm" in cells)
+    """Read a plate's file: every cell filled, every ball once. None with something wrong, which goes to `problems`."""
+    table_problems = ProblemList(path)
+    table = read_table(path, table_problems, lambda cells: "ball" in cells or "x_mm" in cells)
     if table is not None:
-        _check(table, faults)
-    problems += faults.problems
-    if table is None or faults.problems:
+        _check(table, table_problems)
+    problems += table_problems.problems
+    if table is None or table_problems.problems:
         return None
     number = table.columns["ball"].astype(np.int64)
     return BallPlate(path, table.content, number, np.column_stack([table.columns[name] for name in _COLUMNS[1:]]))
 
 
-def _check(table: CsvTable, faults: ProblemList) -> None:
+def write_plate(path: Path, position_mm: FloatArray) -> None:
+    """Write a plate's file: balls 1 to B at `position_mm` (B, 3), to 0.1 um. Raises OSError."""
+    lines = [f"{number},{x:.4f},{y:.4f},{z:.4f}" for number, (x, y, z) in enumerate(position_mm, 1)]
+    write_files({path: "\n".join([",".join(_COLUMNS), *lines]) + "\n"})
+
+
+def _check(table: CsvTable, problems: ProblemList) -> None:
+    """Columns, cells and numbers of a plate's file."""
     if set(table.letters) != set(_COLUMNS):
-        faults.add(
+        problems.add(
             "",
             f"has the columns {', '.join(table.letters)}",
             allowed=", ".join(_COLUMNS),
@@ -53,25 +67,25 @@ def _check(table: CsvTable, faults: ProblemList) -> None:
         )
         return
     if not len(table.row):
-        faults.add("", "names no ball", next_step="add the calibrated places")
-    for name in () if faults.problems else _COLUMNS:
+        problems.add("", "names no ball", next_step="add the calibrated places")
+    for name in () if problems.problems else _COLUMNS:
         values = table.columns[name]
         wrong = np.isnan(values) | ((values != np.round(values)) & (name == "ball"))
         if wrong.any():
             what = "empty, or not a whole number" if name == "ball" else "empty"
-            faults.add(
+            problems.add(
                 f"{table.place(name)}, {rows_text(table.row[wrong].tolist())}", what, allowed="a value in every row"
             )
     number, count = np.unique(table.columns["ball"], return_counts=True)
-    for twice in number[count > 1]:
-        faults.add(table.place("ball"), f"ball {twice:g} comes twice", next_step="keep one")
+    for repeated in number[count > 1]:
+        problems.add(table.place("ball"), f"ball {repeated:g} comes twice", next_step="keep one")
 
 
-def check_balls(table: CsvTable, plate: BallPlate, faults: ProblemList) -> None:
+def check_balls(table: CsvTable, plate: BallPlate, problems: ProblemList) -> None:
     """Every ball that a recording names must be on the plate."""
     ball = table.columns["ball"]
     unknown = ~np.isnan(ball) & ~np.isin(ball, plate.number)
     if unknown.any():
         place = f"{table.place('ball')}, {rows_text(table.row[unknown].tolist())}"
         values = values_text(f"{number:g}" for number in np.unique(ball[unknown]))
-        faults.add(place, "no such ball on the plate", values, f"a ball of {plate.path}")
+        problems.add(place, "no such ball on the plate", values, f"a ball of {plate.path}")

@@ -1,4 +1,4 @@
-"""What the numbers of a recording say: rules that they must keep, and limits beyond which a person should look."""
+"""Checks of a recording's numbers: rules that they must keep, and limits beyond which a person should look."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ _ROOM_DEGC = (0.0, 50.0)
 _SMALLEST_JOINT_UM = 0.05
 
 
-def check_values(table: CsvTable, faults: ProblemList) -> None:
-    """Rules first (problems), then limits (warnings)."""
+def check_values(table: CsvTable, problems: ProblemList) -> None:
+    """Check every column: rules first (problems), then plausible limits (warnings)."""
     if "time_s" in table.columns:
-        _check_time(table, faults)
+        _check_time(table, problems)
     for name in ID_COLUMNS:
         if name in table.columns and name not in table.labels:
             values = table.columns[name]
             wrong = ~np.isnan(values) & ((values != np.round(values)) | (values < 0) | (np.abs(values) > 2**53))
-            _report(table, name, wrong, faults, "not a whole number", "0, 1, 2, ...", "number them")
+            _report(table, name, wrong, problems, "not a whole number", "0, 1, 2, ...", "number them")
     for name, values in table.columns.items():
         if re.fullmatch(r"approach_\d+", name):
             wrong = ~np.isnan(values) & (np.abs(values) != 1.0)
@@ -50,61 +50,62 @@ def check_values(table: CsvTable, faults: ProblemList) -> None:
                 table,
                 name,
                 wrong,
-                faults,
+                problems,
                 "not a direction",
                 "1 or -1, or an empty cell where it is not known",
                 "write the direction in which the link last moved",
             )
-    _check_limits(table, faults)
+    _check_limits(table, problems)
 
 
-def check_rows(table: CsvTable, excluded: BoolArray, needed: Iterable[str], faults: ProblemList) -> None:
+def check_rows(table: CsvTable, excluded: BoolArray, needed: Iterable[str], problems: ProblemList) -> None:
     """At least two rows must have everything; otherwise say where they went.
 
-    A cell that was reported as wrong counts as filled: one mistake is told once.
+    A cell that was reported as wrong counts as filled, so that one mistake is reported once.
     """
     rows = len(table.row)
     if rows < 2:
-        faults.add(
+        problems.add(
             "",
             "no rows" if rows == 0 else "only one row",
             allowed="two rows or more",
             next_step="record more, or give the right file",
         )
         return
-    left = ~excluded
+    usable = ~excluded
     reasons = [f"{int(excluded.sum())} excluded in the sidecar"] if excluded.any() else []
     for name in needed:
         if name in table.wrong:
             continue
-        empty = left & np.isnan(table.columns[name])
+        empty = usable & np.isnan(table.columns[name])
         if empty.any():
             reasons.append(f"{int(empty.sum())} without {name}")
-            left &= ~empty
-    if left.sum() < 2:
-        faults.add(
+            usable &= ~empty
+    if usable.sum() < 2:
+        problems.add(
             "",
-            f"{'no' if not left.any() else 'only one'} row of {rows} can be used: {', '.join(reasons)}",
+            f"{'no' if not usable.any() else 'only one'} row of {rows} can be used: {', '.join(reasons)}",
             allowed="two rows or more",
             next_step="fill these columns, or delete those that were not measured",
         )
 
 
-def _check_time(table: CsvTable, faults: ProblemList) -> None:
+def _check_time(table: CsvTable, problems: ProblemList) -> None:
     """time_s rises: a row that is not later than the one above is reported, backwards and repeated apart."""
-    there = np.flatnonzero(~np.isnan(table.columns["time_s"]))
-    time_s = table.columns["time_s"][there]
+    with_time = np.flatnonzero(~np.isnan(table.columns["time_s"]))
+    time_s = table.columns["time_s"][with_time]
     step = np.diff(time_s)
     for wrong, what, mend in (
         (step < 0, "time runs backwards", "sort the rows, or let the clock run on where sessions were put together"),
         (step == 0, "the same time as the row above", "write more decimals, or delete the repeated row"),
     ):
         rows = np.zeros(len(table.row), dtype=bool)
-        rows[there[1:][wrong]] = True
-        _report(table, "time_s", rows, faults, what, "later than the row above", mend)
+        rows[with_time[1:][wrong]] = True
+        _report(table, "time_s", rows, problems, what, "later than the row above", mend)
 
 
-def _check_limits(table: CsvTable, faults: ProblemList) -> None:
+def _check_limits(table: CsvTable, problems: ProblemList) -> None:
+    """Warn of values that are implausible for their unit; the values are used all the same."""
     for name, values in table.columns.items():
         for pattern, low, high, why in _LIMITS:
             if pattern.fullmatch(name):
@@ -115,7 +116,7 @@ def _check_limits(table: CsvTable, faults: ProblemList) -> None:
                     table,
                     name,
                     strange,
-                    faults,
+                    problems,
                     "implausible for its unit",
                     f"{least:g} to {most:g}: {why}",
                     "look; it is used as it stands",
@@ -125,7 +126,7 @@ def _check_limits(table: CsvTable, faults: ProblemList) -> None:
     joints = [values for name, values in table.columns.items() if re.fullmatch(r"joint_\d+_um", name)]
     largest = max((float(np.nanmax(np.abs(v))) for v in joints if not np.isnan(v).all()), default=0.0)
     if 0 < largest < _SMALLEST_JOINT_UM:
-        faults.warn(
+        problems.warn(
             "columns joint_<k>_um",
             "no joint comparator ever moves by what it can resolve",
             f"{largest:g} um",
@@ -137,7 +138,7 @@ def _report(
     table: CsvTable,
     name: str,
     wrong: BoolArray,
-    faults: ProblemList,
+    problems: ProblemList,
     what: str,
     allowed: str,
     next_step: str,
@@ -149,9 +150,9 @@ def _report(
     rows: IntArray = table.row[wrong]
     values: FloatArray = table.columns[name][wrong]
     place = f"{table.place(name)}, {rows_text(rows.tolist())}"
-    say = faults.warn if warn else faults.add
-    say(place, what, _shown(values.tolist()), allowed, next_step)
+    report = problems.warn if warn else problems.add
+    report(place, what, _values_shown(values.tolist()), allowed, next_step)
 
 
-def _shown(values: Sequence[float]) -> str:
+def _values_shown(values: Sequence[float]) -> str:
     return values_text(f"{value:.10g}" for value in values)

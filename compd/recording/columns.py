@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
-from compd.units import KNOWN, conversion, unit_of
+from compd.units import KNOWN_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
@@ -41,7 +41,7 @@ _STEMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"humidity", "pct"),
     )
 )
-# A name that begins like a column of the format but is none would else slip in as a covariate.
+# A name that begins like a column of the format but is none: probably misspelt, so no covariate.
 _RESERVED = re.compile(
     r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
     r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
@@ -50,8 +50,8 @@ _COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")
 _COMMON = ("time_s", *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
 
 
-class Name(NamedTuple):
-    """What the format knows of a name: its stem ("scale_1") and unit ("mm"); the stem is "" for a covariate."""
+class ColumnName(NamedTuple):
+    """The parts of a column's name: stem ("scale_1") and unit ("mm", or "" for a column without unit)."""
 
     stem: str
     unit: str
@@ -79,7 +79,7 @@ def link_reference_column(link: int) -> str:
 
 def decimals(name: str) -> int | None:
     """How many decimals the column `name` is rounded to when it is written; None: written in full."""
-    column = known(name)
+    column = parse_name(name)
     return DECIMALS.get(column.unit if column else unit_of(name))
 
 
@@ -88,35 +88,38 @@ def number_text(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
-def known(name: str) -> Name | None:
-    """The column of the format that `name` is, exactly; None for every other name."""
+def parse_name(name: str) -> ColumnName | None:
+    """The parts of a name that is exactly a column of the format; None for every other name."""
     for pattern, unit in _STEMS:
         stem = name.removesuffix(f"_{unit}") if unit else name
         if (stem != name or not unit) and pattern.fullmatch(stem):
-            return Name(stem, unit)
+            return ColumnName(stem, unit)
     return None
 
 
 def is_covariate(name: str) -> bool:
-    """Whether the format takes `name` as anything else that was measured: <name>_<unit>."""
-    return not _RESERVED.match(name) and bool(_COVARIATE.fullmatch(name)) and mended(name) in (None, name)
+    """Whether `name` may stand for anything else that was measured: <name>_<unit>, unlike any column of the format."""
+    return not _RESERVED.match(name) and bool(_COVARIATE.fullmatch(name)) and intended_column(name) in (None, name)
 
 
 def is_header(cells: Sequence[str]) -> bool:
-    """Whether these cells are a recording's header: time, or most of the names, even if written wrongly."""
+    """Whether these cells are a recording's header: they name the time or, rightly or wrongly spelt, mostly columns."""
     filled = [cell for cell in cells if cell]
-    understood = [mended(cell) for cell in filled]
-    return "time_s" in understood or sum(name is not None for name in understood) * 2 > max(2, len(filled))
+    intended = [intended_column(cell) for cell in filled]
+    return "time_s" in intended or sum(name is not None for name in intended) * 2 > max(2, len(filled))
 
 
-def mended(name: str) -> str | None:
-    """The column of the format that a person most probably meant by `name`; None where there is none."""
-    if known(name):
+def intended_column(name: str) -> str | None:
+    """The column of the format that a person most probably meant by `name`; None where there is none.
+
+    Example: "Scale 01 [um]" -> "scale_1_mm", "Temp room °C" -> "temperature_room_degC".
+    """
+    if parse_name(name):
         return name
     tidy = name.strip().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u").replace("%", "pct")
     tidy = re.sub(r"[^A-Za-z0-9]+", "_", tidy).strip("_")
     tidy = re.sub(r"_0+(?=[1-9])", "_", tidy)
-    for unit in sorted(["", *KNOWN], key=len, reverse=True):
+    for unit in sorted(["", *KNOWN_UNITS], key=len, reverse=True):
         if unit and not tidy.lower().endswith(f"_{unit.lower()}"):
             continue
         stem = tidy[: -len(unit) - 1] if unit else tidy
@@ -131,22 +134,23 @@ def mended(name: str) -> str | None:
 
 
 def _convertible(unit: str, right: str) -> bool:
-    return right == "degC" or bool(conversion(unit, right)) or unit == "1"
+    """Whether values in `unit` can be meant for a column in `right`; any unit can for a temperature."""
+    return right == "degC" or bool(conversion_text(unit, right)) or unit == "1"
 
 
-def rename(table: CsvTable, faults: ProblemList) -> CsvTable:
+def correct_names(table: CsvTable, problems: ProblemList) -> CsvTable:
     """The table with the names that were meant; every name that is not the format's own is reported.
 
-    A mended name is a problem all the same: its values may be in another unit. It only keeps the same mistake
-    from being reported again as a missing column.
+    A corrected name is a problem all the same: its values may be in another unit. It is corrected so that the same
+    mistake is not reported again as a missing column.
     """
     names: dict[str, str] = {}
     for name in table.letters:
-        meant = mended(name)
+        meant = intended_column(name)
         if meant == name or (meant is None and is_covariate(name)):
             names[name] = name
             if meant is None and not unit_of(name):
-                faults.warn(
+                problems.warn(
                     table.place(name),
                     "ends in no unit that is known",
                     name.rsplit("_", 1)[-1],
@@ -154,11 +158,11 @@ def rename(table: CsvTable, faults: ProblemList) -> CsvTable:
                     "kept as it is; check the name",
                 )
         elif meant is not None:
-            faults.add(table.place(name), *_wrong_name(name, meant))
+            problems.add(table.place(name), *_wrong_name(name, meant))
             if meant not in table.letters:
                 names[name] = meant
         else:
-            faults.add(
+            problems.add(
                 table.place(name),
                 "no column of the format",
                 name,
@@ -179,12 +183,12 @@ def rename(table: CsvTable, faults: ProblemList) -> CsvTable:
 
 def _wrong_name(name: str, meant: str) -> tuple[str, str, str, str]:
     """(what, value, allowed, next step) of a name that is nearly a column of the format."""
-    right = known(meant)
+    right = parse_name(meant)
     wanted = right.unit if right else ""
     unit = unit_of(name)
     if wanted and not unit and name == meant.removesuffix(f"_{wanted}"):
         return "has no unit in its name", name, meant, f"name it {meant} if the values are in {wanted}"
     if unit and wanted and unit != wanted:
-        how = conversion(unit, wanted) or f"give the values in {wanted}"
+        how = conversion_text(unit, wanted) or f"give the values in {wanted}"
         return f"is in {unit} by its name", name, meant, f"{how}, and name it {meant}"
     return "is not spelt as the format spells it", name, meant, f"name it {meant}"

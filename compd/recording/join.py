@@ -1,4 +1,4 @@
-"""Putting an instrument's export beside a recording of gauges: one clock, one table."""
+"""Joining a recording of gauges and an instrument's export into one recording with a reference, on one clock."""
 
 from __future__ import annotations
 
@@ -11,30 +11,35 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.clock_offset import Offset, agreement_at, estimate_offset
+from compd.recording.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.recording.columns import link_reference_column
 from compd.recording.instrument_export import LENGTH, Track
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Frame, sidecar_contents
 from compd.recording.writer import write_recording
 
-# The machine stands still where the instrument sees less than this, or less than its own noise can feign.
+# The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
 STILL_MM = 0.001
 _NOISE_SIGMAS = 6.0
-# Samples further apart than this many periods leave a gap that nothing is read from.
+# Between samples further apart than this many periods nothing is interpolated.
 _GAP_PERIODS = 5.0
-_LOOKS = 9
+# Instants around a row at which the instrument's position is compared with that of the row itself.
+_INSTANTS = 9
 
 
 @dataclass(frozen=True)
-class Joined:
-    """What `join` wrote.
+class JoinResult:
+    """What `join_reference` wrote.
 
-    matched : rows that have a reference now. left_out : reason -> rows without one. still_mm : the limit used.
+    Attributes
+    ----------
+    path : the CSV file. offset : between the clocks.
+    matched : rows that have a reference now. left_out : reason -> rows without one.
+    still_mm : motion above which a row counts as in motion.
     """
 
     path: Path
-    offset: Offset
+    offset: ClockOffset
     matched: int
     left_out: Mapping[str, int]
     still_mm: float
@@ -42,29 +47,40 @@ class Joined:
 
 @dataclass(frozen=True)
 class Instrument:
-    """What a person knows of the instrument: frame of its x, y, z; standard uncertainty in um, or None; and, for
-    a length, the link that it measures (1-based)."""
+    """What a person states about the instrument.
+
+    Attributes
+    ----------
+    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None where it is not known.
+    link : for a length, the link that it measures (1-based).
+    """
 
     frame: Frame = "instrument"
     sigma_um: float | None = None
     link: int | None = None
 
 
-def join(
+def join_reference(
     recording: Recording,
     track: Track,
     out: Path,
     instrument: Instrument,
     offset_s: float | None = None,
     moving: bool = False,
-) -> Joined:
-    """Write `out` (NAME.csv and NAME.yaml): the recording's columns and the reference beside them.
+) -> JoinResult:
+    """Write `out` (NAME.csv and NAME.yaml): the recording's columns, and the reference in further columns.
 
+    Parameters
+    ----------
+    recording : of gauges alone. track : the instrument's export.
     offset_s : recording time = instrument time + offset_s; estimated from the motion when None.
     moving : take the reference in motion too; without it, only where the machine stands still for as long as
         the offset is uncertain. Elsewhere the cells stay empty.
 
-    Raises RecordingError where the offset cannot be told, no row matches, or the files cannot be written.
+    Raises
+    ------
+    RecordingError
+        Where the offset cannot be estimated, no row matches, or the files cannot be written.
     """
     problems = _problems(recording, track, instrument)
     if problems or recording.scale_mm is None:
@@ -72,15 +88,17 @@ def join(
     if offset_s is None:
         offset = estimate_offset(recording.time_s, recording.scale_mm, track)
     else:
-        offset = agreement_at(recording.time_s, recording.scale_mm, track, offset_s)
+        offset = evaluate_offset(recording.time_s, recording.scale_mm, track, offset_s)
     still_mm = max(STILL_MM, _NOISE_SIGMAS * track.noise_mm)
-    reference_mm, left_out = _matched(recording.time_s - offset.offset_s, track, offset, np.inf if moving else still_mm)
+    reference_mm, left_out = _reference_at_rows(
+        recording.time_s - offset.offset_s, track, offset, np.inf if moving else still_mm
+    )
     matched = int(np.isfinite(reference_mm).all(axis=1).sum())
     if not matched:
         raise RecordingError(
             Problem(
                 where=str(track.path),
-                what=f"no row matches at an offset of {offset.offset_s:.3f} s: {_told(left_out)}",
+                what=f"no row matches at an offset of {offset.offset_s:.3f} s: {_counts_text(left_out)}",
                 next_step="check the offset; rows in motion are taken with --moving",
             )
         )
@@ -90,7 +108,7 @@ def join(
     ]
     columns = {**recording.columns, **dict(zip(names, reference_mm.T, strict=True))}
     write_recording(out, columns, _sidecar(recording, track, instrument, offset, matched))
-    return Joined(out, offset, matched, left_out, still_mm)
+    return JoinResult(out, offset, matched, left_out, still_mm)
 
 
 def _problems(recording: Recording, track: Track, instrument: Instrument) -> list[Problem]:
@@ -142,17 +160,19 @@ def _problems(recording: Recording, track: Track, instrument: Instrument) -> lis
     return problems
 
 
-def _matched(time_s: FloatArray, track: Track, offset: Offset, still_mm: float) -> tuple[FloatArray, Mapping[str, int]]:
-    """(N, d) position at the instrument's times, nan in gaps and in motion; and why how many rows have none."""
+def _reference_at_rows(
+    time_s: FloatArray, track: Track, offset: ClockOffset, still_mm: float
+) -> tuple[FloatArray, Mapping[str, int]]:
+    """(N, d) position at times of the instrument's clock, nan in gaps and in motion; and reason -> rows without one."""
     after = np.searchsorted(track.time_s, time_s).clip(1, len(track.time_s) - 1)
     outside = (time_s < track.time_s[0]) | (time_s > track.time_s[-1])
     gap = ~outside & (track.time_s[after] - track.time_s[after - 1] > _GAP_PERIODS * track.period_s)
-    position_mm = track.at(time_s)
-    # an offset given by hand is taken at its word: only the neighbouring samples must agree
+    position_mm = track.position_at(time_s)
+    # an offset that a person gave has no uncertainty: then only the neighbouring samples must agree
     reach_s = max(0.0 if np.isnan(offset.std_s) else 2.0 * offset.std_s, 1.5 * track.period_s)
     moved_mm = np.zeros(len(time_s))
-    for look_s in np.linspace(-reach_s, reach_s, _LOOKS):
-        moved_mm = np.maximum(moved_mm, np.abs(track.at(time_s + look_s) - position_mm).max(axis=1))
+    for shift_s in np.linspace(-reach_s, reach_s, _INSTANTS):
+        moved_mm = np.maximum(moved_mm, np.abs(track.position_at(time_s + shift_s) - position_mm).max(axis=1))
     motion = ~outside & ~gap & (moved_mm > still_mm)
     position_mm[outside | gap | motion] = np.nan
     reasons = {"outside the instrument's time": outside, "in a gap of the instrument": gap, "in motion": motion}
@@ -160,7 +180,7 @@ def _matched(time_s: FloatArray, track: Track, offset: Offset, still_mm: float) 
 
 
 def _sidecar(
-    recording: Recording, track: Track, instrument: Instrument, offset: Offset, matched: int
+    recording: Recording, track: Track, instrument: Instrument, offset: ClockOffset, matched: int
 ) -> dict[str, Any]:
     """The joined recording's sidecar; rows are numbered anew where some were left out."""
     reference: dict[str, Any] = {"quantity": "link_length" if instrument.link else "tool_position"}
@@ -178,12 +198,11 @@ def _sidecar(
     }
     known = {"agreement": offset.agreement, "offset_std_s": offset.std_s}
     joined |= {name: round(value, 6) for name, value in known.items() if not np.isnan(value)}
-    excluded = {
-        int(i) + 2: recording.sidecar.excluded[int(recording.row[i])] for i in np.flatnonzero(recording.excluded)
-    }
     provenance = {**recording.sidecar.provenance, "join": joined}
-    return sidecar_contents(recording.machine, reference, excluded, provenance, recording.sidecar.notes)
+    return sidecar_contents(
+        recording.machine, reference, recording.exclusions_by_position(), provenance, recording.sidecar.notes
+    )
 
 
-def _told(left_out: Mapping[str, int]) -> str:
+def _counts_text(left_out: Mapping[str, int]) -> str:
     return ", ".join(f"{count} rows {reason}" for reason, count in left_out.items())

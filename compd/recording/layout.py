@@ -1,4 +1,4 @@
-"""Which columns a recording has and which it must have, from their names alone."""
+"""The layout of a recording: which columns it has and which it must have, from their names alone."""
 
 from __future__ import annotations
 
@@ -9,14 +9,33 @@ from dataclasses import dataclass, replace
 
 from compd.configuration import Configuration
 from compd.errors import Problem
-from compd.recording.columns import ATTITUDES, AXES, FRAME_COLUMNS, ID_COLUMNS, known
+from compd.recording.columns import (
+    ATTITUDE_COLUMNS,
+    ATTITUDES,
+    AXES,
+    FRAME_COLUMNS,
+    ID_COLUMNS,
+    POSITION_COLUMNS,
+    approach_columns,
+    joint_columns,
+    parse_name,
+    scale_columns,
+)
 from compd.recording.problem_list import ProblemList
 from compd.recording.sidecar import EXTERNAL, Sidecar
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What is there: counts of gauges (0 = none), what the reference's columns are, and the names of the rest."""
+    """Which columns a recording has.
+
+    Attributes
+    ----------
+    scales, joints : how many columns; 0 = none. frame : whether the nine frame comparators are there.
+    approach : whether there is an approach column for every scale. attitude : whether the reference has an attitude.
+    axes, links : of the reference's position, or the links (1-based) whose length it measures.
+    covariates : names of all other columns.
+    """
 
     scales: int
     joints: int
@@ -37,24 +56,24 @@ class Layout:
         )
 
 
-def lay_out(names: Sequence[str], sidecar: Sidecar | None, reference_sound: bool, faults: ProblemList) -> Layout:
-    """Sort the names into what they are; everything that is missing or too much goes to `faults`.
+def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: bool, problems: ProblemList) -> Layout:
+    """The layout of the columns `names`; every column that is missing or must not be there goes to `problems`.
 
-    reference_sound : whether the sidecar's reference could be read; if not, reference columns are not judged.
+    reference_valid : whether the sidecar's reference could be read; if not, reference columns are not checked.
     """
     external = sidecar is not None and sidecar.external
     if "time_s" not in names:
-        _missing(["time_s"], names, faults)
-    scales = _count(names, "scale", "mm", external, faults)
-    joints = _count(names, "joint", "um", external, faults)
-    approaches = _count(names, "approach", "", external, faults)
+        _add_missing(["time_s"], names, problems)
+    scales = _count(names, "scale", "mm", external, problems)
+    joints = _count(names, "joint", "um", external, problems)
+    approaches = _count(names, "approach", "", external, problems)
     frame = [name for name in FRAME_COLUMNS if name in names]
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
     if not external:
         if not scales and not any(name.startswith("scale_") for name in names):
-            _missing(["scale_1_mm, scale_2_mm, ..."], names, faults)
+            _add_missing(["scale_1_mm, scale_2_mm, ..."], names, problems)
         if approaches and scales and approaches != scales:
-            faults.add(
+            problems.add(
                 "",
                 f"{approaches} approach columns for {scales} scales",
                 allowed="approach_<i> for every scale, or none",
@@ -62,23 +81,23 @@ def lay_out(names: Sequence[str], sidecar: Sidecar | None, reference_sound: bool
             )
         # A link's change by interferometer needs no frame: the paper's figures 17 and 18.
         if len(frame) < 9 and (frame or quantity != "link_length"):
-            _missing([name for name in FRAME_COLUMNS if name not in frame], names, faults)
+            _add_missing([name for name in FRAME_COLUMNS if name not in frame], names, problems)
     links = tuple(_numbers(names, "reference_link", "mm"))
     axes = tuple(axis for axis in AXES if f"reference_{axis}_mm" in names)
     attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
     if quantity == "ball_plate":
         axes = AXES
     layout = Layout(scales, joints, len(frame) == 9, 0 < approaches == scales, axes, len(attitude) == 3, links, ())
-    if sidecar is not None and reference_sound:
-        _check_reference(names, sidecar, layout, attitude, faults)
-        _check_model(names, external, layout, faults)
+    if sidecar is not None and reference_valid:
+        _check_reference(names, sidecar, layout, attitude, problems)
+        _check_model(names, external, layout, problems)
     return replace(layout, covariates=tuple(_covariates(names, layout)))
 
 
-def fits(machine: str, layout_counts: tuple[int, int, bool], configuration: Configuration, where: str) -> list[Problem]:
-    """What contradicts `configuration`: the machine's name, the number of scales, of joint comparators, the frame's.
+def machine_problems(machine: str, counts: tuple[int, int], configuration: Configuration, where: str) -> list[Problem]:
+    """What contradicts `configuration`: the machine's name, the number of scales, of joint comparators.
 
-    layout_counts : (scales, joint comparators, whether the nine frame comparators are there).
+    counts : (scales, joint comparators). where : the sidecar, for messages.
     """
     problems: list[Problem] = []
     if machine != configuration.machine:
@@ -93,18 +112,18 @@ def fits(machine: str, layout_counts: tuple[int, int, bool], configuration: Conf
         )
     if machine == EXTERNAL:
         return problems
-    scales, joints, _ = layout_counts
-    counted = (
+    scales, joints = counts
+    comparisons = (
         ("scale", scales, len(configuration.wiring.scale), "scale_<i>_mm"),
         ("joint comparator", joints, len(configuration.wiring.joint), "joint_<k>_um"),
     )
-    for what, found, wanted, column in counted:
-        if found != wanted:
+    for what, count, expected, column in comparisons:
+        if count != expected:
             problems.append(
                 Problem(
                     where=where,
-                    what=f"{found} {what} columns, {configuration.machine} has {wanted}",
-                    allowed=f"{wanted} {column}",
+                    what=f"{count} {what} columns, {configuration.machine} has {expected}",
+                    allowed=f"{expected} {column}",
                     next_step="add the missing columns, or name the right machine",
                 )
             )
@@ -117,43 +136,44 @@ def _numbers(names: Iterable[str], stem: str, unit: str) -> list[int]:
     return sorted(int(match[1]) for name in names if (match := pattern.fullmatch(name)))
 
 
-def _count(names: Sequence[str], stem: str, unit: str, external: bool, faults: ProblemList) -> int:
-    """How many columns <stem>_1 ... <stem>_n there are; gaps are missing columns, but for an external model
-    the whole group is then a matter of covariates (0)."""
+def _count(names: Sequence[str], stem: str, unit: str, external: bool, problems: ProblemList) -> int:
+    """How many columns <stem>_1 ... <stem>_n there are; gaps are reported as missing columns.
+
+    An external model needs none of them: with gaps the whole group counts as covariates, and the result is 0.
+    """
     numbers = _numbers(names, stem, unit)
     if not numbers or len(numbers) == numbers[-1]:
         return len(numbers)
     if not external:
         tail = f"_{unit}" if unit else ""
-        _missing([f"{stem}_{i}{tail}" for i in range(1, numbers[-1]) if i not in numbers], names, faults)
+        _add_missing([f"{stem}_{i}{tail}" for i in range(1, numbers[-1]) if i not in numbers], names, problems)
     return 0 if external else numbers[-1]
 
 
 def _check_reference(
-    names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], faults: ProblemList
+    names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], problems: ProblemList
 ) -> None:
-    """The reference's columns against what the sidecar says that it is."""
-    there = [name for name in names if name.startswith("reference_") or name == "ball"]
+    """Check the reference's columns against the quantity that the sidecar names."""
+    present = [name for name in names if name.startswith("reference_") or name == "ball"]
     if sidecar.reference is None:
-        if there:
-            faults.add(
+        if present:
+            problems.add(
                 "",
-                f"{', '.join(there)}: the sidecar names no reference",
+                f"{', '.join(present)}: the sidecar names no reference",
                 allowed="`reference:` in the sidecar",
                 next_step="say in the sidecar what the reference is, or delete the columns",
             )
         return
     quantity = sidecar.reference.quantity
-    position = [f"reference_{axis}_mm" for axis in AXES]
     wanted: dict[str, list[str]] = {
-        "tool_position": position,
-        "tool_pose": [*position, *(f"reference_{axis}_rad" for axis in ATTITUDES)],
-        "link_length": [name for name in there if name.startswith("reference_link_")],
+        "tool_position": [*POSITION_COLUMNS],
+        "tool_pose": [*POSITION_COLUMNS, *ATTITUDE_COLUMNS],
+        "link_length": [name for name in present if name.startswith("reference_link_")],
         "ball_plate": ["ball"],
     }
-    extra = [name for name in there if name not in wanted[quantity]]
+    extra = [name for name in present if name not in wanted[quantity]]
     if extra:
-        faults.add(
+        problems.add(
             "",
             f"{', '.join(extra)}: not a column of the quantity that the sidecar names",
             quantity,
@@ -161,20 +181,20 @@ def _check_reference(
             "mend `quantity:` in the sidecar, or delete the columns",
         )
     if quantity in ("tool_position", "tool_pose") and not layout.axes:
-        _missing(["reference_x_mm, reference_y_mm or reference_z_mm"], names, faults)
+        _add_missing(["reference_x_mm, reference_y_mm or reference_z_mm"], names, problems)
     if quantity == "tool_pose" and len(attitude) < 3:
-        _missing([f"reference_{axis}_rad" for axis in ATTITUDES if axis not in attitude], names, faults)
+        _add_missing([f"reference_{axis}_rad" for axis in ATTITUDES if axis not in attitude], names, problems)
     if quantity == "link_length":
         if not layout.links:
-            _missing(["reference_link_1_mm, ..."], names, faults)
+            _add_missing(["reference_link_1_mm, ..."], names, problems)
         beyond = [i for i in layout.links if layout.scales and i > layout.scales]
         if beyond:
-            faults.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
+            problems.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
     if quantity == "ball_plate" and "ball" not in names:
-        _missing(["ball"], names, faults)
+        _add_missing(["ball"], names, problems)
     count = len(layout.links) if quantity == "link_length" else len(layout.axes)
     if count and len(sidecar.reference.sigma_um) not in (1, count):
-        faults.add(
+        problems.add(
             "",
             f"sigma_um has {len(sidecar.reference.sigma_um)} values for {count} reference columns",
             allowed=f"1 or {count} values",
@@ -182,23 +202,23 @@ def _check_reference(
         )
 
 
-def _check_model(names: Sequence[str], external: bool, layout: Layout, faults: ProblemList) -> None:
-    """An external model predicts every reference column; a machine configuration leaves no room for one."""
-    there = [name for name in names if name.startswith("model_")]
+def _check_model(names: Sequence[str], external: bool, layout: Layout, problems: ProblemList) -> None:
+    """Check the model_ columns: one for every reference column with an external model, else none."""
+    present = [name for name in names if name.startswith("model_")]
     if not external:
-        if there:
-            faults.add(
+        if present:
+            problems.add(
                 "",
-                f"{', '.join(there)}: a model's prediction, but the sidecar names a machine",
+                f"{', '.join(present)}: a model's prediction, but the sidecar names a machine",
                 allowed="`machine: external` with model_ columns",
                 next_step="mend `machine:` or delete them",
             )
         return
     wanted = [f"model_{name}" for name in layout.reference]
-    _missing([name for name in wanted if name not in there], names, faults)
-    extra = [name for name in there if name not in wanted]
+    _add_missing([name for name in wanted if name not in present], names, problems)
+    extra = [name for name in present if name not in wanted]
     if extra:
-        faults.add(
+        problems.add(
             "",
             f"{', '.join(extra)}: a prediction with no reference to compare it with",
             next_step="add the reference's column, or delete the model's",
@@ -206,20 +226,19 @@ def _check_model(names: Sequence[str], external: bool, layout: Layout, faults: P
 
 
 def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
-    """Everything that has no place of its own in a Recording."""
-    placed = {"time_s", *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
-    placed |= {f"scale_{i}_mm" for i in range(1, layout.scales + 1)}
-    placed |= {f"joint_{k}_um" for k in range(1, layout.joints + 1)}
-    placed |= {f"approach_{i}" for i in range(1, layout.scales + 1)} if layout.approach else set()
-    return (name for name in names if name not in placed and not name.startswith(("reference_", "model_")))
+    """Names of the columns that have no attribute of their own in a Recording."""
+    own = {"time_s", *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
+    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints)}
+    own |= {*approach_columns(layout.scales)} if layout.approach else set()
+    return (name for name in names if name not in own and not name.startswith(("reference_", "model_")))
 
 
-def _missing(wanted: Sequence[str], names: Sequence[str], faults: ProblemList) -> None:
-    """One problem for missing columns of one group."""
+def _add_missing(wanted: Sequence[str], names: Sequence[str], problems: ProblemList) -> None:
+    """Add one problem for the missing columns of one group."""
     if not wanted:
         return
-    strange = [name for name in names if known(name) is None]
-    close = difflib.get_close_matches(wanted[0], strange, n=1, cutoff=0.75)
+    unknown = [name for name in names if parse_name(name) is None]
+    close = difflib.get_close_matches(wanted[0], unknown, n=1, cutoff=0.75)
     plural = "s are" if len(wanted) > 1 else " is"
     next_step = f"is `{close[0]}` meant?" if close else "add it; leave cells empty where nothing was measured"
-    faults.add("", f"the column{plural} missing: {', '.join(wanted)}", next_step=next_step)
+    problems.add("", f"the column{plural} missing: {', '.join(wanted)}", next_step=next_step)

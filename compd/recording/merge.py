@@ -1,9 +1,10 @@
-"""Several recordings of one machine as one: what was measured first, and what was measured next."""
+"""Merging several recordings of one machine into one: what was measured first, and what was measured next."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,155 +14,174 @@ from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.recording.columns import ID_COLUMNS
 from compd.recording.recording import Recording
+from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 
-# Where nobody knows how long after each other two recordings were made.
+# Assumed between two recordings where their sidecars do not say when they began.
 ASSUMED_GAP_S = 3600.0
-# Numbers of the ball and of nothing else mean the same in every recording.
+# A ball's number means the same in every recording; the other ids are counted by each recording for itself.
 _RENUMBERED = tuple(name for name in ID_COLUMNS if name != "ball")
 
 
-class Merged(NamedTuple):
-    """rows : of each recording. starts_s : when each begins in merged time; gap_known : whether that is recorded."""
+class MergeResult(NamedTuple):
+    """What `merge_recordings` wrote.
+
+    rows : of each recording. starts_s : merged time at which each begins.
+    gap_known : whether the sidecars say when the recordings began; if not, ASSUMED_GAP_S lies between them.
+    """
 
     rows: tuple[int, ...]
     starts_s: tuple[float, ...]
     gap_known: bool
 
 
-def merge(recordings: Sequence[Recording], path: Path, overwrite: bool = False) -> Merged:
-    """Write NAME.csv (`path`) and NAME.yaml with the rows of all, in the order given.
+def merge_recordings(recordings: Sequence[Recording], path: Path, overwrite: bool = False) -> MergeResult:
+    """Write NAME.csv (`path`) and NAME.yaml with the rows of all recordings, in the order given.
 
     Sessions, visits and points are numbered on, so that none of two recordings is taken for the same. Columns that
-    one of them has not are empty there. Raises RecordingError with everything in which they do not fit together.
+    a recording does not have are empty in its rows. Raises RecordingError with everything in which the recordings do
+    not fit together.
     """
     if problems := _problems(recordings):
         raise RecordingError(problems)
-    began = [_began_s(one) for one in recordings]
-    gap_known = None not in began and all(
-        later - earlier > one.time_s[-1] - one.time_s[0]
-        for one, earlier, later in zip(recordings, began, began[1:], strict=False)
-        if earlier is not None and later is not None
-    )
-    starts_s = [0.0]
-    for one, earlier, later in zip(recordings, began, began[1:], strict=False):
-        passed_s = float(one.time_s[-1] - one.time_s[0]) + ASSUMED_GAP_S
-        if gap_known and earlier is not None and later is not None:
-            passed_s = later - earlier
-        starts_s.append(starts_s[-1] + passed_s)
-    names = list(dict.fromkeys(name for one in recordings for name in one.columns))
-    columns = {name: np.concatenate([_column(one, name) for one in recordings]) for name in names}
+    starts_s, gap_known = _start_times_s(recordings)
+    names = list(dict.fromkeys(name for recording in recordings for name in recording.columns))
+    columns = {name: np.concatenate([_column(recording, name) for recording in recordings]) for name in names}
     columns["time_s"] = np.concatenate(
-        [one.time_s - one.time_s[0] + start for one, start in zip(recordings, starts_s, strict=True)]
+        [
+            recording.time_s - recording.time_s[0] + start_s
+            for recording, start_s in zip(recordings, starts_s, strict=True)
+        ]
     )
     for name in _RENUMBERED:
         if name in columns:
-            columns[name] = _numbered_on([_ids(one, name) for one in recordings])
+            columns[name] = _renumber([_ids(recording, name) for recording in recordings])
     write_recording(path, columns, _sidecar(recordings, starts_s), overwrite)
-    return Merged(tuple(one.rows for one in recordings), tuple(starts_s), gap_known)
+    return MergeResult(tuple(recording.rows for recording in recordings), tuple(starts_s), gap_known)
 
 
 def _problems(recordings: Sequence[Recording]) -> list[Problem]:
+    """Everything in which the recordings do not fit together."""
     first, *others = recordings
-    problems = []
-    for one in recordings:
-        reference = one.reference
-        if reference is not None and reference.frame == "instrument":
-            problems.append(
-                Problem(
-                    where=str(one.sidecar.path),
-                    what="the instrument's own frame is fitted anew for every recording",
-                    value="reference.frame: instrument",
-                    allowed="machine",
-                    next_step="compare and diagnose it by itself",
-                )
-            )
-    for one in others:
-        pairs = (
-            ("is of another machine", one.machine, first.machine, "leave it out"),
-            ("has another reference", _reference(one), _reference(first), "diagnose it by itself"),
+    problems = [
+        Problem(
+            where=str(recording.sidecar.path),
+            what="the instrument's own frame is fitted anew for every recording",
+            value="reference.frame: instrument",
+            allowed="machine",
+            next_step="compare and diagnose it by itself",
+        )
+        for recording in recordings
+        if recording.reference is not None and recording.reference.frame == "instrument"
+    ]
+    for recording in others:
+        comparisons = (
+            ("is of another machine", recording.machine, first.machine, "leave it out"),
+            ("has another reference", _reference_text(recording), _reference_text(first), "diagnose it by itself"),
             (
                 "was recorded from another machine zero",
-                _zero(one),
-                _zero(first),
+                _zero_time(recording),
+                _zero_time(first),
                 "measure again from the first zero: it survives a restart of the daemon",
             ),
         )
         problems += [
-            Problem(where=str(one.sidecar.path), what=what, value=here, allowed=there, next_step=step)
-            for what, here, there, step in pairs
-            if here != there
+            Problem(where=str(recording.sidecar.path), what=what, value=value, allowed=allowed, next_step=next_step)
+            for what, value, allowed, next_step in comparisons
+            if value != allowed
         ]
     return problems
 
 
-def _reference(one: Recording) -> str:
-    reference = one.reference
+def _reference_text(recording: Recording) -> str:
+    reference = recording.reference
     return "none" if reference is None else f"{reference.quantity}, {reference.frame}, sigma {reference.sigma_um} um"
 
 
-def _zero(one: Recording) -> str:
-    return str(one.sidecar.provenance.get("zero_taken_at", ""))
+def _zero_time(recording: Recording) -> str:
+    """When machine zero was taken; "" where the sidecar does not say."""
+    return str(recording.sidecar.provenance.get("zero_taken_at", ""))
 
 
-def _began_s(one: Recording) -> float | None:
+def _start_times_s(recordings: Sequence[Recording]) -> tuple[list[float], bool]:
+    """Merged time at which each recording begins, and whether that is from the sidecars.
+
+    It is not where a sidecar does not say when its recording began, or where one began before the one before it ended.
+    """
+    duration_s = [float(recording.time_s[-1] - recording.time_s[0]) for recording in recordings]
+    began_s = [time_s for recording in recordings if (time_s := _calendar_time_s(recording)) is not None]
+    gap_known = len(began_s) == len(recordings) and all(
+        later_s - earlier_s > length_s
+        for length_s, (earlier_s, later_s) in zip(duration_s, pairwise(began_s), strict=False)
+    )
+    steps_s = (
+        [later_s - earlier_s for earlier_s, later_s in pairwise(began_s)]
+        if gap_known
+        else [length_s + ASSUMED_GAP_S for length_s in duration_s[:-1]]
+    )
+    starts_s = [0.0]
+    for step_s in steps_s:
+        starts_s.append(starts_s[-1] + step_s)
+    return starts_s, gap_known
+
+
+def _calendar_time_s(recording: Recording) -> float | None:
     """Seconds of the calendar at which the recording began; None where its sidecar does not say."""
     try:
-        return datetime.fromisoformat(str(one.sidecar.provenance.get("started_at"))).timestamp()
+        return datetime.fromisoformat(str(recording.sidecar.provenance.get("started_at"))).timestamp()
     except ValueError:
         return None
 
 
-def _column(one: Recording, name: str) -> FloatArray:
-    return one.columns.get(name, np.full(one.rows, np.nan))
+def _column(recording: Recording, name: str) -> FloatArray:
+    """(N,) the column as in the file; nan where the recording does not have it."""
+    return recording.columns.get(name, np.full(recording.rows, np.nan))
 
 
-def _ids(one: Recording, name: str) -> FloatArray:
-    """(N,) nan where there is none; a recording without sessions is one session beside others."""
-    if name == "session" and name not in one.columns:
-        return np.zeros(one.rows)
-    return _column(one, name)
+def _ids(recording: Recording, name: str) -> FloatArray:
+    """(N,) ids, nan where there is none; a recording without sessions is one session beside those of others."""
+    if name == "session" and name not in recording.columns:
+        return np.zeros(recording.rows)
+    return _column(recording, name)
 
 
-def _numbered_on(each: Sequence[FloatArray]) -> FloatArray:
-    """The same numbers in the same order, every recording's after those before it, from 1."""
-    found, used = [], 0
-    for ids in each:
+def _renumber(ids_by_recording: Sequence[FloatArray]) -> FloatArray:
+    """All ids numbered from 1 in the order of the recordings, and within a recording in their own order.
+
+    Example: [3, 5, 5], [3, nan] -> [1, 2, 2, 3, nan].
+    """
+    renumbered, used = [], 0
+    for ids in ids_by_recording:
         numbers, inverse = np.unique(ids[~np.isnan(ids)], return_inverse=True)
-        anew = np.full(len(ids), np.nan)
-        anew[~np.isnan(ids)] = used + 1 + inverse
+        new_ids = np.full(len(ids), np.nan)
+        new_ids[~np.isnan(ids)] = used + 1 + inverse
         used += len(numbers)
-        found.append(anew)
-    return np.concatenate(found)
+        renumbered.append(new_ids)
+    return np.concatenate(renumbered)
 
 
 def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict[str, Any]:
+    """The merged recording's sidecar: the common reference, excluded rows renumbered, and where every row is from."""
     reference = recordings[0].reference
-    sidecar: dict[str, Any] = {"machine": recordings[0].machine}
+    reference_contents: dict[str, Any] | None = None
     if reference is not None:
+        reference_contents = {"quantity": reference.quantity, "frame": reference.frame}
         sigma_um = [value for value in reference.sigma_um if np.isfinite(value)]
-        sidecar["reference"] = {"quantity": reference.quantity, "frame": reference.frame} | (
-            {"sigma_um": sigma_um[0] if len(sigma_um) == 1 else sigma_um} if sigma_um else {}
-        )
-    before, excluded = 0, []
-    for one in recordings:
-        excluded += [
-            {"row": before + i + 2, "reason": one.sidecar.excluded[int(one.row[i])]}
-            for i in np.flatnonzero(one.excluded).tolist()
-        ]
-        before += one.rows
-    if excluded:
-        sidecar["excluded_rows"] = excluded
-    sidecar["provenance"] = {
-        "merge": [
-            {
-                "recording": one.path.name,
-                "sha256": one.sha256,
-                "rows": one.rows,
-                "starts_s": round(start_s, 6),
-                "provenance": dict(one.sidecar.provenance),
-            }
-            for one, start_s in zip(recordings, starts_s, strict=True)
-        ]
-    }
-    return sidecar
+        if sigma_um:
+            reference_contents["sigma_um"] = sigma_um[0] if len(sigma_um) == 1 else sigma_um
+    rows_before = 0
+    excluded: dict[int, str] = {}
+    for recording in recordings:
+        excluded |= {rows_before + row: reason for row, reason in recording.exclusions_by_position().items()}
+        rows_before += recording.rows
+    sources = [
+        {
+            "recording": recording.path.name,
+            "sha256": recording.sha256,
+            "rows": recording.rows,
+            "starts_s": round(start_s, 6),
+            "provenance": dict(recording.sidecar.provenance),
+        }
+        for recording, start_s in zip(recordings, starts_s, strict=True)
+    ]
+    return sidecar_contents(recordings[0].machine, reference_contents, excluded, {"merge": sources})

@@ -1,4 +1,4 @@
-"""Everything that is wrong with a file, collected; equal problems of one column become one."""
+"""The problems of one file, and rows, values and columns as its messages name them."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from pathlib import Path
 
 from compd.errors import Problem
 
+# Rows, and different values, that a message lists.
 SHOWN_ROWS = 3
 
 
 class ProblemList:
-    """The problems (the file cannot be used) and warnings (it can, but look) found in one table."""
+    """What is wrong with one file.
+
+    Attributes
+    ----------
+    problems : with these the file cannot be used. warnings : it can, but a person should look.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -19,13 +25,13 @@ class ProblemList:
         self.warnings: list[Problem] = []
 
     def add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        """A problem at `place` in this file: "row 5", "column scale_1_mm (E)", or "" for the whole file."""
+        """Add a problem at `place` in this file: "row 5", "column scale_1_mm (E)", or "" for the whole file."""
         self.problems.append(
             Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
         )
 
     def warn(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        """As `add`, but the file can be used."""
+        """Add a warning, as `add` a problem."""
         self.warnings.append(
             Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
         )

@@ -1,4 +1,4 @@
-"""From NAME.csv and NAME.yaml to a Recording, or to every problem in them at once."""
+"""Reading a recording: NAME.csv and NAME.yaml as a Recording, or every problem in them at once."""
 
 from __future__ import annotations
 
@@ -13,16 +13,29 @@ from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.recording.ball_plate import BallPlate, check_balls, read_plate
 from compd.recording.checks import check_rows, check_values
-from compd.recording.columns import ATTITUDES, AXES, FRAME_COLUMNS, is_header, rename
+from compd.recording.columns import (
+    ATTITUDE_COLUMNS,
+    ATTITUDES,
+    AXES,
+    FRAME_COLUMNS,
+    POSITION_COLUMNS,
+    approach_columns,
+    correct_names,
+    is_header,
+    joint_columns,
+    link_reference_column,
+    scale_columns,
+)
 from compd.recording.csv_table import CsvTable, read_table
-from compd.recording.layout import Layout, fits, lay_out
+from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.problem_list import ProblemList, rows_text
-from compd.recording.recording import Recording, last_direction
-from compd.recording.sidecar import EXTERNAL, Sidecar, read_sidecar
+from compd.recording.recording import Recording, travel_direction
+from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.units import UM_PER_MM
 
 # Comparators are converted from um to mm and rounded to a picometre, far below any gauge, so that a reading
 # that was written in decimals comes back as the same number that the gauge delivered.
-_PER_MM = 1e9
+_PICOMETRES_PER_MM = 1e9
 
 
 def read_recording(path: Path, configuration: Configuration | None = None, needs_reference: bool = True) -> Recording:
@@ -38,8 +51,8 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     sidecar_path = path.with_suffix(".yaml")
     problems: list[Problem] = []
     sidecar = read_sidecar(sidecar_path, problems)
-    reference_sound = sidecar is not None and (sidecar.reference is not None or not problems)
-    if sidecar is not None and sidecar.reference is None and reference_sound and (needs_reference or sidecar.external):
+    reference_valid = sidecar is not None and (sidecar.reference is not None or not problems)
+    if sidecar is not None and sidecar.reference is None and reference_valid and (needs_reference or sidecar.external):
         problems.append(
             Problem(
                 where=str(sidecar_path),
@@ -48,57 +61,56 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
                 next_step="put an instrument's export beside the gauges with `compd join`",
             )
         )
-    faults = ProblemList(path)
-    table = read_table(path, faults, is_header, ("point",))
+    table_problems = ProblemList(path)
+    table = read_table(path, table_problems, is_header, ("point",))
     balls = sidecar.reference.balls if sidecar and sidecar.reference else None
     plate = None if balls is None else read_plate(balls, problems)
     if table is None:
-        raise RecordingError([*problems, *faults.problems])
-    table = rename(table, faults)
-    layout = lay_out(list(table.letters), sidecar, reference_sound, faults)
-    check_values(table, faults)
-    excluded = _excluded(table, sidecar, faults)
-    needed = [name for name in _needed(layout, sidecar) if name in table.columns]
-    if not any(name not in table.columns for name in _needed(layout, sidecar)):
-        check_rows(table, excluded, needed, faults)
+        raise RecordingError([*problems, *table_problems.problems])
+    table = correct_names(table, table_problems)
+    layout = read_layout(list(table.letters), sidecar, reference_valid, table_problems)
+    check_values(table, table_problems)
+    excluded = _excluded(table, sidecar, table_problems)
+    needed = _needed_columns(layout, sidecar)
+    if all(name in table.columns for name in needed):
+        check_rows(table, excluded, needed, table_problems)
     if plate is not None and "ball" in table.columns:
-        check_balls(table, plate, faults)
+        check_balls(table, plate, table_problems)
     if configuration is not None and sidecar is not None and sidecar.machine:
-        counts = (layout.scales, layout.joints, layout.frame)
-        problems += fits(sidecar.machine, counts, configuration, str(sidecar_path))
-    problems += faults.problems
+        counts = (layout.scales, layout.joints)
+        problems += machine_problems(sidecar.machine, counts, configuration, str(sidecar_path))
+    problems += table_problems.problems
     if problems or sidecar is None:
         raise RecordingError(problems)
-    return _build(table, sidecar, layout, excluded, plate, tuple(faults.warnings))
+    return _build(table, sidecar, layout, excluded, plate, tuple(table_problems.warnings))
 
 
 def check_against(recording: Recording, configuration: Configuration) -> None:
     """Raise RecordingError where the recording is of another machine: its name, or its number of gauges."""
     scales = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
-    counts = (scales, joints, recording.frame_mm is not None)
-    if problems := fits(recording.machine, counts, configuration, str(recording.sidecar.path)):
+    if problems := machine_problems(recording.machine, (scales, joints), configuration, str(recording.sidecar.path)):
         raise RecordingError(problems)
 
 
-def _needed(layout: Layout, sidecar: Sidecar | None) -> list[str]:
-    """Columns without which a row says nothing: time, and the reference with what predicts it."""
+def _needed_columns(layout: Layout, sidecar: Sidecar | None) -> list[str]:
+    """Columns without which a row is of no use: time, and the reference with what predicts it."""
     reference = sidecar.reference if sidecar else None
-    named = [f"reference_{name}" for name in layout.reference]
+    reference_columns = [f"reference_{name}" for name in layout.reference]
     if reference is not None and reference.quantity == "ball_plate":
-        named = ["ball"]
-    gauges = [f"scale_{i}_mm" for i in range(1, layout.scales + 1)]
-    if sidecar is not None and sidecar.machine == EXTERNAL:
-        gauges = [f"model_{name}" for name in layout.reference]
-    return ["time_s", *gauges, *(named if reference is not None else ())]
+        reference_columns = ["ball"]
+    predictors = list(scale_columns(layout.scales))
+    if sidecar is not None and sidecar.external:
+        predictors = [f"model_{name}" for name in layout.reference]
+    return ["time_s", *predictors, *(reference_columns if reference is not None else ())]
 
 
-def _excluded(table: CsvTable, sidecar: Sidecar | None, faults: ProblemList) -> BoolArray:
+def _excluded(table: CsvTable, sidecar: Sidecar | None, problems: ProblemList) -> BoolArray:
     """(N,) rows that the person excluded; a row that the file does not have is a problem."""
     numbers = np.array(sorted(sidecar.excluded), dtype=np.int64) if sidecar else np.array([], dtype=np.int64)
     absent = numbers[~np.isin(numbers, table.row)]
     if len(absent) and sidecar is not None:
-        faults.problems.append(
+        problems.problems.append(
             Problem(
                 where=f"{sidecar.path} excluded_rows",
                 what=f"{rows_text(absent.tolist())} of the file: no such row",
@@ -117,12 +129,12 @@ def _build(
     plate: BallPlate | None,
     warnings: tuple[Problem, ...],
 ) -> Recording:
-    """The Recording of sound files; rows without a time have no place in it and are counted."""
+    """The Recording of files without problems; rows without a time are left out and counted."""
     kept = ~np.isnan(table.columns["time_s"])
     columns = {name: values[kept] for name, values in table.columns.items()}
     left_out = {"time_s is empty": int((~kept).sum()), "empty row": table.blank_rows}
 
-    def together(names: Iterable[str]) -> FloatArray | None:
+    def stack(names: Iterable[str]) -> FloatArray | None:
         present = [columns[name] for name in names if name in columns]
         return np.column_stack(present) if present else None
 
@@ -130,15 +142,15 @@ def _build(
         return np.where(np.isnan(columns[name]), -1, columns[name]).astype(np.int64) if name in columns else None
 
     session, ball = ids("session"), ids("ball")
-    scale_mm = together(f"scale_{i}_mm" for i in range(1, layout.scales + 1))
-    approach = together(f"approach_{i}" for i in range(1, layout.scales + 1)) if layout.approach else None
+    scale_mm = stack(scale_columns(layout.scales))
+    approach = stack(approach_columns(layout.scales)) if layout.approach else None
     if approach is None and scale_mm is not None:
-        approach = last_direction(scale_mm, session)
-    joint_um = together(f"joint_{k}_um" for k in range(1, layout.joints + 1))
-    frame_um = together(FRAME_COLUMNS) if layout.frame else None
-    position = together(f"reference_{axis}_mm" for axis in AXES)
+        approach = travel_direction(scale_mm, session)
+    joint_um = stack(joint_columns(layout.joints))
+    frame_um = stack(FRAME_COLUMNS) if layout.frame else None
+    position = stack(POSITION_COLUMNS)
     if plate is not None and ball is not None:
-        position = plate.places_mm(ball)
+        position = plate.positions_of_mm(ball)
     return Recording(
         path=table.path,
         sha256=_sha256(table.content, sidecar, plate),
@@ -156,14 +168,14 @@ def _build(
         quantities={name: columns[name] for name in layout.covariates},
         reference_axes=layout.axes,
         reference_mm=position,
-        reference_rotation_rad=together(f"reference_{axis}_rad" for axis in ATTITUDES),
+        reference_rotation_rad=stack(ATTITUDE_COLUMNS),
         reference_links=layout.links,
-        reference_link_mm=together(f"reference_link_{i}_mm" for i in layout.links),
+        reference_link_mm=stack(link_reference_column(i) for i in layout.links),
         ball=ball,
         plate=plate,
-        model_mm=together(f"model_{axis}_mm" for axis in AXES),
-        model_rotation_rad=together(f"model_{axis}_rad" for axis in ATTITUDES),
-        model_link_mm=together(f"model_link_{i}_mm" for i in layout.links),
+        model_mm=stack(f"model_{axis}_mm" for axis in AXES),
+        model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
+        model_link_mm=stack(f"model_link_{i}_mm" for i in layout.links),
         excluded=excluded[kept],
         left_out={reason: count for reason, count in left_out.items() if count},
         columns=columns,
@@ -172,10 +184,12 @@ def _build(
 
 
 def _to_mm(value_um: FloatArray | None) -> FloatArray | None:
-    return None if value_um is None else np.rint(value_um * (_PER_MM / 1000.0)) / _PER_MM
+    """The values in mm, rounded to a picometre; None stays None."""
+    return None if value_um is None else np.rint(value_um * (_PICOMETRES_PER_MM / UM_PER_MM)) / _PICOMETRES_PER_MM
 
 
 def _sha256(content: bytes, sidecar: Sidecar, plate: BallPlate | None) -> str:
+    """Hash of the CSV file, its sidecar and its ball plate, in hexadecimal digits."""
     digest = hashlib.sha256(content)
     digest.update(b"\0" + sidecar.path.read_bytes())
     if plate is not None:

@@ -13,8 +13,9 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
-from compd.recording.columns import FRAME_COLUMNS
+from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.recording.sidecar import Reference, Sidecar
+from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).
 BLOCKS = 8
@@ -49,7 +50,7 @@ class Recording:
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
-        the scales (`last_direction`); nan where it is not known.
+        the scales (`travel_direction`); nan where it is not known.
     approach_measured : whether it is from the columns.
     quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
     reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
@@ -115,8 +116,8 @@ class Recording:
         scales = 0 if self.scale_mm is None else self.scale_mm.shape[1]
         joints = 0 if self.joint_mm is None else self.joint_mm.shape[1]
         return (
-            *(f"scale_{i}_mm" for i in range(1, scales + 1)),
-            *(f"joint_{k}_um" for k in range(1, joints + 1)),
+            *scale_columns(scales),
+            *joint_columns(joints),
             *(FRAME_COLUMNS if self.frame_mm is not None else ()),
         )
 
@@ -135,23 +136,27 @@ class Recording:
         """(axes or links,) standard uncertainty of the reference; nan where it is not known."""
         count = len(self.reference_axes) or len(self.reference_links)
         sigma_um = self.reference.sigma_um if self.reference else (np.nan,)
-        return np.broadcast_to(np.array(sigma_um) / 1000.0, (count,)).astype(np.float64)
+        return np.broadcast_to(np.array(sigma_um) / UM_PER_MM, (count,)).astype(np.float64)
+
+    def exclusions_by_position(self) -> dict[int, str]:
+        """Spreadsheet row -> reason, as the rows are numbered when this recording's N rows alone are written."""
+        return {int(i) + 2: self.sidecar.excluded[int(self.row[i])] for i in np.flatnonzero(self.excluded)}
 
     def usable(self, needed: Iterable[str]) -> UsableRows:
         """Rows that nobody excluded and that have a value in every column of `needed` (full names).
 
         Raises KeyError for a column that the recording does not have.
         """
-        left: dict[str, int] = {}
+        left_out: dict[str, int] = {}
         mask = ~self.excluded
         if self.excluded.any():
-            left["excluded by a person"] = int(self.excluded.sum())
+            left_out["excluded by a person"] = int(self.excluded.sum())
         for name in needed:
             empty = mask & np.isnan(self.columns[name])
             if empty.any():
-                left[f"{name} is empty"] = int(empty.sum())
+                left_out[f"{name} is empty"] = int(empty.sum())
                 mask &= ~empty
-        return UsableRows(mask, left)
+        return UsableRows(mask, left_out)
 
     @cached_property
     def fold(self) -> IntArray:
@@ -165,29 +170,41 @@ class Recording:
         if self.visit is None:
             return block
         _, first, inverse = np.unique(self.visit, return_index=True, return_inverse=True)
-        together = block[first][inverse]
-        return np.where(self.visit >= 0, together, block).astype(np.int64)
+        block_of_visit = block[first][inverse]
+        return np.where(self.visit >= 0, block_of_visit, block).astype(np.int64)
 
 
-def last_direction(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
-    """(N, n) sign of each scale's last movement of STILL_MM or more; nan before its first in a session.
+def travel_direction(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
+    """Direction of travel of each link from its scale: the sign of its last movement of STILL_MM or more.
 
-    Slow creep counts once it has added up. What happened between two rows is not known: an axis that went
-    out and came back looks as if it stood still. Where that matters, record the `approach` columns.
+    A movement is measured from the last value at which a direction was set, so that slow creep counts once it has
+    added up. What happened between two rows is not known: a link that went out and came back looks as if it stood
+    still. Where that matters, record the `approach` columns.
+
+    Parameters
+    ----------
+    scale_mm : (N, n), nan where there is no value. session : (N,) or None; every session begins anew.
+
+    Returns
+    -------
+    (N, n) +1 or -1; nan before a link's first movement in a session.
+
+    Examples
+    --------
+    Of one link at 0, 0.0005, 0.002, 0.0015, 0.0008 mm: nan, nan, 1, 1, -1.
     """
     direction = np.full(scale_mm.shape, np.nan)
-    fresh = {0} if session is None else {0, *(np.flatnonzero(np.diff(session)) + 1).tolist()}
+    first_rows = {0} if session is None else {0, *(np.flatnonzero(np.diff(session)) + 1).tolist()}
     for link in range(scale_mm.shape[1]):
-        column = scale_mm[:, link].tolist()
-        last, anchor = np.nan, np.nan
-        signs = []
-        for i, value in enumerate(column):
-            if i in fresh:
-                last, anchor = np.nan, np.nan
-            if not np.isfinite(anchor):
-                anchor = value
-            elif abs(value - anchor) >= STILL_MM:
-                last, anchor = (1.0 if value > anchor else -1.0), value
-            signs.append(last)
+        sign, anchor_mm = np.nan, np.nan
+        signs: list[float] = []
+        for row, value_mm in enumerate(scale_mm[:, link].tolist()):
+            if row in first_rows:
+                sign, anchor_mm = np.nan, np.nan
+            if not np.isfinite(anchor_mm):
+                anchor_mm = value_mm
+            elif abs(value_mm - anchor_mm) >= STILL_MM:
+                sign, anchor_mm = (1.0 if value_mm > anchor_mm else -1.0), value_mm
+            signs.append(sign)
         direction[:, link] = signs
     return direction

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, get_args
 import yaml
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from compd.configuration.document import Document, read
+from compd.configuration.document import Document, read_document
 from compd.configuration.section import Section, refusal, unknown_key, validate
 from compd.errors import ConfigurationError, Problem, RecordingError
 
@@ -228,7 +228,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         problems.append(Problem(where=str(path), what="the sidecar is missing", next_step=f"write it: {_EXAMPLE}"))
         return None
     try:
-        document = read(path)
+        document = read_document(path)
     except ConfigurationError as error:
         problems += error.problems
         return None

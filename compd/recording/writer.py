@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.files import write_files
-from compd.recording.columns import decimals, is_covariate, known, number_text
+from compd.recording.columns import decimals, is_covariate, number_text, parse_name
 from compd.recording.sidecar import sidecar_text
 
 
@@ -57,7 +57,7 @@ def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> 
         problems.append(Problem(where=str(path), what="a recording is NAME.csv", value=path.suffix, allowed=".csv"))
     for name, values in arrays.items():
         where = f"{path}: column {name}"
-        if known(name) is None and not is_covariate(name):
+        if parse_name(name) is None and not is_covariate(name):
             problems.append(
                 Problem(
                     where=where, what="no column of the format", value=name, allowed="see the format, or <name>_<unit>"

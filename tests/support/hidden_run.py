@@ -21,7 +21,7 @@ import numpy as np
 import yaml
 
 from compd.client import connect
-from compd.configuration.document import read
+from compd.configuration.document import read_document
 from compd.demo.processes import Command, running
 from compd.demo.session import ARRIVED_MM, MachineController, wait_for_gauges
 from tests.support.hidden_visits import Visit
@@ -41,7 +41,7 @@ MORE_CHANNELS = ("force_x_N", "force_y_N", "force_z_N", "pressure_hPa", "humidit
 
 def equipped(directory: Path) -> Path:
     """The shipped tripod with a load cell, a barometer and a hygrometer on its cabinet's module."""
-    data = read(TRIPOD).data
+    data = read_document(TRIPOD).data
     address = 16
     for name in MORE_CHANNELS:
         unit = name.rpartition("_")[2]

@@ -22,6 +22,7 @@ HEADER = (
     + ["temperature_room_degC", "pressure_hPa"]
     + [f"reference_{axis}_mm" for axis in "xyz"]
 )
+# Turns the text of a CSV file into another.
 Edit = Callable[[str], str]
 
 
@@ -39,16 +40,16 @@ def csv_text(rows: int = 20, separator: str = ",") -> str:
     return "\n".join(lines) + "\n"
 
 
-def put(tmp_path: Path, text: str | bytes, sidecar: str = SIDECAR) -> Path:
-    """Write both files; the CSV's path."""
+def write_recording_files(tmp_path: Path, text: str | bytes, sidecar: str = SIDECAR) -> Path:
+    """Write run.csv and its sidecar into `tmp_path`; the CSV's path."""
     path = tmp_path / "run.csv"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
     path.with_suffix(".yaml").write_text(sidecar)
     return path
 
 
-def cell(row: int, column: str, value: str) -> Edit:
-    """Put `value` in spreadsheet row `row` (header = 1) of `column`."""
+def set_cell(row: int, column: str, value: str) -> Edit:
+    """An edit that writes `value` into spreadsheet row `row` (header = 1) of `column`."""
 
     def edit(text: str) -> str:
         lines = text.split("\n")
@@ -60,19 +61,19 @@ def cell(row: int, column: str, value: str) -> Edit:
     return edit
 
 
-def column(name: str, value: str) -> Edit:
-    """Put `value` in every row of `name`."""
+def set_column(name: str, value: str) -> Edit:
+    """An edit that writes `value` into every row of `name`."""
 
     def edit(text: str) -> str:
         for row in range(2, text.count("\n") + 1):
-            text = cell(row, name, value)(text)
+            text = set_cell(row, name, value)(text)
         return text
 
     return edit
 
 
-def without(*names: str) -> Edit:
-    """Leave columns out."""
+def drop_columns(*names: str) -> Edit:
+    """An edit that leaves columns out."""
 
     def edit(text: str) -> str:
         rows = [line.split(",") for line in text.splitlines()]
@@ -82,6 +83,6 @@ def without(*names: str) -> Edit:
     return edit
 
 
-def header(old: str, new: str) -> Edit:
-    """Rename one column."""
+def rename_column(old: str, new: str) -> Edit:
+    """An edit that renames one column."""
     return lambda text: text.replace(old, new, 1)

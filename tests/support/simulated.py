@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.configuration.document import read
+from compd.configuration.document import read_document
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from tests.support.paths import CONFIG
@@ -23,7 +23,7 @@ HEXAPOD = CONFIG / "hexapod.yaml"
 
 
 def section(path: Path, name: str) -> Any:
-    return read(path).data[name]
+    return read_document(path).data[name]
 
 
 def tripod(turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Geometry:

@@ -15,7 +15,7 @@ _BASE_MM = np.array([[0.0, 250.0, 700.0], [-216.5, -125.0, 700.0], [216.5, -125.
 
 
 @dataclass(frozen=True)
-class Path3:
+class TipPath:
     """Targets reached one after another: a move of 0.6 to 2 s with smooth ends, then a dwell."""
 
     arrive_s: FloatArray
@@ -40,16 +40,16 @@ class Path3:
         return length_mm - 600.0
 
 
-def path3(rng: np.random.Generator, targets: int, dwell_s: tuple[float, float]) -> Path3:
+def random_path(rng: np.random.Generator, targets: int, dwell_s: tuple[float, float]) -> TipPath:
     """A random path; dwells last between the two."""
     target_mm = rng.uniform([-90, -90, 130], [90, 90, 250], (targets, 3))
     move_s, stay_s = rng.uniform(0.6, 2.0, targets), rng.uniform(*dwell_s, targets)
     leave_s = np.cumsum(move_s + stay_s)
-    return Path3(leave_s - stay_s, leave_s, target_mm)
+    return TipPath(leave_s - stay_s, leave_s, target_mm)
 
 
 def track_of(
-    path: Path3, rng: np.random.Generator, offset_s: float, period_s: float, noise_mm: float
+    path: TipPath, rng: np.random.Generator, offset_s: float, period_s: float, noise_mm: float
 ) -> tuple[Track, FloatArray]:
     """The instrument's samples over the whole path, its clock `offset_s` behind, in a frame of its own; and the
     rotation and shift (4, 3) of that frame."""

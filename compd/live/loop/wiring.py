@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.configuration.crosscheck import resolve
+from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
@@ -95,7 +95,7 @@ class MachineWires:
         wiring = configuration.wiring
 
         def wire(reference: str, meaning: str, sign: int = 1) -> Wire:
-            channel = resolve(reference, configuration.gauges, configuration.drivers)
+            channel = resolve_channel(reference, configuration.gauges, configuration.drivers)
             assert channel is not None, f"{reference} was checked when the configuration was loaded"
             own = configuration.gauges[channel.split(".")[0]].stale_after_s
             stale_after_s = own if own is not None else configuration.loop.stale_after_s

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from compd.configuration import Configuration, load
-from compd.configuration.document import read
+from compd.configuration.document import read_document
 from compd.errors import ConfigurationError, Problem
 
 Port = str | tuple[str, int]
@@ -39,7 +39,7 @@ def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port]
     UDP stay on this computer, so that no real controller hears of a machine that does not exist.
     """
     path = daemon_path(configuration, directory)
-    data = read(configuration.path).data
+    data = read_document(configuration.path).data
     for name, port in ports.items():
         line = data["lines"][name]
         if isinstance(port, str):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.configuration import Configuration
-from compd.configuration.crosscheck import resolve
+from compd.configuration.crosscheck import resolve_channel
 from compd.simulation.truth.world import World
 from compd.simulation.wires.device import Sense
 
@@ -26,7 +26,8 @@ class Sensing:
             *((wire.name, wire.gauge, 1) for wire in wiring.quantities),
         ]
         wired = {
-            resolve(gauge, configuration.gauges, configuration.drivers): (name, sign) for name, gauge, sign in wires
+            resolve_channel(gauge, configuration.gauges, configuration.drivers): (name, sign)
+            for name, gauge, sign in wires
         }
         self._sources: dict[str, dict[str, Callable[[], float]]] = {}
         for gauge, driver in configuration.gauge_objects().items():

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from compd.configuration import load
-from compd.configuration.schema import schema
+from compd.configuration.schema import json_schema
 from compd.errors import ConfigurationError
 from tests.support.paths import ROOT
 
@@ -86,10 +86,10 @@ def test_all_mistakes_come_at_once_in_the_order_of_the_file(tmp_path: Path) -> N
         text = text.replace("on_stale: hold", "on_stale: maybe")
         return text.replace("correction_mm: 0.2", "correction_mm: 0")
 
-    found = problems_of(tmp_path, edit)
+    messages = problems_of(tmp_path, edit)
     for key in ("tool.zero_tip_M_mm", "lines.frame_u.baud", "heds", "loop.on_stale", "limits.correction_mm"):
-        assert any(key in text for text in found), (key, found)
-    numbers = [int(text.split(" ")[0].rsplit(":", 1)[1]) for text in found]
+        assert any(key in text for text in messages), (key, messages)
+    numbers = [int(text.split(" ")[0].rsplit(":", 1)[1]) for text in messages]
     assert numbers == sorted(numbers)
 
 
@@ -146,7 +146,7 @@ def test_a_driver_in_a_file_must_not_be_writable_by_others(tmp_path: Path) -> No
 
 
 def test_the_schema_names_every_key_that_the_shipped_files_use() -> None:
-    document = schema()
+    document = json_schema()
     json.dumps(document)
     data = yaml.safe_load(TRIPOD.read_text())
     assert set(data) <= set(document["properties"])

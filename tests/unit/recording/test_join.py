@@ -14,10 +14,10 @@ from compd.cli.join import join as join_command
 from compd.errors import RecordingError
 from compd.recording.clock_offset import estimate_offset
 from compd.recording.instrument_export import Track, read_track
-from compd.recording.join import Instrument, join
+from compd.recording.join import Instrument, join_reference
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
-from tests.support.two_clocks import Path3, path3, track_of
+from tests.support.two_clocks import TipPath, random_path, track_of
 
 SCALE_NOISE_MM, TRACKER_NOISE_MM = 1e-4, 0.005
 SIDECAR = {"machine": "tripod-cmm"}
@@ -30,7 +30,7 @@ def _several() -> None:
     """Keeps `join` a command of its own, as in `compd`."""
 
 
-def gauges(path: Path, motion: Path3, time_s: FloatArray, rng: np.random.Generator, **extra: FloatArray) -> Path:
+def gauges(path: Path, motion: TipPath, time_s: FloatArray, rng: np.random.Generator, **extra: FloatArray) -> Path:
     """A recording of gauges alone at `time_s`."""
     scale_mm = motion.scales(time_s) + rng.normal(0.0, SCALE_NOISE_MM, (len(time_s), 3))
     columns = {"time_s": time_s, **{f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}}
@@ -52,17 +52,17 @@ def export(path: Path, track: Track, head: str = "t_s,Tracker X [mm],Tracker Y [
 def test_offset_from_recorded_motion(period_s: float, instrument_period_s: float, seed: int) -> None:
     """Rows that follow the motion: 1 ms, where the instrument's noise alone is worth 5 um / (40 mm/s) a sample."""
     rng = np.random.default_rng(seed)
-    motion = path3(rng, 60, (1.5, 4.0))
+    motion = random_path(rng, 60, (1.5, 4.0))
     planted_s = float(rng.uniform(-500, 500))
     track, _ = track_of(motion, rng, planted_s, instrument_period_s, TRACKER_NOISE_MM)
     time_s = np.arange(20.0, motion.end_s - 30.0, period_s)
     scale_mm = motion.scales(time_s) + rng.normal(0.0, SCALE_NOISE_MM, (len(time_s), 3))
-    found = estimate_offset(time_s, scale_mm, track)
-    assert abs(found.offset_s - planted_s) < 0.001
-    assert abs(found.offset_s - planted_s) < 3 * found.std_s < 0.01
-    assert found.agreement > 0.999
-    assert found.runner_up is not None
-    assert found.runner_up[1] < 0.8
+    offset = estimate_offset(time_s, scale_mm, track)
+    assert abs(offset.offset_s - planted_s) < 0.001
+    assert abs(offset.offset_s - planted_s) < 3 * offset.std_s < 0.01
+    assert offset.agreement > 0.999
+    assert offset.runner_up is not None
+    assert offset.runner_up[1] < 0.8
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -70,18 +70,18 @@ def test_offset_from_one_row_per_dwell(seed: int) -> None:
     """One row in each dwell of 1.5 to 4 s, no row in motion: a fifth of a second, and an uncertainty that says
     that no offset within a dwell is better than another."""
     rng = np.random.default_rng(seed)
-    motion = path3(rng, 80, (1.5, 4.0))
+    motion = random_path(rng, 80, (1.5, 4.0))
     planted_s = float(rng.uniform(-500, 500))
     track, _ = track_of(motion, rng, planted_s, 0.1, TRACKER_NOISE_MM)
     time_s = (motion.arrive_s + motion.leave_s)[:-1] / 2 + rng.uniform(-0.3, 0.3, 79)
-    found = estimate_offset(time_s, motion.scales(time_s), track)
-    assert abs(found.offset_s - planted_s) < 0.2
-    assert 0.1 < found.std_s < 0.8
+    offset = estimate_offset(time_s, motion.scales(time_s), track)
+    assert abs(offset.offset_s - planted_s) < 0.2
+    assert 0.1 < offset.std_s < 0.8
 
 
 def test_offset_from_one_link_by_interferometer() -> None:
     rng = np.random.default_rng(3)
-    motion = path3(rng, 40, (1.0, 3.0))
+    motion = random_path(rng, 40, (1.0, 3.0))
     instrument_s = np.arange(0.0, motion.end_s, 0.05)
     length_mm = motion.scales(instrument_s)[:, 1:2] + rng.normal(0.0, 1e-4, (len(instrument_s), 1))
     track = Track(Path("laser.csv"), instrument_s - 12.345, length_mm, ("length",), {}, 0)
@@ -91,52 +91,52 @@ def test_offset_from_one_link_by_interferometer() -> None:
 
 def test_joined_recording_is_right_where_the_machine_dwells(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
-    motion = path3(rng, 60, (1.5, 4.0))
+    motion = random_path(rng, 60, (1.5, 4.0))
     track, frame = track_of(motion, rng, -77.7, 0.05, TRACKER_NOISE_MM)
     time_s = np.arange(10.0, motion.end_s + 5.0, 0.1)
     humidity = {"humidity_pct": np.linspace(40, 50, len(time_s))}
     recording = read_recording(gauges(tmp_path / "g.csv", motion, time_s, rng, **humidity), needs_reference=False)
-    joined = join(
+    result = join_reference(
         recording, read_track(export(tmp_path / "t.csv", track), {}), tmp_path / "out.csv", Instrument(sigma_um=5)
     )
-    found = read_recording(tmp_path / "out.csv")
-    assert found.reference is not None
-    assert (found.reference.quantity, found.reference.frame) == ("tool_position", "instrument")
-    assert found.reference_sigma_mm == pytest.approx([0.005] * 3)
-    assert found.reference_mm is not None
-    there = np.isfinite(found.reference_mm).all(axis=1)
-    assert there.sum() == joined.matched
-    assert joined.matched + sum(joined.left_out.values()) == found.rows
-    assert joined.left_out["outside the instrument's time"] >= 49
-    truth_mm = motion.tip(found.time_s[there]) @ frame[:3] + frame[3]
-    error_mm = found.reference_mm[there] - truth_mm
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference is not None
+    assert (joined.reference.quantity, joined.reference.frame) == ("tool_position", "instrument")
+    assert joined.reference_sigma_mm == pytest.approx([0.005] * 3)
+    assert joined.reference_mm is not None
+    matched = np.isfinite(joined.reference_mm).all(axis=1)
+    assert matched.sum() == result.matched
+    assert result.matched + sum(result.left_out.values()) == joined.rows
+    assert result.left_out["outside the instrument's time"] >= 49
+    truth_mm = motion.tip(joined.time_s[matched]) @ frame[:3] + frame[3]
+    error_mm = joined.reference_mm[matched] - truth_mm
     assert np.sqrt(np.mean(error_mm**2)) < 1.2 * TRACKER_NOISE_MM
     assert np.abs(error_mm).max() < 0.05, "no row in motion among them"
     standing = (motion.arrive_s[:, None] + 0.2 < time_s) & (time_s < motion.leave_s[:, None] - 0.2)
-    assert there[: len(time_s)][standing.any(axis=0)].mean() > 0.95, "dwells are matched"
-    assert np.array_equal(found.columns["humidity_pct"], recording.columns["humidity_pct"])
-    provenance = found.sidecar.provenance["join"]
+    assert matched[: len(time_s)][standing.any(axis=0)].mean() > 0.95, "dwells are matched"
+    assert np.array_equal(joined.columns["humidity_pct"], recording.columns["humidity_pct"])
+    provenance = joined.sidecar.provenance["join"]
     assert provenance["gauges_sha256"] == recording.sha256
     assert provenance["offset_s"] == pytest.approx(-77.7, abs=0.001)
 
 
-def standing_still(motion: Path3) -> Path3:
-    return Path3(motion.arrive_s, motion.leave_s, np.repeat(motion.target_mm[:1], len(motion.target_mm), axis=0))
+def standing_still(motion: TipPath) -> TipPath:
+    return TipPath(motion.arrive_s, motion.leave_s, np.repeat(motion.target_mm[:1], len(motion.target_mm), axis=0))
 
 
-def repeating(motion: Path3) -> Path3:
+def repeating(motion: TipPath) -> TipPath:
     """Ten moves, again and again, each time alike."""
     count = len(motion.leave_s) // 10
     cycle_s = motion.leave_s[9]
     arrive_s = np.concatenate([motion.arrive_s[:10] + k * cycle_s for k in range(count)])
     leave_s = np.concatenate([motion.leave_s[:10] + k * cycle_s for k in range(count)])
-    return Path3(arrive_s, leave_s, np.tile(motion.target_mm[:10], (count, 1)))
+    return TipPath(arrive_s, leave_s, np.tile(motion.target_mm[:10], (count, 1)))
 
 
 def test_ambiguous_or_absent_motion_is_refused() -> None:
     rng = np.random.default_rng(5)
-    motion = path3(rng, 60, (1.5, 4.0))
-    other = path3(rng, 60, (1.5, 4.0))
+    motion = random_path(rng, 60, (1.5, 4.0))
+    other = random_path(rng, 60, (1.5, 4.0))
     time_s = np.arange(5.0, motion.end_s - 60.0, 0.2)
     track, _ = track_of(motion, rng, 30.0, 0.1, TRACKER_NOISE_MM)
     again, _ = track_of(repeating(motion), rng, 30.0, 0.1, TRACKER_NOISE_MM)
@@ -157,7 +157,7 @@ def test_ambiguous_or_absent_motion_is_refused() -> None:
 
 def test_offset_by_hand_and_refusals_write_nothing(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    motion = standing_still(path3(rng, 20, (1.5, 4.0)))
+    motion = standing_still(random_path(rng, 20, (1.5, 4.0)))
     track, _ = track_of(motion, rng, 30.0, 0.1, 0.001)
     path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, 40.0, 0.5), rng)
     export(tmp_path / "t.csv", track)
@@ -181,7 +181,7 @@ def test_offset_by_hand_and_refusals_write_nothing(tmp_path: Path) -> None:
 
 def test_command_shows_the_offset_and_its_uncertainty(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
-    motion = path3(rng, 30, (1.5, 4.0))
+    motion = random_path(rng, 30, (1.5, 4.0))
     track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
     path = gauges(tmp_path / "g.csv", motion, np.arange(0.0, motion.end_s, 0.2), rng)
     names = export(tmp_path / "t.csv", track, "when_s,a,b,c")
@@ -191,24 +191,24 @@ def test_command_shows_the_offset_and_its_uncertainty(tmp_path: Path) -> None:
     assert "clock offset +4.5" in result.output
     assert "s (one standard uncertainty)" in result.output
     assert "x from 'a'" in result.output
-    found = read_recording(tmp_path / "out.csv")
-    assert found.reference is not None
-    assert found.reference.frame == "machine"
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference is not None
+    assert joined.reference.frame == "machine"
 
 
 def test_exclusions_keep_their_rows(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
-    motion = path3(rng, 10, (1.5, 4.0))
+    motion = random_path(rng, 10, (1.5, 4.0))
     path = gauges(tmp_path / "g.csv", motion, np.arange(0.0, motion.end_s, 0.2), rng)
     lines = path.read_text().split("\n")
     path.write_text("\n".join([*lines[:5], "", *lines[5:]]))
     path.with_suffix(".yaml").write_text("machine: tripod-cmm\nexcluded_rows: [{row: 9, reason: door}]\n")
     recording = read_recording(path, needs_reference=False)
     track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
-    join(recording, track, tmp_path / "out.csv", Instrument(), 4.5)
-    found = read_recording(tmp_path / "out.csv")
-    assert found.time_s[found.excluded] == recording.time_s[recording.excluded]
-    assert list(found.sidecar.excluded.values()) == ["door"]
+    join_reference(recording, track, tmp_path / "out.csv", Instrument(), 4.5)
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.time_s[joined.excluded] == recording.time_s[recording.excluded]
+    assert list(joined.sidecar.excluded.values()) == ["door"]
 
 
 EXPORTS: dict[str, tuple[str, list[str]]] = {
@@ -249,15 +249,15 @@ def test_export_is_read_in_its_own_units(tmp_path: Path) -> None:
 
 def test_length_needs_its_link(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
-    motion = path3(rng, 40, (1.0, 3.0))
+    motion = random_path(rng, 40, (1.0, 3.0))
     path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, motion.end_s - 5.0, 0.1), rng)
     recording = read_recording(path, needs_reference=False)
     seen_s = np.arange(0.0, motion.end_s, 0.05)
     track = Track(tmp_path / "l.csv", seen_s - 12.0, motion.scales(seen_s)[:, :1], ("length",), {}, 0)
     with pytest.raises(RecordingError, match="--link"):
-        join(recording, track, tmp_path / "out.csv", Instrument())
-    join(recording, track, tmp_path / "out.csv", Instrument(link=1))
-    found = read_recording(tmp_path / "out.csv")
-    assert found.reference_links == (1,)
-    assert found.reference is not None
-    assert found.reference.quantity == "link_length"
+        join_reference(recording, track, tmp_path / "out.csv", Instrument())
+    join_reference(recording, track, tmp_path / "out.csv", Instrument(link=1))
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference_links == (1,)
+    assert joined.reference is not None
+    assert joined.reference.quantity == "link_length"

@@ -11,19 +11,29 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.recording import recording
+from compd.cli.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording
-from compd.recording.recording import last_direction
+from compd.recording.recording import travel_direction
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from tests.support.paths import ROOT, SHARED
-from tests.support.recordings import HEADER, SIDECAR, Edit, cell, column, csv_text, header, put, without
+from tests.support.recordings import (
+    HEADER,
+    SIDECAR,
+    Edit,
+    csv_text,
+    drop_columns,
+    rename_column,
+    set_cell,
+    set_column,
+    write_recording_files,
+)
 
 TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
 EXAMPLES = ("elastic-and-backlash", "link-expansion", "not-in-the-library", "nothing-missing", "plate-bending")
-NO_REFERENCE = without("reference_x_mm", "reference_y_mm", "reference_z_mm")
+NO_REFERENCE = drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm")
 
 
 @pytest.mark.parametrize("part", ["train", "valid"])
@@ -32,18 +42,23 @@ def test_example_reads_without_complaint(name: str, part: str) -> None:
     path = SHARED / "recordings" / f"example-{name}" / f"{part}.csv"
     if not path.is_file():
         pytest.skip(f"needs the example recordings in {SHARED}")
-    found = read_recording(path, load(TRIPOD))
-    assert found.warnings == ()
-    assert found.left_out == {}
-    assert found.scale_mm is not None
-    assert found.joint_mm is not None
-    assert found.frame_mm is not None
-    shapes = found.scale_mm.shape[1], found.joint_mm.shape[1], found.frame_mm.shape[1], found.reference_axes
+    recording = read_recording(path, load(TRIPOD))
+    assert recording.warnings == ()
+    assert recording.left_out == {}
+    assert recording.scale_mm is not None
+    assert recording.joint_mm is not None
+    assert recording.frame_mm is not None
+    shapes = (
+        recording.scale_mm.shape[1],
+        recording.joint_mm.shape[1],
+        recording.frame_mm.shape[1],
+        recording.reference_axes,
+    )
     assert shapes == (3, 9, 9, ("x", "y", "z"))
-    assert found.usable([*found.gauge_columns, *found.reference_columns]).mask.all()
-    assert "temperature_link_2_degC" in found.quantities
-    assert found.reference_sigma_mm == pytest.approx([0.00015] * 3)
-    assert "joint_1_um" not in found.quantities
+    assert recording.usable([*recording.gauge_columns, *recording.reference_columns]).mask.all()
+    assert "temperature_link_2_degC" in recording.quantities
+    assert recording.reference_sigma_mm == pytest.approx([0.00015] * 3)
+    assert "joint_1_um" not in recording.quantities
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -52,44 +67,46 @@ def test_direction_from_the_scales_is_the_recorded_one(name: str) -> None:
     path = SHARED / "recordings" / f"example-{name}" / "train.csv"
     if not path.is_file():
         pytest.skip(f"needs the example recordings in {SHARED}")
-    found = read_recording(path)
-    assert found.scale_mm is not None
-    assert found.approach is not None
-    derived = last_direction(found.scale_mm, found.session)
-    there = np.isfinite(derived)
-    assert there.mean() > 0.95
-    assert (derived[there] == found.approach[there]).mean() > 0.95
+    recording = read_recording(path)
+    assert recording.scale_mm is not None
+    assert recording.approach is not None
+    derived = travel_direction(recording.scale_mm, recording.session)
+    known = np.isfinite(derived)
+    assert known.mean() > 0.95
+    assert (derived[known] == recording.approach[known]).mean() > 0.95
 
 
 def test_real_recording_reads_without_complaint() -> None:
     path = SHARED / "real" / "voron-frame-expansion.csv"
     if not path.is_file():
         pytest.skip(f"needs the real recording in {SHARED}")
-    found = read_recording(path)
-    assert found.sidecar.external
-    assert found.warnings == ()
-    assert (found.rows, found.reference_axes) == (1203, ("z",))
-    assert found.scale_mm is None
-    assert found.approach is None
-    assert found.model_mm is not None
-    assert not found.model_mm.any()
-    assert sorted(set(found.fold.tolist())) == list(range(8))
-    assert found.visit is not None
-    for visit in set(found.visit.tolist()):
-        assert len(set(found.fold[found.visit == visit].tolist())) == 1, "a visit stays in one fold"
+    recording = read_recording(path)
+    assert recording.sidecar.external
+    assert recording.warnings == ()
+    assert (recording.rows, recording.reference_axes) == (1203, ("z",))
+    assert recording.scale_mm is None
+    assert recording.approach is None
+    assert recording.model_mm is not None
+    assert not recording.model_mm.any()
+    assert sorted(set(recording.fold.tolist())) == list(range(8))
+    assert recording.visit is not None
+    for visit in set(recording.visit.tolist()):
+        assert len(set(recording.fold[recording.visit == visit].tolist())) == 1, "a visit stays in one fold"
 
 
 def test_units_and_order(tmp_path: Path) -> None:
-    text = cell(2, "joint_3_um", "-6.61")(cell(2, "frame_u6_um", "1.25")(cell(2, "frame_t1_um", "2.5")(csv_text())))
-    found = read_recording(put(tmp_path, text))
-    assert found.joint_mm is not None
-    assert found.frame_mm is not None
-    assert found.joint_mm[0, 2] == float("-0.00661"), "the very number that a gauge in mm delivers"
-    assert found.frame_mm[0, [0, 8]].tolist() == [0.0025, 0.00125]
-    assert list(found.quantities) == ["temperature_room_degC", "pressure_hPa"]
-    assert found.row[[0, -1]].tolist() == [2, 21]
-    assert found.session is not None
-    assert found.session.tolist() == [1] * 10 + [2] * 10
+    text = set_cell(2, "joint_3_um", "-6.61")(
+        set_cell(2, "frame_u6_um", "1.25")(set_cell(2, "frame_t1_um", "2.5")(csv_text()))
+    )
+    recording = read_recording(write_recording_files(tmp_path, text))
+    assert recording.joint_mm is not None
+    assert recording.frame_mm is not None
+    assert recording.joint_mm[0, 2] == float("-0.00661"), "the very number that a gauge in mm delivers"
+    assert recording.frame_mm[0, [0, 8]].tolist() == [0.0025, 0.00125]
+    assert list(recording.quantities) == ["temperature_room_degC", "pressure_hPa"]
+    assert recording.row[[0, -1]].tolist() == [2, 21]
+    assert recording.session is not None
+    assert recording.session.tolist() == [1] * 10 + [2] * 10
 
 
 TOLERATED: dict[str, Edit] = {
@@ -109,52 +126,52 @@ def test_what_means_one_thing_only_is_taken(tmp_path: Path, habit: str) -> None:
     text = TOLERATED[habit](csv_text())
     assert text != csv_text()
     (tmp_path / "plain").mkdir()
-    plain = read_recording(put(tmp_path / "plain", csv_text()))
-    found = read_recording(put(tmp_path, text))
-    assert list(found.columns) == list(plain.columns)
-    assert all(np.array_equal(found.columns[name], plain.columns[name]) for name in plain.columns)
-    assert np.array_equal(found.row, plain.row)
-    assert found.left_out == {}
-    assert found.warnings == ()
+    plain = read_recording(write_recording_files(tmp_path / "plain", csv_text()))
+    recording = read_recording(write_recording_files(tmp_path, text))
+    assert list(recording.columns) == list(plain.columns)
+    assert all(np.array_equal(recording.columns[name], plain.columns[name]) for name in plain.columns)
+    assert np.array_equal(recording.row, plain.row)
+    assert recording.left_out == {}
+    assert recording.warnings == ()
 
 
 def test_empty_cells_are_left_out_where_needed_and_counted(tmp_path: Path) -> None:
     text = csv_text()
     for edit in (
-        cell(4, "scale_2_mm", ""),
-        cell(5, "scale_2_mm", ""),
-        cell(5, "pressure_hPa", ""),
-        cell(6, "time_s", ""),
-        cell(9, "session", ""),
+        set_cell(4, "scale_2_mm", ""),
+        set_cell(5, "scale_2_mm", ""),
+        set_cell(5, "pressure_hPa", ""),
+        set_cell(6, "time_s", ""),
+        set_cell(9, "session", ""),
     ):
         text = edit(text)
     lines = text.split("\n")
     lines.insert(11, "")
     sidecar = SIDECAR + "excluded_rows: [{row: 5, reason: door}, {rows: 7-8, reason: beam cut}]\n"
-    found = read_recording(put(tmp_path, "\n".join(lines), sidecar))
-    assert found.left_out == {"time_s is empty": 1, "empty row": 1}
-    assert found.rows == 19
-    assert np.isfinite(found.time_s).all()
-    assert found.row[found.excluded].tolist() == [5, 7, 8]
-    usable = found.usable(["scale_2_mm", "pressure_hPa"])
+    recording = read_recording(write_recording_files(tmp_path, "\n".join(lines), sidecar))
+    assert recording.left_out == {"time_s is empty": 1, "empty row": 1}
+    assert recording.rows == 19
+    assert np.isfinite(recording.time_s).all()
+    assert recording.row[recording.excluded].tolist() == [5, 7, 8]
+    usable = recording.usable(["scale_2_mm", "pressure_hPa"])
     assert usable.left_out == {"excluded by a person": 3, "scale_2_mm is empty": 1}
     assert usable.mask.sum() == 15
-    assert found.usable(["scale_1_mm"]).mask.sum() == 16
-    assert found.session is not None
-    assert found.session[found.row == 9] == -1
-    assert found.sidecar.excluded == {5: "door", 7: "beam cut", 8: "beam cut"}
+    assert recording.usable(["scale_1_mm"]).mask.sum() == 16
+    assert recording.session is not None
+    assert recording.session[recording.row == 9] == -1
+    assert recording.sidecar.excluded == {5: "door", 7: "beam cut", 8: "beam cut"}
 
 
 def test_any_subset_of_axes_and_own_sigmas(tmp_path: Path) -> None:
     sidecar = SIDECAR.replace("0.15", "[0.1, 0.3]").replace("frame: machine", "frame: instrument")
-    found = read_recording(put(tmp_path, without("reference_y_mm")(csv_text()), sidecar))
-    assert found.reference_axes == ("x", "z")
-    assert found.reference_mm is not None
-    assert found.reference_mm.shape == (20, 2)
-    assert found.reference_sigma_mm == pytest.approx([0.0001, 0.0003])
-    assert found.reference is not None
-    assert found.reference.frame == "instrument"
-    unknown = read_recording(put(tmp_path, csv_text(), SIDECAR.replace("  sigma_um: 0.15\n", "")))
+    recording = read_recording(write_recording_files(tmp_path, drop_columns("reference_y_mm")(csv_text()), sidecar))
+    assert recording.reference_axes == ("x", "z")
+    assert recording.reference_mm is not None
+    assert recording.reference_mm.shape == (20, 2)
+    assert recording.reference_sigma_mm == pytest.approx([0.0001, 0.0003])
+    assert recording.reference is not None
+    assert recording.reference.frame == "instrument"
+    unknown = read_recording(write_recording_files(tmp_path, csv_text(), SIDECAR.replace("  sigma_um: 0.15\n", "")))
     assert np.isnan(unknown.reference_sigma_mm).all()
 
 
@@ -164,34 +181,38 @@ def test_pose_with_attitude(tmp_path: Path) -> None:
         rows[0] + ",reference_rx_rad,reference_ry_rad,reference_rz_rad",
         *(row + ",0.1,0.2,0.3" for row in rows[1:]),
     ]
-    found = read_recording(put(tmp_path, "\n".join(rows), SIDECAR.replace("tool_position", "tool_pose")))
-    assert found.reference_rotation_rad is not None
-    assert found.reference_rotation_rad[3].tolist() == [0.1, 0.2, 0.3]
+    recording = read_recording(
+        write_recording_files(tmp_path, "\n".join(rows), SIDECAR.replace("tool_position", "tool_pose"))
+    )
+    assert recording.reference_rotation_rad is not None
+    assert recording.reference_rotation_rad[3].tolist() == [0.1, 0.2, 0.3]
 
 
 def test_link_length_needs_no_frame(tmp_path: Path) -> None:
     frame = [name for name in HEADER if name.startswith("frame_")]
-    text = header("reference_x_mm", "reference_link_2_mm")(
-        without("reference_y_mm", "reference_z_mm", *frame)(csv_text())
+    text = rename_column("reference_x_mm", "reference_link_2_mm")(
+        drop_columns("reference_y_mm", "reference_z_mm", *frame)(csv_text())
     )
-    found = read_recording(put(tmp_path, text, "machine: tripod-cmm\nreference: {quantity: link_length}\n"))
-    assert found.reference_links == (2,)
-    assert found.reference_link_mm is not None
-    assert found.reference_link_mm.shape == (20, 1)
-    assert found.frame_mm is None
-    assert found.reference_mm is None
+    recording = read_recording(
+        write_recording_files(tmp_path, text, "machine: tripod-cmm\nreference: {quantity: link_length}\n")
+    )
+    assert recording.reference_links == (2,)
+    assert recording.reference_link_mm is not None
+    assert recording.reference_link_mm.shape == (20, 1)
+    assert recording.frame_mm is None
+    assert recording.reference_mm is None
 
 
 def test_ball_plate(tmp_path: Path) -> None:
-    text = header("pressure_hPa", "ball")(NO_REFERENCE(csv_text()).replace("1013.25", "17"))
+    text = rename_column("pressure_hPa", "ball")(NO_REFERENCE(csv_text()).replace("1013.25", "17"))
     (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n18,0,0,0\n17,50.001,-50,0.5\n")
     sidecar = "machine: tripod-cmm\nreference: {quantity: ball_plate, balls: plate.csv}\n"
-    found = read_recording(put(tmp_path, text, sidecar))
-    assert found.reference is not None
-    assert found.reference.frame == "instrument", "a plate's coordinates are its own"
-    assert found.reference_mm is not None
-    assert found.reference_mm[5].tolist() == [50.001, -50.0, 0.5]
-    before = found.sha256
+    recording = read_recording(write_recording_files(tmp_path, text, sidecar))
+    assert recording.reference is not None
+    assert recording.reference.frame == "instrument", "a plate's coordinates are its own"
+    assert recording.reference_mm is not None
+    assert recording.reference_mm[5].tolist() == [50.001, -50.0, 0.5]
+    before = recording.sha256
     (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n18,0,0,0\n17,50.002,-50,0.5\n")
     assert read_recording(tmp_path / "run.csv").sha256 != before, "the plate is part of the provenance"
 
@@ -199,54 +220,58 @@ def test_ball_plate(tmp_path: Path) -> None:
 def test_external_model_needs_no_gauges(tmp_path: Path) -> None:
     text = "time_s,wind_m_per_s,model_x_mm,reference_x_mm\n0,1,2,3\n1,1,2,3.5\n"
     sidecar = SIDECAR.replace("tripod-cmm", "external")
-    found = read_recording(put(tmp_path, text, sidecar))
-    assert found.model_mm is not None
-    assert found.model_mm.tolist() == [[2.0], [2.0]]
-    assert list(found.quantities) == ["wind_m_per_s"]
+    recording = read_recording(write_recording_files(tmp_path, text, sidecar))
+    assert recording.model_mm is not None
+    assert recording.model_mm.tolist() == [[2.0], [2.0]]
+    assert list(recording.quantities) == ["wind_m_per_s"]
 
 
 def test_points_may_have_names(tmp_path: Path) -> None:
-    text = header("visit", "point")(csv_text())
+    text = rename_column("visit", "point")(csv_text())
     lines = text.split("\n")
     lines[1:3] = [line.replace(",1,0,", ",1,P-07,") for line in lines[1:3]]
-    found = read_recording(put(tmp_path, "\n".join(lines)))
-    assert found.point is not None
-    assert found.point[0] == found.point[1] != found.point[2]
+    recording = read_recording(write_recording_files(tmp_path, "\n".join(lines)))
+    assert recording.point is not None
+    assert recording.point[0] == recording.point[1] != recording.point[2]
 
 
 def test_gauges_alone_are_for_join_only(tmp_path: Path) -> None:
-    path = put(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
+    path = write_recording_files(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
     with pytest.raises(RecordingError, match="compd join"):
         read_recording(path)
     assert read_recording(path, needs_reference=False).reference is None
 
 
 def test_implausible_values_are_warned_of_not_refused(tmp_path: Path) -> None:
-    text = column("temperature_room_degC", "68")(cell(3, "joint_1_um", "5000")(csv_text()))
-    warnings = "\n".join(str(warning) for warning in read_recording(put(tmp_path, text)).warnings)
+    text = set_column("temperature_room_degC", "68")(set_cell(3, "joint_1_um", "5000")(csv_text()))
+    warnings = "\n".join(str(warning) for warning in read_recording(write_recording_files(tmp_path, text)).warnings)
     assert "joint_1_um (G), row 3: implausible" in warnings
     assert "temperature_room_degC (Y), rows 2, 3, 4 and 17 more rows" in warnings
 
 
 def test_unknown_unit_is_kept_and_warned_of(tmp_path: Path) -> None:
-    found = read_recording(put(tmp_path, header("pressure_hPa", "coolant_flow_foo")(csv_text())))
-    assert "coolant_flow_foo" in found.quantities
-    assert "ends in no unit that is known" in str(found.warnings[0])
+    recording = read_recording(
+        write_recording_files(tmp_path, rename_column("pressure_hPa", "coolant_flow_foo")(csv_text()))
+    )
+    assert "coolant_flow_foo" in recording.quantities
+    assert "ends in no unit that is known" in str(recording.warnings[0])
 
 
 def test_check_against_counts_gauges(tmp_path: Path) -> None:
-    found = read_recording(put(tmp_path, without("joint_9_um")(csv_text())))
+    recording = read_recording(write_recording_files(tmp_path, drop_columns("joint_9_um")(csv_text())))
     with pytest.raises(RecordingError, match="8 joint comparator columns, tripod-cmm has 9"):
-        check_against(found, load(TRIPOD))
+        check_against(recording, load(TRIPOD))
 
 
 def test_direction_ignores_creep_but_adds_it_up() -> None:
     scale_mm = np.array([[0.0, 1.0, 1.0002, 0.9998, 0.5, 0.4996, 0.4992, 0.4988, 0.5]]).T
-    assert np.array_equal(last_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True)
+    assert np.array_equal(
+        travel_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True
+    )
 
 
 def test_check_prints_what_there_is(tmp_path: Path) -> None:
-    result = CliRunner().invoke(recording, ["check", str(put(tmp_path, csv_text()))])
+    result = CliRunner().invoke(recording_command, ["check", str(write_recording_files(tmp_path, csv_text()))])
     assert result.exit_code == 0
     assert "20 rows" in result.output
     assert "3 scales, 9 joint comparators, 9 frame comparators" in result.output
@@ -272,11 +297,11 @@ def test_what_is_written_is_read_back(tmp_path: Path, data: st.DataObject) -> No
     sidecar = {"machine": "tripod-cmm", "reference": {"quantity": "tool_position", "frame": "instrument"}}
     path = tmp_path / "round.csv"
     write_recording(path, columns, sidecar, overwrite=True)
-    found = read_recording(path)
-    assert list(found.columns) == list(columns)
+    recording = read_recording(path)
+    assert list(recording.columns) == list(columns)
     for name, values in columns.items():
         decimals = 6 if name.endswith("_um") else 9 if name.endswith("_mm") else 15
-        np.testing.assert_array_equal(found.columns[name], np.round(values, decimals) if decimals < 15 else values)
+        np.testing.assert_array_equal(recording.columns[name], np.round(values, decimals) if decimals < 15 else values)
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["round.csv", "round.yaml"]
 
 
@@ -312,7 +337,7 @@ def test_failed_second_file_leaves_what_was_there(tmp_path: Path) -> None:
 
 
 def test_a_sidecar_without_a_format_is_format_1_and_what_is_written_is_format_2(tmp_path: Path) -> None:
-    first = read_recording(put(tmp_path, csv_text()))
+    first = read_recording(write_recording_files(tmp_path, csv_text()))
     assert first.sidecar.format == 1
     write_recording(tmp_path / "again.csv", first.columns, sidecar_contents("tripod-cmm", {"quantity": "link_length"}))
     text = (tmp_path / "again.yaml").read_text()

@@ -10,12 +10,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.recording import recording
+from compd.cli.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import read_recording
 from tests.support.paths import ROOT
-from tests.support.recordings import SIDECAR, Edit, cell, column, csv_text, header, put, without
+from tests.support.recordings import (
+    SIDECAR,
+    Edit,
+    csv_text,
+    drop_columns,
+    rename_column,
+    set_cell,
+    set_column,
+    write_recording_files,
+)
 
 TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
 HEXAPOD = TRIPOD.with_name("hexapod.yaml")
@@ -38,52 +47,55 @@ def swap_rows(text: str) -> str:
 
 
 MISTAKES: dict[str, tuple[Edit, list[str]]] = {
-    "text": (cell(7, "joint_4_um", "abc"), ["column joint_4_um (J), row 7: text", "'abc'", "empty the cell"]),
-    "a spreadsheet's error": (cell(3, "scale_1_mm", "#REF!"), ["scale_1_mm (D), row 3", "a spreadsheet's error"]),
-    "#N/A": (cell(3, "scale_1_mm", "#N/A"), ["spreadsheet's error", "'#N/A'"]),
-    "dash": (cell(3, "pressure_hPa", "-"), ["row 3", "missing value", "'-'", "empty the cell"]),
-    "n/a": (cell(3, "pressure_hPa", "n/a"), ["missing value", "'n/a'"]),
-    "NaN": (cell(3, "pressure_hPa", "NaN"), ["missing value", "'NaN'"]),
-    "inf": (cell(3, "pressure_hPa", "inf"), ["not a finite number"]),
-    "too large": (cell(3, "pressure_hPa", "1e999"), ["not a finite number"]),
-    "a date": (cell(3, "time_s", "2026-11-20 12:00:01"), ["column time_s (A), row 3: a date", "=(A2-A$2)*86400"]),
-    "a time of day": (cell(3, "time_s", "12:00:01"), ["a time of day"]),
-    "unit in a cell": (cell(3, "temperature_room_degC", "20.1 °C"), ["a unit behind the number", "20.1 °C"]),
-    "decimal comma": (cell(3, "temperature_room_degC", '"20,1"'), ["decimal comma", "'20,1'", "`.`"]),
-    "ambiguous comma": (cell(3, "scale_1_mm", '"20,123"'), ["may be a decimal or a thousands mark"]),
-    "thousands": (cell(3, "pressure_hPa", '"1,013.25"'), ["thousands separator", "1,013.25"]),
-    "thousands by spaces": (cell(3, "pressure_hPa", "1 013.25"), ["thousands separator"]),
-    "typographic minus": (cell(3, "scale_1_mm", "\u221212.5"), ["typographic minus"]),
-    "underscore": (cell(3, "scale_1_mm", "1_0"), ["text where a number belongs"]),
+    "text": (set_cell(7, "joint_4_um", "abc"), ["column joint_4_um (J), row 7: text", "'abc'", "empty the cell"]),
+    "a spreadsheet's error": (set_cell(3, "scale_1_mm", "#REF!"), ["scale_1_mm (D), row 3", "a spreadsheet's error"]),
+    "#N/A": (set_cell(3, "scale_1_mm", "#N/A"), ["spreadsheet's error", "'#N/A'"]),
+    "dash": (set_cell(3, "pressure_hPa", "-"), ["row 3", "missing value", "'-'", "empty the cell"]),
+    "n/a": (set_cell(3, "pressure_hPa", "n/a"), ["missing value", "'n/a'"]),
+    "NaN": (set_cell(3, "pressure_hPa", "NaN"), ["missing value", "'NaN'"]),
+    "inf": (set_cell(3, "pressure_hPa", "inf"), ["not a finite number"]),
+    "too large": (set_cell(3, "pressure_hPa", "1e999"), ["not a finite number"]),
+    "a date": (set_cell(3, "time_s", "2026-11-20 12:00:01"), ["column time_s (A), row 3: a date", "=(A2-A$2)*86400"]),
+    "a time of day": (set_cell(3, "time_s", "12:00:01"), ["a time of day"]),
+    "unit in a cell": (set_cell(3, "temperature_room_degC", "20.1 °C"), ["a unit behind the number", "20.1 °C"]),
+    "decimal comma": (set_cell(3, "temperature_room_degC", '"20,1"'), ["decimal comma", "'20,1'", "`.`"]),
+    "ambiguous comma": (set_cell(3, "scale_1_mm", '"20,123"'), ["may be a decimal or a thousands mark"]),
+    "thousands": (set_cell(3, "pressure_hPa", '"1,013.25"'), ["thousands separator", "1,013.25"]),
+    "thousands by spaces": (set_cell(3, "pressure_hPa", "1 013.25"), ["thousands separator"]),
+    "typographic minus": (set_cell(3, "scale_1_mm", "\u221212.5"), ["typographic minus"]),
+    "underscore": (set_cell(3, "scale_1_mm", "1_0"), ["text where a number belongs"]),
     "time backwards": (swap_rows, ["column time_s (A), row 6: time runs backwards", "'30'", "sort the rows"]),
-    "time repeated": (cell(5, "time_s", "20"), ["row 5: the same time as the row above"]),
-    "session 1.5": (cell(5, "session", "1.5"), ["session (B), row 5: not a whole number", "'1.5'"]),
-    "visit -3": (cell(5, "visit", "-3"), ["visit (C), row 5", "'-3'"]),
-    "scale in um": (header("scale_1_mm", "scale_1_um"), ["is in um by its name", "divide the values by 1000"]),
-    "joint in mm": (header("joint_1_um", "joint_1_mm"), ["is in mm", "multiply the values by 1000", "joint_1_um"]),
-    "reference in um": (header("reference_x_mm", "reference_x_um"), ["is in um", "reference_x_mm"]),
-    "degC as C": (header("room_degC", "room_C"), ["is in C", "the values stay", "temperature_room_degC"]),
-    "degrees F": (header("room_degC", "room_degF"), ["is in degF", "(value - 32) / 1.8"]),
-    "kelvin": (header("room_degC", "room_K"), ["value - 273.15"]),
-    "pressure in Pa": (header("pressure_hPa", "pressure_Pa"), ["divide the values by 100"]),
-    "time in ms": (header("time_s", "time_ms"), ["is in ms", "divide the values by 1000"]),
-    "time without unit": (header("time_s", "time"), ["has no unit in its name", "time_s"]),
-    "spaces in a name": (header("scale_1_mm", "scale 1 mm"), ["not spelt", "name it scale_1_mm"]),
-    "brackets in a name": (header("scale_1_mm", "Scale 1 [mm]"), ["not spelt", "name it scale_1_mm"]),
-    "capitals": (header("scale_1_mm", "SCALE_1_MM"), ["not spelt", "name it scale_1_mm"]),
-    "no format column": (header("pressure_hPa", "remarks"), ["column remarks (Z): no column of the format"]),
-    "scale 0": (header("scale_1_mm", "scale_0_mm"), ["scale_0_mm (D): no column", "missing: scale_1_mm"]),
-    "model with a machine": (header("pressure_hPa", "model_x_mm"), ["the sidecar names a machine"]),
-    "missing time": (without("time_s"), ["missing: time_s"]),
-    "missing scale": (without("scale_2_mm"), ["missing: scale_2_mm"]),
-    "no scales": (without("scale_1_mm", "scale_2_mm", "scale_3_mm"), ["missing: scale_1_mm"]),
-    "missing joint": (without("joint_4_um"), ["missing: joint_4_um"]),
-    "missing frame": (without("frame_t1_um", "frame_u6_um"), ["columns are missing: frame_t1_um, frame_u6_um"]),
+    "time repeated": (set_cell(5, "time_s", "20"), ["row 5: the same time as the row above"]),
+    "session 1.5": (set_cell(5, "session", "1.5"), ["session (B), row 5: not a whole number", "'1.5'"]),
+    "visit -3": (set_cell(5, "visit", "-3"), ["visit (C), row 5", "'-3'"]),
+    "scale in um": (rename_column("scale_1_mm", "scale_1_um"), ["is in um by its name", "divide the values by 1000"]),
+    "joint in mm": (
+        rename_column("joint_1_um", "joint_1_mm"),
+        ["is in mm", "multiply the values by 1000", "joint_1_um"],
+    ),
+    "reference in um": (rename_column("reference_x_mm", "reference_x_um"), ["is in um", "reference_x_mm"]),
+    "degC as C": (rename_column("room_degC", "room_C"), ["is in C", "the values stay", "temperature_room_degC"]),
+    "degrees F": (rename_column("room_degC", "room_degF"), ["is in degF", "(value - 32) / 1.8"]),
+    "kelvin": (rename_column("room_degC", "room_K"), ["value - 273.15"]),
+    "pressure in Pa": (rename_column("pressure_hPa", "pressure_Pa"), ["divide the values by 100"]),
+    "time in ms": (rename_column("time_s", "time_ms"), ["is in ms", "divide the values by 1000"]),
+    "time without unit": (rename_column("time_s", "time"), ["has no unit in its name", "time_s"]),
+    "spaces in a name": (rename_column("scale_1_mm", "scale 1 mm"), ["not spelt", "name it scale_1_mm"]),
+    "brackets in a name": (rename_column("scale_1_mm", "Scale 1 [mm]"), ["not spelt", "name it scale_1_mm"]),
+    "capitals": (rename_column("scale_1_mm", "SCALE_1_MM"), ["not spelt", "name it scale_1_mm"]),
+    "no format column": (rename_column("pressure_hPa", "remarks"), ["column remarks (Z): no column of the format"]),
+    "scale 0": (rename_column("scale_1_mm", "scale_0_mm"), ["scale_0_mm (D): no column", "missing: scale_1_mm"]),
+    "model with a machine": (rename_column("pressure_hPa", "model_x_mm"), ["the sidecar names a machine"]),
+    "missing time": (drop_columns("time_s"), ["missing: time_s"]),
+    "missing scale": (drop_columns("scale_2_mm"), ["missing: scale_2_mm"]),
+    "no scales": (drop_columns("scale_1_mm", "scale_2_mm", "scale_3_mm"), ["missing: scale_1_mm"]),
+    "missing joint": (drop_columns("joint_4_um"), ["missing: joint_4_um"]),
+    "missing frame": (drop_columns("frame_t1_um", "frame_u6_um"), ["columns are missing: frame_t1_um, frame_u6_um"]),
     "missing reference": (
-        without("reference_x_mm", "reference_y_mm", "reference_z_mm"),
+        drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm"),
         ["missing: reference_x_mm, reference_y_mm"],
     ),
-    "duplicate name": (header("scale_2_mm", "scale_1_mm"), ["columns D and E: two columns of the same name"]),
+    "duplicate name": (rename_column("scale_2_mm", "scale_1_mm"), ["columns D and E: two columns of the same name"]),
     "cells without a name": (
         lambda t: "\n".join(line + (",7" if i in (1, 5) else ",") for i, line in enumerate(lines_of(t)[:-1])),
         ["column AD, rows 2 and 6: cells under no name"],
@@ -96,11 +108,11 @@ MISTAKES: dict[str, tuple[Edit, list[str]]] = {
     "no header": (lambda t: t.split("\n", 1)[1], ["row 1: numbers where the header belongs"]),
     "cut row": (lambda t: t[:-60], ["row 21: fewer cells than the header"]),
     "unquoted decimal commas": (lambda t: t.replace("20.104", "20,104", 1), ["row 2: more cells than the header"]),
-    "unclosed quote": (cell(4, "scale_1_mm", '"1.5'), ["not CSV", "mend the quotes"]),
+    "unclosed quote": (set_cell(4, "scale_1_mm", '"1.5'), ["not CSV", "mend the quotes"]),
     "one row": (lambda t: "\n".join(lines_of(t)[:2]) + "\n", ["only one row"]),
     "no rows": (lambda t: lines_of(t)[0] + "\n", ["no rows"]),
     "empty file": (lambda _: "", ["is empty"]),
-    "empty column": (column("scale_2_mm", ""), ["no row of 20 can be used: 20 without scale_2_mm"]),
+    "empty column": (set_column("scale_2_mm", ""), ["no row of 20 can be used: 20 without scale_2_mm"]),
 }
 
 
@@ -109,12 +121,12 @@ def test_mistake_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
     edit, wanted = MISTAKES[mistake]
     text = edit(csv_text())
     assert text != csv_text(), "the edit must change the file"
-    problems = problems_of(put(tmp_path, text))
+    problems = problems_of(write_recording_files(tmp_path, text))
     message = "\n".join(problems)
     for part in wanted:
         assert part in message
     assert str(tmp_path / "run.csv") in message
-    assert len(problems) <= 2, "one mistake is not told many times"
+    assert len(problems) <= 2, "one mistake is reported once"
 
 
 SIDECARS: dict[str, tuple[str, list[str]]] = {
@@ -144,7 +156,7 @@ SIDECARS: dict[str, tuple[str, list[str]]] = {
 @pytest.mark.parametrize("mistake", SIDECARS)
 def test_sidecar_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
     sidecar, wanted = SIDECARS[mistake]
-    message = "\n".join(problems_of(put(tmp_path, csv_text(), sidecar)))
+    message = "\n".join(problems_of(write_recording_files(tmp_path, csv_text(), sidecar)))
     for part in wanted:
         assert part in message
 
@@ -152,7 +164,7 @@ def test_sidecar_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
 def test_every_mistake_of_a_sidecar_comes_at_once_with_its_line(tmp_path: Path) -> None:
     sidecar = "format: two\nreference:\n  quantity: tip\n  frame: tracker\n  sigma_um: -1\n"
     sidecar += "excluded_rows:\n- {row: 5}\nnotes: 3\n"
-    problems = [problem.split(": ")[0] for problem in problems_of(put(tmp_path, csv_text(), sidecar))]
+    problems = [problem.split(": ")[0] for problem in problems_of(write_recording_files(tmp_path, csv_text(), sidecar))]
     path = tmp_path / "run.yaml"
     assert problems == [
         f"{path}:1 format",
@@ -166,13 +178,13 @@ def test_every_mistake_of_a_sidecar_comes_at_once_with_its_line(tmp_path: Path) 
 
 
 def test_a_newer_format_is_refused_and_nothing_else_judged(tmp_path: Path) -> None:
-    (problem,) = problems_of(put(tmp_path, "no table\n", "format: 3\nsomething_new: 5\n"))
+    (problem,) = problems_of(write_recording_files(tmp_path, "no table\n", "format: 3\nsomething_new: 5\n"))
     assert "run.yaml:1 format: was written by a newer release" in problem
     assert "update compd" in problem
 
 
 def test_missing_sidecar_does_not_hide_the_rows_mistakes(tmp_path: Path) -> None:
-    path = put(tmp_path, cell(7, "joint_4_um", "abc")(csv_text()))
+    path = write_recording_files(tmp_path, set_cell(7, "joint_4_um", "abc")(csv_text()))
     path.with_suffix(".yaml").unlink()
     message = "\n".join(problems_of(path))
     assert "the sidecar is missing" in message
@@ -182,28 +194,30 @@ def test_missing_sidecar_does_not_hide_the_rows_mistakes(tmp_path: Path) -> None
 def test_every_problem_comes_in_one_message(tmp_path: Path) -> None:
     text = csv_text()
     for edit in (
-        cell(3, "scale_1_mm", "#REF!"),
-        cell(9, "session", "0.5"),
-        cell(12, "time_s", "3"),
-        header("joint_7_um", "joint_7_mm"),
-        header("room_degC", "room_F"),
+        set_cell(3, "scale_1_mm", "#REF!"),
+        set_cell(9, "session", "0.5"),
+        set_cell(12, "time_s", "3"),
+        rename_column("joint_7_um", "joint_7_mm"),
+        rename_column("room_degC", "room_F"),
     ):
         text = edit(text)
-    path = put(tmp_path, text, SIDECAR.replace("machine\n  sigma_um: 0.15", "tracker\n  sigma_um: good"))
+    path = write_recording_files(
+        tmp_path, text, SIDECAR.replace("machine\n  sigma_um: 0.15", "tracker\n  sigma_um: good")
+    )
     message = "\n".join(problems_of(path))
     for part in ("#REF!", "'0.5'", "time runs backwards", "joint_7_um", "room_degC", "'tracker'", "'good'"):
         assert part in message
 
 
 def test_equal_problems_are_summed_up(tmp_path: Path) -> None:
-    (problem,) = problems_of(put(tmp_path, column("joint_2_um", "n/a")(csv_text(415))))
+    (problem,) = problems_of(write_recording_files(tmp_path, set_column("joint_2_um", "n/a")(csv_text(415))))
     assert "column joint_2_um (H), rows 2, 3, 4 and 412 more rows" in problem
     assert problem.count("'n/a'") == 1
 
 
 def test_german_spreadsheet_gets_two_problems_not_ninety(tmp_path: Path) -> None:
     text = csv_text(separator=";").replace(".", ",")
-    problems = problems_of(put(tmp_path, text))
+    problems = problems_of(write_recording_files(tmp_path, text))
     assert len(problems) == 2
     assert "separated by semicolons" in problems[0]
     assert "decimal comma" in problems[1]
@@ -219,7 +233,7 @@ def test_german_spreadsheet_gets_two_problems_not_ninety(tmp_path: Path) -> None
     ],
 )
 def test_file_of_another_kind(tmp_path: Path, content: bytes, wanted: str) -> None:
-    assert wanted in "\n".join(problems_of(put(tmp_path, content)))
+    assert wanted in "\n".join(problems_of(write_recording_files(tmp_path, content)))
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
@@ -233,17 +247,19 @@ def test_nothing_but_words_comes_of_any_file(tmp_path: Path, data: st.DataObject
         text = text[:at] + data.draw(st.text("0,;\n\r\t\"'#.-eE_x \u00b0\u2212\x00", max_size=6)) + text[at + cut :]
     sidecar = data.draw(st.sampled_from([SIDECAR, SIDECAR[1:], SIDECAR[:40], SIDECAR + "excluded_rows: [{rows: 3-4}]"]))
     try:
-        found = read_recording(put(tmp_path, text, sidecar))
+        recording = read_recording(write_recording_files(tmp_path, text, sidecar))
     except RecordingError:
         return
-    assert np.isfinite(found.time_s).all()
-    assert (np.diff(found.time_s) > 0).all()
+    assert np.isfinite(recording.time_s).all()
+    assert (np.diff(recording.time_s) > 0).all()
 
 
 def test_ball_plate_mistakes(tmp_path: Path) -> None:
-    text = without("reference_x_mm", "reference_y_mm", "reference_z_mm")(header("pressure_hPa", "ball")(csv_text()))
+    text = drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm")(
+        rename_column("pressure_hPa", "ball")(csv_text())
+    )
     sidecar = "machine: tripod-cmm\nreference: {quantity: ball_plate, balls: plate.csv}\n"
-    path = put(tmp_path, text.replace("1013.25", "17"), sidecar)
+    path = write_recording_files(tmp_path, text.replace("1013.25", "17"), sidecar)
     assert "plate.csv: cannot be read" in "\n".join(problems_of(path))
     (tmp_path / "plate.csv").write_text("ball,x_mm,y_mm,z_mm\n1,0,0,0\n2,50,0,\n2,50,0,0\n")
     message = "\n".join(problems_of(path))
@@ -254,7 +270,7 @@ def test_ball_plate_mistakes(tmp_path: Path) -> None:
 
 
 def test_sidecar_of_another_machine(tmp_path: Path) -> None:
-    path = put(tmp_path, csv_text())
+    path = write_recording_files(tmp_path, csv_text())
     with pytest.raises(RecordingError) as caught:
         read_recording(path, load(HEXAPOD))
     message = str(caught.value)
@@ -265,8 +281,8 @@ def test_sidecar_of_another_machine(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("machine", "wanted"), [("hexapod", "hexapod has 6"), ("tripod-cm", "--machine PATH")])
 def test_check_finds_the_machine_that_the_sidecar_names(tmp_path: Path, machine: str, wanted: str) -> None:
-    path = put(tmp_path, csv_text(), SIDECAR.replace("tripod-cmm", machine))
-    result = CliRunner().invoke(recording, ["check", str(path)])
+    path = write_recording_files(tmp_path, csv_text(), SIDECAR.replace("tripod-cmm", machine))
+    result = CliRunner().invoke(recording_command, ["check", str(path)])
     assert isinstance(result.exception, RecordingError)
     assert wanted in str(result.exception)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["run.csv", "run.yaml"]

@@ -1,4 +1,4 @@
-"""From a file to a Configuration, or to every problem in it at once."""
+"""Loading a machine's configuration: the Configuration, or every problem in its file at once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from compd.configuration import crosscheck
-from compd.configuration.document import Document, Location, read
+from compd.configuration.document import Document, Location, read_document
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings
 from compd.configuration.operation import LimitSettings, LoopSettings, SocketSettings, StateSettings, Wiring
@@ -36,7 +36,11 @@ SECTIONS: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Configuration:
-    """A whole machine, checked. `gauges` holds each driver's own options, with `.driver` and `.line`."""
+    """A whole machine, checked.
+
+    gauges : each gauge's options, of its driver's own model. drivers : the gauges' driver classes, by name.
+    warnings : what can be used but is probably a mistake.
+    """
 
     path: Path
     machine: str
@@ -57,17 +61,17 @@ class Configuration:
 
     @property
     def config_hash(self) -> str:
-        """Of everything in the file: tells a client whether two daemons run the same configuration."""
+        """Hash of everything in the file: equal for two daemons with the same configuration."""
         return _hash(self, ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"))
 
     @property
     def geometry_hash(self) -> str:
-        """Of what a model is fitted on: the geometry, without what only limits it."""
+        """Hash of what a model is fitted on: the geometry without the limits of the links' length."""
         return _hash(self, ("geometry",), without=("link_length_mm",))
 
     @property
     def zero_hash(self) -> str:
-        """Of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
+        """Hash of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
         return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))
 
 
@@ -76,7 +80,7 @@ def load(path: Path) -> Configuration:
 
     Raises ConfigurationError with every problem: file, line, key, value, what is allowed, next step.
     """
-    document = read(path)
+    document = read_document(path)
     problems: list[Problem] = []
     section_names = [*SECTIONS, "gauges"]
     problems += [unknown_key(document, (key,), section_names) for key in document.data if key not in section_names]
@@ -88,11 +92,15 @@ def load(path: Path) -> Configuration:
             sections[name] = None
             problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
     gauges, drivers = _gauges(document, problems)
-    parts = crosscheck.Parts(document, sections["geometry"], sections["lines"], gauges, drivers, sections["wiring"])
-    problems += crosscheck.problems(parts)
+    readable = crosscheck.Sections(
+        document, sections["geometry"], sections["lines"], gauges, drivers, sections["wiring"]
+    )
+    problems += crosscheck.problems(readable)
     if problems:
         raise ConfigurationError(sorted(set(problems), key=lambda problem: _line_number(problem.where)))
-    return Configuration(path, gauges=gauges, drivers=drivers, warnings=tuple(crosscheck.warnings(parts)), **sections)
+    return Configuration(
+        path, gauges=gauges, drivers=drivers, warnings=tuple(crosscheck.warnings(readable)), **sections
+    )
 
 
 def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, GaugeOptions], dict[str, type[Gauge[Any]]]]:
