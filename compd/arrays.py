@@ -1,4 +1,4 @@
-"""Arrays as the whole program names them in annotations, their shapes in the docstrings; their root mean square."""
+"""Array types for annotations (docstrings give the shapes), and their root mean square."""
 
 from __future__ import annotations
 

@@ -5,9 +5,10 @@ instrument's frame. Each step solves the weighted linear problem
 
     minimise  sum_i w_i | (y_i - f_i(theta) - R_i r - G_i (d_theta, d_r)) / sigma |^2
 
-by `solve_least_squares`, with Huber weights w_i (`huber_weights`) and the columns G (the derivatives at machine
-zero, R among them), and then evaluates the full model again. Outliers are found from the residual, left out, and the
-fit is repeated until they no longer change. Standard errors: `cluster_covariance`.
+by `solve_least_squares`, with Huber weights w_i (`huber_weights`), and then evaluates the full model f again. The
+derivatives G (R are its last columns) are taken once, at each row's readings without any effect. Outliers are found
+from the residual, left out, and the fit is repeated until they no longer change. Standard errors:
+`cluster_covariance`.
 
 Example::
 
