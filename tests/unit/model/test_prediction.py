@@ -15,9 +15,8 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.model.deltas import deltas_by_effect, effect_deltas, port_size, sum_deltas
 from compd.model.effect import PORTS, FittedEffect, Port
-from compd.model.joint_correction import scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_vector
-from compd.model.kinematics import inverse_kinematics
+from compd.model.kinematics import inverse_kinematics, scale_for_length_mm
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
