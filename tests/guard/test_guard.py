@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from tests.scoreboard.trial import at_once
+from tests.scoreboard.trial import run_in_process
 from tests.support.live_machine import machine
 from tests.support.paths import SHARED
 
@@ -43,7 +43,7 @@ def test_setpoints_are_bit_for_bit_those_of_0_1_0(run):
 def test_examples_are_judged_as_by_0_1_0(name):
     example, *which, command, _ = name.split(".")
     recording = EXAMPLES / example / f"{which[0] if which else 'train'}.csv"
-    now = json.loads(at_once(command, str(recording), "--json"))
+    now = json.loads(run_in_process(command, str(recording), "--json"))
     before = json.loads((HERE / "verdicts" / name).read_text(encoding="utf-8"))
     assert differences(before, now) == []
 

@@ -87,7 +87,7 @@ def add_named_effects(run: HiddenRun, verdict: dict[str, Any], recording: Path, 
 
 
 def run_hidden(hidden: list[int], directory: Path, pace: Pace = HOURS) -> Outcome:
-    """The whole way, from a machine with a secret to the daemon that has learned it."""
+    """Survey, diagnose, adopt: from a machine with hidden causes to the daemon that compensates them."""
     options = [word for number in hidden for word in ("--hidden", str(number))]
     with hidden_run(directory, "--seed", "1", "--speedup", pace.speedup, *options) as run:
         recording, before_um = run.survey(survey_visits(2, VISITS, heaters=pace.heaters), "survey")
