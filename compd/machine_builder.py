@@ -49,7 +49,7 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
 
 
 def machine_details(geometry: Geometry) -> MachineDetails:
-    """What effects ask of a geometry beyond the kinematics; nan where it says nothing."""
+    """What effects need of a geometry beyond its kinematics; nan where it says nothing."""
     unknown = float("nan")
     return MachineDetails(geometry.plate_thickness_mm or unknown, geometry.scale_signal_period_mm or unknown)
 
