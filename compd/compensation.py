@@ -18,9 +18,15 @@ from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
 from compd.model.apply_effects import EffectInputs, EffectMemory, apply_effects, final, final_array
 from compd.model.frame import Frame, solve_frame
-from compd.model.joint_correction import joint_shortening, link_length_mm, scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix, to_inner
-from compd.model.kinematics import Pose, forward_kinematics, inverse_kinematics
+from compd.model.kinematics import (
+    Pose,
+    forward_kinematics,
+    inverse_kinematics,
+    joint_shortening,
+    link_length_mm,
+    scale_for_length_mm,
+)
 from compd.model.machine import MachineModel
 from compd.model.prediction import PerturbedMachine
 from compd.model.tool import Contact

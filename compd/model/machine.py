@@ -43,7 +43,7 @@ class MachineModel:
 
     frame : supports, plate points, base joints.  platform_joints_P_mm : (n, 3).
     revolute_axes_P : (3, 3) unit vectors for the tripod, (0, 3) for the hexapod.
-    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.joint_correction`.
+    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.kinematics.joint_shortening`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
     constants : what effects need beyond the kinematics; None where none was computed, as for a model without effects.

@@ -10,9 +10,8 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.deltas import Deltas
 from compd.model.effect import Port
 from compd.model.frame import Frame, solve_frame
-from compd.model.joint_correction import joint_shortening, link_length_mm
 from compd.model.kernels.rotation import compose, rotation_matrix
-from compd.model.kinematics import Mechanism, forward_kinematics
+from compd.model.kinematics import Mechanism, forward_kinematics, joint_shortening, link_length_mm
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 

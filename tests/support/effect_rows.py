@@ -26,7 +26,7 @@ LIBRARY = load_library()
 PLACES = ("room", "base", "frame", "platform", "tool", "plate_top", "plate_bottom")
 
 
-def quantities(links: int, rows: int, values: Mapping[str, Any]) -> dict[str, Floats]:
+def all_quantities(links: int, rows: int, values: Mapping[str, Any]) -> dict[str, Floats]:
     """Everything that the library may need: 20 degC, no load, 1013.25 hPa, but for `values`."""
     names = [f"temperature_{place}_degC" for place in (*PLACES, *(f"link_{i + 1}" for i in range(links)))]
     still: dict[str, Any] = dict.fromkeys(names, 20.0)
@@ -34,7 +34,7 @@ def quantities(links: int, rows: int, values: Mapping[str, Any]) -> dict[str, Fl
     return {name: np.broadcast_to(np.asarray(value, float), (rows,)) for name, value in (still | dict(values)).items()}
 
 
-def at_tips(
+def rows_at_tips(
     model: MachineModel, tip_M_mm: Floats, values: Mapping[str, Any] | None = None, **given: Any
 ) -> Observations:
     """Rows at these tips with perfect gauges; `values` by quantity, `given` by argument of `observe`."""
@@ -47,7 +47,7 @@ def at_tips(
         "scale_mm": pose.link_length_mm - zero.link_length_mm,
         "joint_mm": np.zeros((count, k)),
         "frame_mm": np.zeros((count, 9)),
-        "quantities": quantities(n, count, values or {}),
+        "quantities": all_quantities(n, count, values or {}),
         "time_s": 25.0 * np.arange(count),
         "session_start": np.arange(count) == 0,
         "movement": Movement(np.ones((count, n)), np.zeros((count, n)), np.zeros((count, k))),
@@ -55,16 +55,16 @@ def at_tips(
     return observe(model, machine_constants(model, DETAILS), **(arguments | given))
 
 
-def at_zero(model: MachineModel = TRIPOD, values: Mapping[str, Any] | None = None, **given: Any) -> Observations:
+def row_at_zero(model: MachineModel = TRIPOD, values: Mapping[str, Any] | None = None, **given: Any) -> Observations:
     """One row at machine zero."""
-    return at_tips(model, model.zero.contact.tip_M_mm[None], values, **given)
+    return rows_at_tips(model, model.zero.contact.tip_M_mm[None], values, **given)
 
 
-def varied(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[str, Any]:
+def random_inputs(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[str, Any]:
     """Arguments of `observe` in which nothing is zero: two sessions, uneven times, weather, load, moving links."""
     rng = np.random.default_rng(seed)
     n, k = model.links, model.joint_weights.shape[1]
-    around = at_tips(model, tips(model, rows, seed, 60.0))
+    around = rows_at_tips(model, tips(model, rows, seed, 60.0))
     weather = {name: 20.0 + rng.normal(0, 1, rows) for name in around.quantities if name.startswith("temperature")}
     load = {f"force_{axis}_N": rng.normal(0, 30, rows) for axis in "xyz"}
     return {
@@ -82,12 +82,12 @@ def varied(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[str, Any]
     }
 
 
-def rows_of(model: MachineModel, arguments: Mapping[str, Any]) -> Observations:
+def observe_rows(model: MachineModel, arguments: Mapping[str, Any]) -> Observations:
     """The rows of such arguments."""
     return observe(model, machine_constants(model, DETAILS), **arguments)
 
 
-def part(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
+def select_rows(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
     """Some of the rows."""
     return {
         "quantities": {name: values[which] for name, values in arguments["quantities"].items()},
@@ -95,13 +95,13 @@ def part(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
     } | {name: arguments[name][which] for name in arguments if name not in ("quantities", "movement")}
 
 
-def some_shape(effect: Effect) -> dict[str, float]:
+def constants_of(effect: Effect) -> dict[str, float]:
     """Shape constants with which something happens between rows of `varied`."""
     some = {"p": PERIODS_MM[4], "d": 30.0, "tau": 240.0}
     return {constant.name: some.get(constant.name, constant.grid[-1]) for constant in effect.constants}
 
 
-def added(id_: str, rows: Observations, *theta: float, **shape: float) -> Floats:
+def delta_mm(id_: str, rows: Observations, *theta: float, **shape: float) -> Floats:
     """What one effect adds at its first port, (N, size), for these numbers."""
     from compd.model.effect import FittedEffect
 
@@ -110,7 +110,7 @@ def added(id_: str, rows: Observations, *theta: float, **shape: float) -> Floats
     return found[effect.ports[0]]
 
 
-def solved_tip(model: MachineModel, lengths_mm: Floats, **moved: Floats) -> Floats:
+def solve_tip(model: MachineModel, lengths_mm: Floats, **moved: Floats) -> Floats:
     """The tip (3,) by scipy's solver on the closure written out, with base_M, joints_P or axes_P moved."""
     zero = model.zero
     base = zero.base_joints_M_mm + moved.get("base_M", 0.0)

@@ -39,7 +39,7 @@ def ring(radius_mm: float, *degrees: float, z_mm: float = 0.0) -> Floats:
     return np.stack([radius_mm * np.cos(angle), radius_mm * np.sin(angle), np.full(len(degrees), z_mm)], -1)
 
 
-def about(axis: str, degrees: float) -> Floats:
+def rotation(axis: str, degrees: float) -> Floats:
     """Rotation about one axis."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     i = "xyz".index(axis)
@@ -99,7 +99,7 @@ def hexapod() -> MachineModel:
     return machine_model(**hexapod_parts())
 
 
-def moved(parts: dict[str, Any], R: Floats, shift_mm: Floats) -> dict[str, Any]:
+def move_machine(parts: dict[str, Any], R: Floats, shift_mm: Floats) -> dict[str, Any]:
     """The same machine with the whole world turned and shifted: base under the work, or beside it."""
     contact = parts["zero_contact"]
     attitude = parts["zero_rotation_M_P"]

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from compd.model.motion import Movement
-from tests.support.effect_rows import TRIPOD, added, at_tips
+from tests.support.effect_rows import TRIPOD, delta_mm, rows_at_tips
 from tests.support.model_machines import Floats
 
 UM = 1e-3
@@ -20,8 +20,8 @@ def along(position_mm: Floats, rounded: float = 0.0) -> Floats:
     count = len(scale_mm)
     unknown = Movement(np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 9)))
     tip = np.tile(TRIPOD.zero.contact.tip_M_mm, (count, 1))
-    rows = at_tips(TRIPOD, tip, scale_mm=scale_mm, movement=unknown)
-    return -added("friction_hysteresis", rows, 1.0, d=2.0, r=rounded)[:, 0] / UM
+    rows = rows_at_tips(TRIPOD, tip, scale_mm=scale_mm, movement=unknown)
+    return -delta_mm("friction_hysteresis", rows, 1.0, d=2.0, r=rounded)[:, 0] / UM
 
 
 def test_hysteresis_builds_up_again_after_a_reversal() -> None:
@@ -38,8 +38,8 @@ def test_hysteresis_follows_the_approach_where_rows_hide_a_reversal() -> None:
     """Both rows are approached from above: between them the link went farther down than the second."""
     scale_mm = np.array([[10.0] * 3, [0.0] * 3])
     upwards = Movement(np.ones((2, 3)), np.zeros((2, 3)), np.zeros((2, 9)))
-    rows = at_tips(TRIPOD, np.tile(TRIPOD.zero.contact.tip_M_mm, (2, 1)), scale_mm=scale_mm, movement=upwards)
-    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0, r=0.0), -UM)
+    rows = rows_at_tips(TRIPOD, np.tile(TRIPOD.zero.contact.tip_M_mm, (2, 1)), scale_mm=scale_mm, movement=upwards)
+    np.testing.assert_allclose(delta_mm("friction_hysteresis", rows, 1.0, d=2.0, r=0.0), -UM)
 
 
 def test_a_round_loop_nears_its_end_by_a_factor_e_over_the_distance() -> None:
@@ -54,22 +54,22 @@ def test_a_round_loop_nears_its_end_by_a_factor_e_over_the_distance() -> None:
 def test_a_session_forgets_the_one_before() -> None:
     scale_mm = np.repeat([[0.0], [10.0], [10.0]], 3, axis=1)
     unknown = Movement(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 9)))
-    rows = at_tips(
+    rows = rows_at_tips(
         TRIPOD,
         np.tile(TRIPOD.zero.contact.tip_M_mm, (3, 1)),
         scale_mm=scale_mm,
         movement=unknown,
         session_start=np.array([True, False, True]),
     )
-    np.testing.assert_allclose(added("friction_hysteresis", rows, 1.0, d=2.0, r=0.0)[:, 0], [0, -UM, 0], atol=1e-15)
+    np.testing.assert_allclose(delta_mm("friction_hysteresis", rows, 1.0, d=2.0, r=0.0)[:, 0], [0, -UM, 0], atol=1e-15)
 
 
 def step_response(times_s: Floats, tau_s: float) -> Floats:
     """Warming of the rod in K: the skin steps by 1 K just after the start."""
     warm = np.where(np.arange(len(times_s)) == 0, 20.0, 21.0)
     tip = np.tile(TRIPOD.zero.contact.tip_M_mm, (len(times_s), 1))
-    rows = at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": warm for i in (1, 2, 3)}, time_s=times_s)
-    found = added("link_expansion_lag", rows, 10.0, tau=tau_s)[:, 0]
+    rows = rows_at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": warm for i in (1, 2, 3)}, time_s=times_s)
+    found = delta_mm("link_expansion_lag", rows, 10.0, tau=tau_s)[:, 0]
     return found / (10e-6 * LINK_MM)
 
 
@@ -89,8 +89,8 @@ def test_the_lag_solves_its_differential_equation_for_a_ramping_room() -> None:
     times_s = np.cumsum(rng.uniform(5, 400, 30))
     skin_K = np.cumsum(rng.normal(0, 0.2, 30))
     tip = np.tile(TRIPOD.zero.contact.tip_M_mm, (30, 1))
-    rows = at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": 20 + skin_K for i in (1, 2, 3)}, time_s=times_s)
-    found = added("link_expansion_lag", rows, 1.0, tau=900.0)[:, 0] / (1e-6 * LINK_MM)
+    rows = rows_at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": 20 + skin_K for i in (1, 2, 3)}, time_s=times_s)
+    found = delta_mm("link_expansion_lag", rows, 1.0, tau=900.0)[:, 0] / (1e-6 * LINK_MM)
     solution = solve_ivp(
         lambda t, y: (np.interp(t, times_s, skin_K) - y) / 900.0,
         (times_s[0], times_s[-1]),
@@ -107,7 +107,7 @@ def test_a_missing_temperature_leaves_no_trace_in_the_lag() -> None:
     warm = np.array([20.0, 21.0, np.nan, 21.0, 21.0])
     tip = np.tile(TRIPOD.zero.contact.tip_M_mm, (5, 1))
     times_s = np.array([0.0, 1e-6, 300.0, 600.0, 900.0])
-    rows = at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": warm for i in (1, 2, 3)}, time_s=times_s)
-    found = added("link_expansion_lag", rows, 10.0, tau=600.0)[:, 0] / (10e-6 * LINK_MM)
+    rows = rows_at_tips(TRIPOD, tip, {f"temperature_link_{i}_degC": warm for i in (1, 2, 3)}, time_s=times_s)
+    found = delta_mm("link_expansion_lag", rows, 10.0, tau=600.0)[:, 0] / (10e-6 * LINK_MM)
     assert np.isnan(found[2])
     np.testing.assert_allclose(found[[3, 4]], step_response(times_s, 600.0)[[3, 4]], atol=1e-12)

@@ -18,7 +18,16 @@ from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find_effect, load_library
 from compd.model.motion import update_motion
 from compd.model.observe import observe_tip
-from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, at_zero, part, rows_of, some_shape, varied
+from tests.support.effect_rows import (
+    HEXAPOD,
+    LIBRARY,
+    TRIPOD,
+    constants_of,
+    observe_rows,
+    random_inputs,
+    row_at_zero,
+    select_rows,
+)
 from tests.support.model_machines import Floats
 
 PORT_FILES = {
@@ -64,18 +73,20 @@ def test_every_effect_says_what_it_must(effect: Effect) -> None:
 def test_rows_at_once_are_row_after_row_bit_for_bit(effect: Effect, model: object) -> None:
     assert model in (TRIPOD, HEXAPOD)
     machine = TRIPOD if model is TRIPOD else HEXAPOD
-    arguments = varied(machine)
-    rows = rows_of(machine, arguments)
+    arguments = random_inputs(machine)
+    rows = observe_rows(machine, arguments)
     if unmet_needs(effect, rows.available, rows.links):
         assert "revolute_axes" in effect.needs
         return
     theta = np.linspace(0.3, 1.7, len(effect.columns(rows.links)))
-    fitted = [FittedEffect(effect, theta, some_shape(effect))]
+    fitted = [FittedEffect(effect, theta, constants_of(effect))]
     at_once, last = deltas_by_effect(fitted, rows, {})
     one_by_one = []
     memories = {}
     for i in range(len(rows)):
-        found, memories = deltas_by_effect(fitted, rows_of(machine, part(arguments, slice(i, i + 1))), memories)
+        found, memories = deltas_by_effect(
+            fitted, observe_rows(machine, select_rows(arguments, slice(i, i + 1))), memories
+        )
         one_by_one.append(found[effect.id])
     for port, values in at_once[effect.id].items():
         assert values.shape == (len(rows), port_size(port, rows))
@@ -89,7 +100,7 @@ def test_rows_at_once_are_row_after_row_bit_for_bit(effect: Effect, model: objec
 
 
 def test_a_missing_gauge_is_named() -> None:
-    available = at_zero().available - {"temperature_link_2_degC"}
+    available = row_at_zero().available - {"temperature_link_2_degC"}
     (problem,) = unmet_needs(LIBRARY["link_expansion"], available, 3)
     assert "temperature_link_2_degC" in problem.what
     assert "wire a thermometer under `wiring: quantities:`" in problem.next_step
@@ -97,31 +108,31 @@ def test_a_missing_gauge_is_named() -> None:
     assert "a force gauge" in problem.next_step
     (problem,) = unmet_needs(LIBRARY["plate_bending"], available - {"plate_thickness_mm"}, 3)
     assert "plate_thickness_mm" in problem.next_step
-    assert not unmet_needs(LIBRARY["link_expansion"], at_zero().available, 3)
+    assert not unmet_needs(LIBRARY["link_expansion"], row_at_zero().available, 3)
 
 
 def test_every_effect_reads_no_more_than_it_declares() -> None:
     """A basis that reads a quantity which is not in `needs` fails here: only what is declared is there."""
     for effect in BUNDLED:
-        arguments = varied(TRIPOD, 2)
+        arguments = random_inputs(TRIPOD, 2)
         declared = set(needed_quantities(effect, 3))
         arguments["quantities"] = {k: v for k, v in arguments["quantities"].items() if k in declared}
-        effect.basis(rows_of(TRIPOD, arguments), some_shape(effect), None)
+        effect.basis(observe_rows(TRIPOD, arguments), constants_of(effect), None)
 
 
 def test_a_hexapod_has_no_revolute_axes() -> None:
     effects = [effect for effect in BUNDLED if "revolute_axes" in effect.needs]
     assert effects
     for effect in effects:
-        (problem,) = unmet_needs(effect, at_zero(HEXAPOD).available, 6)
+        (problem,) = unmet_needs(effect, row_at_zero(HEXAPOD).available, 6)
         assert "tripod" in problem.next_step
 
 
 def test_no_effect_sees_the_reference() -> None:
-    arguments = varied(TRIPOD, 2)
+    arguments = random_inputs(TRIPOD, 2)
     arguments["quantities"]["reference_x_mm"] = np.zeros(2)
     with pytest.raises(CompdError, match="must never see the answer"):
-        rows_of(TRIPOD, arguments)
+        observe_rows(TRIPOD, arguments)
 
 
 def test_of_an_external_model_only_the_reference_can_err() -> None:
@@ -225,7 +236,7 @@ def as_matrix(values: Floats) -> Floats:
 
 def test_columns_are_named_in_the_order_of_the_basis() -> None:
     names = [column.name for column in LIBRARY["base_joint_position"].columns(3)]
-    basis, _ = LIBRARY["base_joint_position"].basis(at_zero(), {}, None)
+    basis, _ = LIBRARY["base_joint_position"].basis(row_at_zero(), {}, None)
     assert names[4] == "d_2y"
     assert np.flatnonzero(as_matrix(basis)[:, 4]).tolist() == [4]
     names = [column.name for column in LIBRARY["scale_cyclic"].columns(3)]

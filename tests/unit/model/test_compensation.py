@@ -13,7 +13,16 @@ from compd.model.kernels.rotation import rotation_matrix, rotation_vector, to_in
 from compd.model.machine import MachineModel, machine_model
 from compd.model.solve_status import Reason, require
 from compd.model.tool import Contact, ToolOnPlate
-from tests.support.model_machines import Floats, about, hexapod, hexapod_parts, moved, tips, tripod, tripod_parts
+from tests.support.model_machines import (
+    Floats,
+    hexapod,
+    hexapod_parts,
+    move_machine,
+    rotation,
+    tips,
+    tripod,
+    tripod_parts,
+)
 
 ROWS = 25
 
@@ -24,13 +33,13 @@ def work_on_platform(parts: dict[str, object]) -> MachineModel:
     return machine_model(**{**parts, "arrangement": ToolOnPlate(tool_M), "zero_contact": Contact(tool_M, place_P)})  # type: ignore[arg-type]
 
 
-UNDER = (about("x", 180), np.array([0.0, 0.0, 50.0]))
-BESIDE = (about("y", 90), np.array([-800.0, 0.0, 300.0]))
+UNDER = (rotation("x", 180), np.array([0.0, 0.0, 50.0]))
+BESIDE = (rotation("y", 90), np.array([-800.0, 0.0, 300.0]))
 MACHINES = {
     "tripod": tripod(),
     "hexapod": hexapod(),
-    "tripod under the work": machine_model(**moved(tripod_parts(), *UNDER)),
-    "hexapod beside the work": machine_model(**moved(hexapod_parts(), *BESIDE)),
+    "tripod under the work": machine_model(**move_machine(tripod_parts(), *UNDER)),
+    "hexapod beside the work": machine_model(**move_machine(hexapod_parts(), *BESIDE)),
     "tripod with the work on the platform": work_on_platform(tripod_parts()),
     "hexapod with the work on the platform": work_on_platform(hexapod_parts()),
 }
@@ -144,7 +153,7 @@ def assert_same_bits(one: Compensation, many: Compensation, i: int) -> None:
 @pytest.mark.parametrize("turn", [UNDER, BESIDE], ids=["under", "beside"])
 @pytest.mark.parametrize("parts", [tripod_parts(), hexapod_parts()], ids=["tripod", "hexapod"])
 def test_a_turned_world_asks_for_the_same_setpoint(parts: dict[str, object], turn: tuple[Floats, Floats]) -> None:
-    here, there = machine_model(**parts), machine_model(**moved(parts, *turn))  # type: ignore[arg-type]
+    here, there = machine_model(**parts), machine_model(**move_machine(parts, *turn))  # type: ignore[arg-type]
     values = gauges(here)
     upright, _ = compensate_machine_tool(here, targets(here), None, values, WarmStart.at_zero(here))
     turned, _ = compensate_machine_tool(there, targets(here), None, values, WarmStart.at_zero(there))

@@ -18,7 +18,7 @@ from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
-from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, some_shape, varied
+from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, random_inputs
 
 ON_PLATE = replace(TRIPOD, arrangement=ToolOnPlate(TRIPOD.zero.contact.tip_M_mm))
 LIVE = [effect for effect in LIBRARY.values() if effect.live]
@@ -29,7 +29,7 @@ def fitted(effect: Effect, model: MachineModel) -> FittedEffect:
     """With plausible numbers, so that every effect moves the tip; a scale's cyclic error is 1 % of its period."""
     share = 0.1 if effect.id == "scale_cyclic" else 0.3
     theta = [share * column.parameter.theta_range[1] for column in effect.columns(model.links)]
-    return FittedEffect(effect, np.array(theta), some_shape(effect))
+    return FittedEffect(effect, np.array(theta), constants_of(effect))
 
 
 def carrying(model: MachineModel, *effects: Effect) -> MachineModel:
@@ -89,7 +89,7 @@ CASES = [
 
 @pytest.mark.parametrize(("model", "effect"), CASES)
 def test_the_tip_is_where_the_workbench_predicts_it(model: MachineModel, effect: Effect) -> None:
-    values = values_of(varied(model, ROWS))
+    values = values_of(random_inputs(model, ROWS))
     machine = carrying(model, effect)
     found, _ = compensate_cmm(machine, values, WarmStart.at_zero(machine))
     rows = seen_as_recording(model, values)
@@ -106,7 +106,7 @@ def test_the_tip_is_where_the_workbench_predicts_it(model: MachineModel, effect:
 def test_snapshots_one_by_one_are_as_all_rows_together(model: MachineModel) -> None:
     """Every effect at once, bit for bit: memory goes from snapshot to snapshot as from row to row."""
     machine = carrying(model, *possible(model))
-    values = values_of(varied(model, ROWS))
+    values = values_of(random_inputs(model, ROWS))
     start = WarmStart.at_zero(machine)
     together_, after = compensate_cmm(machine, values, start)
     warm = start
@@ -125,7 +125,7 @@ def test_snapshots_one_by_one_are_as_all_rows_together(model: MachineModel) -> N
 @pytest.mark.parametrize(("model", "effect"), CASES)
 def test_scales_at_the_setpoint_bring_the_tip_to_the_target(model: MachineModel, effect: Effect) -> None:
     machine = carrying(model, effect)
-    values = row(values_of(varied(model, ROWS)), 5)
+    values = row(values_of(random_inputs(model, ROWS)), 5)
     start = WarmStart.at_zero(machine)
     target_B0_mm = model.zero.contact.tip_M_mm - model.frame.zero_origin_M_mm + np.array([12.0, -7.0, 3.0])
     asked, _ = compensate_machine_tool(
@@ -140,7 +140,7 @@ def test_scales_at_the_setpoint_bring_the_tip_to_the_target(model: MachineModel,
 @pytest.mark.parametrize("model", [TRIPOD, HEXAPOD, ON_PLATE], ids=["tripod", "hexapod", "tool on plate"])
 def test_the_shares_of_joints_frame_and_effects_add_up_to_the_correction(model: MachineModel) -> None:
     machine = carrying(model, *possible(model))
-    values = values_of(varied(model, ROWS))
+    values = values_of(random_inputs(model, ROWS))
     start = WarmStart.at_zero(machine)
     found, _ = compensate_cmm(machine, values, start)
     target = machine.zero.contact.tip_P_mm if model is ON_PLATE else np.array([1.0, 2.0, -505.0])
@@ -155,7 +155,7 @@ def test_the_shares_of_joints_frame_and_effects_add_up_to_the_correction(model: 
 
 def test_a_share_is_what_the_effect_adds_to_those_before_it() -> None:
     first, second = LIBRARY["link_zero"], LIBRARY["tool_offset"]
-    values = row(values_of(varied(TRIPOD, ROWS)), 3)
+    values = row(values_of(random_inputs(TRIPOD, ROWS)), 3)
     corrections = [np.zeros(3)]
     for effects in ((), (first,), (first, second)):
         machine = carrying(TRIPOD, *effects)
@@ -167,7 +167,7 @@ def test_a_share_is_what_the_effect_adds_to_those_before_it() -> None:
 
 def test_what_happens_at_the_reference_never_acts_on_the_machine() -> None:
     machine = carrying(TRIPOD, *(effect for effect in LIBRARY.values() if not effect.live))
-    values = values_of(varied(TRIPOD, ROWS))
+    values = values_of(random_inputs(TRIPOD, ROWS))
     with_, after = compensate_cmm(machine, values, WarmStart.at_zero(machine))
     without, _ = compensate_cmm(TRIPOD, values, WarmStart.at_zero(TRIPOD))
     assert with_.tip_M_mm.tobytes() == without.tip_M_mm.tobytes()
@@ -177,7 +177,7 @@ def test_what_happens_at_the_reference_never_acts_on_the_machine() -> None:
 
 def test_a_pose_out_of_reach_costs_no_memory() -> None:
     machine = carrying(TRIPOD, LIBRARY["link_expansion_lag"], LIBRARY["backlash"])
-    values = values_of(varied(TRIPOD, ROWS))
+    values = values_of(random_inputs(TRIPOD, ROWS))
     warm = WarmStart.at_zero(machine)
     for i in range(4):
         _, warm = compensate_cmm(machine, row(values, i), warm)
@@ -192,7 +192,7 @@ def test_a_pose_out_of_reach_costs_no_memory() -> None:
 
 def test_going_over_to_commanded_scales_is_no_reversal() -> None:
     machine = carrying(TRIPOD, LIBRARY["backlash"], LIBRARY["link_zero"])
-    values = row(values_of(varied(TRIPOD, ROWS)), 0)
+    values = row(values_of(random_inputs(TRIPOD, ROWS)), 0)
     warm = WarmStart.at_zero(machine)
     for step in range(3):
         _, warm = compensate_cmm(machine, values._replace(scale_mm=np.full(3, 0.1 * step), time_s=float(step)), warm)

@@ -21,7 +21,7 @@ from compd.model.formula.parser import DEEPEST, LONGEST, parse
 from compd.model.library import find_effect
 from compd.model.prediction import predict
 from compd.model.sensitivity import effect_sensitivity, sensitivities
-from tests.support.effect_rows import HEXAPOD, TRIPOD, at_zero, rows_of, varied
+from tests.support.effect_rows import HEXAPOD, TRIPOD, observe_rows, random_inputs, row_at_zero
 
 ALLOWED_NODES = (ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
 NAMES = ("k", "humidity_pct", "x_mm", "pi")
@@ -321,7 +321,7 @@ def test_arithmetic_that_fails_gives_nan_and_no_warning() -> None:
 def test_the_persons_example() -> None:
     effect = find_effect(GRANITE, "model.yaml:12")
     assert effect.needs == ("humidity_pct",)
-    rows = at_zero(values={"humidity_pct": 53.0})
+    rows = row_at_zero(values={"humidity_pct": 53.0})
     found, _ = effect_deltas(FittedEffect(effect, np.array([0.1])), rows)
     np.testing.assert_allclose(found["link"], 0.3e-3)
     (problem,) = unmet_needs(effect, rows.available - {"humidity_pct"}, 3)
@@ -330,7 +330,7 @@ def test_the_persons_example() -> None:
 
 def test_temperature_link_is_the_links_own() -> None:
     effect = written("k * (temperature_link - 20) * link_mm / 1000")
-    rows = at_zero(values={"temperature_link_2_degC": 21.5})
+    rows = row_at_zero(values={"temperature_link_2_degC": 21.5})
     found, _ = effect_deltas(FittedEffect(effect, np.array([2.0])), rows)
     np.testing.assert_allclose(found["link"][0] / (2e-3 * rows.link_mm[0] / 1000), [0, 1.5, 0], atol=1e-12)
     assert written("k * strain_link_ppm").needs == ("strain_link_{link}_ppm",)
@@ -353,8 +353,8 @@ def test_a_formula_serves_every_port_and_moves_the_tip(model: object, more: dict
         parameters="k m n tau",
         **more,
     )
-    arguments = varied(machine, 6)
-    rows = rows_of(machine, arguments)
+    arguments = random_inputs(machine, 6)
+    rows = observe_rows(machine, arguments)
     shape = effect.constant_grid(rows)[3]
     theta = np.array([1.0, -2.0, 0.5])
     found, _ = effect_deltas(FittedEffect(effect, theta, shape), rows)
@@ -370,15 +370,15 @@ def test_a_lag_in_a_formula_remembers() -> None:
     effect = written("k * lag(temperature_room_degC, 500) + m * lag(humidity_pct, tau)", parameters="k m tau")
     assert effect.remembers
     assert {"time", "order"} <= set(effect.needs)
-    arguments = varied(TRIPOD, 9)
-    rows = rows_of(TRIPOD, arguments)
+    arguments = random_inputs(TRIPOD, 9)
+    rows = observe_rows(TRIPOD, arguments)
     fitted = FittedEffect(effect, np.array([1.0, 2.0]), {"tau": 60.0})
     whole, _ = effect_deltas(fitted, rows)
     memory = None
     for i in range(9):
-        from tests.support.effect_rows import part
+        from tests.support.effect_rows import select_rows
 
-        one, memory = effect_deltas(fitted, rows_of(TRIPOD, part(arguments, slice(i, i + 1))), memory)
+        one, memory = effect_deltas(fitted, observe_rows(TRIPOD, select_rows(arguments, slice(i, i + 1))), memory)
         np.testing.assert_array_equal(one["link"][0], whole["link"][i])
 
 
@@ -387,7 +387,7 @@ def test_one_parameter_per_link() -> None:
     effect = formula_effect(
         {"id": "mine", "port": "link", "formula": "k * direction", "parameters": declared}, "a.yaml:7"
     )
-    found, _ = effect_deltas(FittedEffect(effect, np.array([1.0, 2.0, 3.0])), at_zero())
+    found, _ = effect_deltas(FittedEffect(effect, np.array([1.0, 2.0, 3.0])), row_at_zero())
     np.testing.assert_allclose(found["link"][0], [1e-3, 2e-3, 3e-3])
     assert effect.needs == ("direction",)
 

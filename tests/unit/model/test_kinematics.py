@@ -13,10 +13,19 @@ from compd.model.kernels.rotation import rotation_matrix, rotation_vector
 from compd.model.kinematics import Mechanism, Pose, closure_at, forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel, machine_model
 from compd.model.solve_status import AMPLIFICATION_LIMIT, Reason, require
-from tests.support.model_machines import Floats, about, hexapod, hexapod_parts, moved, tips, tripod, tripod_parts
+from tests.support.model_machines import (
+    Floats,
+    hexapod,
+    hexapod_parts,
+    move_machine,
+    rotation,
+    tips,
+    tripod,
+    tripod_parts,
+)
 
 TRIPOD, HEXAPOD = tripod(), hexapod()
-TURNS = [about("x", 180), about("x", 90), about("y", -60) @ about("z", 25)]
+TURNS = [rotation("x", 180), rotation("x", 90), rotation("y", -60) @ rotation("z", 25)]
 
 
 def at_zero(model: MachineModel) -> Mechanism:
@@ -109,7 +118,7 @@ def test_rows_alone_are_as_all_together(model: MachineModel) -> None:
 @pytest.mark.parametrize("parts", [tripod_parts(), hexapod_parts()], ids=["tripod", "hexapod"])
 def test_a_turned_world_changes_no_length(parts: dict[str, object], turn: Floats) -> None:
     shift = np.array([-300.0, 20.0, 150.0])
-    here, there = machine_model(**parts), machine_model(**moved(parts, turn, shift))  # type: ignore[arg-type]
+    here, there = machine_model(**parts), machine_model(**move_machine(parts, turn, shift))  # type: ignore[arg-type]
     tip = tips(here, 50, 4)
     upright = inverse(here, tip)
     turned = inverse(there, tip @ turn.T + shift)
@@ -206,9 +215,9 @@ def test_links_all_far_too_long_or_short_are_no_pose() -> None:
 
 def test_a_hexapod_turned_a_right_angle_is_singular() -> None:
     tip = HEXAPOD.zero.contact.tip_M_mm
-    reasons = [int(inverse(HEXAPOD, tip, about("z", angle)).reason) for angle in (0.0, 60.0, 89.5, 90.0, -90.0)]
+    reasons = [int(inverse(HEXAPOD, tip, rotation("z", angle)).reason) for angle in (0.0, 60.0, 89.5, 90.0, -90.0)]
     assert reasons == [Reason.OK, Reason.OK, *[Reason.NEAR_SINGULAR] * 3]
-    assert np.isnan(inverse(HEXAPOD, tip, about("z", 90.0)).link_length_mm).all()
+    assert np.isnan(inverse(HEXAPOD, tip, rotation("z", 90.0)).link_length_mm).all()
 
 
 def test_amplification_is_pose_error_over_length_error() -> None:
@@ -216,7 +225,7 @@ def test_amplification_is_pose_error_over_length_error() -> None:
     tip, rng = HEXAPOD.zero.contact.tip_M_mm, np.random.default_rng(6)
     radius_mm = 120.0
     for angle, inside in ((88.0, True), (89.5, False)):
-        attitude = about("z", angle)
+        attitude = rotation("z", angle)
         mechanism = at_zero(HEXAPOD)
         origin = tip - attitude @ HEXAPOD.zero.contact.tip_P_mm
         here = closure_at(mechanism, origin, attitude)
@@ -242,7 +251,7 @@ def test_the_mirrored_tripod_is_not_taken_for_the_real_one() -> None:
     assert above.reason == Reason.OK
     assert above.origin_M_mm[2] > 1000
     for z_mm in np.linspace(100.0, 1300.0, 241):
-        pose = forward_kinematics(at_zero(TRIPOD), lengths, [1.0, 2.0, z_mm], about("x", 1.0))
+        pose = forward_kinematics(at_zero(TRIPOD), lengths, [1.0, 2.0, z_mm], rotation("x", 1.0))
         if pose.reason == Reason.OK:
             assert (pose.origin_M_mm[2] < 700.0) == (z_mm < 700.0)
 

@@ -14,7 +14,7 @@ from compd.machine_builder import build_model, joint_weights
 from compd.model.kernels.rotation import rotation_matrix
 from compd.model.machine import MachineModel, machine_model
 from compd.model.tool import Contact, ToolOnPlate
-from tests.support.model_machines import about, hexapod, hexapod_parts, tripod, tripod_parts
+from tests.support.model_machines import hexapod, hexapod_parts, rotation, tripod, tripod_parts
 from tests.support.paths import CONFIG
 
 
@@ -99,7 +99,7 @@ def test_a_machine_zero_that_cannot_be(changes: dict[str, object], match: str) -
 
 def test_a_hexapod_zeroed_in_its_singular_pose_is_refused() -> None:
     with pytest.raises(KinematicsError, match="NEAR_SINGULAR"):
-        machine_model(**{**hexapod_parts(), "zero_rotation_M_P": about("z", 90)})
+        machine_model(**{**hexapod_parts(), "zero_rotation_M_P": rotation("z", 90)})
 
 
 @pytest.mark.parametrize("key", ["supports_M_mm", "plate_points_M_mm", "platform_joints_P_mm", "joint_weights"])

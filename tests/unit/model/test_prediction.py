@@ -15,9 +15,8 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.model.deltas import deltas_by_effect, effect_deltas, port_size, sum_deltas
 from compd.model.effect import PORTS, FittedEffect, Port
-from compd.model.joint_correction import scale_for_length_mm
 from compd.model.kernels.rotation import compose, rotation_vector
-from compd.model.kinematics import inverse_kinematics
+from compd.model.kinematics import inverse_kinematics, scale_for_length_mm
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
@@ -25,7 +24,7 @@ from compd.model.prediction import perturb_machine, predict
 from compd.model.sensitivity import effect_sensitivity, link_residuals, sensitivities
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
-from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, rows_of, some_shape, varied
+from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED
 
@@ -53,7 +52,7 @@ def changed(model: MachineModel, rows: Observations, port: Port, i: int) -> tupl
 @pytest.mark.parametrize("port", PORTS)
 def test_derivatives_are_the_predictions_own(name: str, port: Port) -> None:
     model = MACHINES[name]
-    rows = rows_of(model, varied(model, 6))
+    rows = observe_rows(model, random_inputs(model, 6))
     found = sensitivities(model, rows, [port])[port]
     size = port_size(port, rows)
     assert found.tip.shape == (6, 3, size)
@@ -66,8 +65,8 @@ def test_derivatives_are_the_predictions_own(name: str, port: Port) -> None:
 
 
 def test_nothing_added_is_the_nominal_machine() -> None:
-    arguments = varied(TRIPOD)
-    rows = rows_of(TRIPOD, arguments)
+    arguments = random_inputs(TRIPOD)
+    rows = observe_rows(TRIPOD, arguments)
     values = GaugeValues(arguments["scale_mm"], arguments["joint_mm"], arguments["frame_mm"], {})
     result, _ = compensate_cmm(TRIPOD, values, WarmStart.at_zero(TRIPOD))
     np.testing.assert_allclose(predict(TRIPOD, rows, {}).tip_mm, result.tip_M_mm, atol=1e-9)
@@ -79,10 +78,10 @@ def test_nothing_added_is_the_nominal_machine() -> None:
 def test_an_effects_columns_are_what_its_numbers_do(id_: str) -> None:
     """G theta is the prediction's change for a small theta, whatever the ports."""
     effect = LIBRARY[id_]
-    rows = rows_of(TRIPOD, varied(TRIPOD, 5))
-    basis, _ = effect.basis(rows, some_shape(effect), None)
+    rows = observe_rows(TRIPOD, random_inputs(TRIPOD, 5))
+    basis, _ = effect.basis(rows, constants_of(effect), None)
     theta = 1e-3 * np.array([sum(one.parameter.theta_range) / 2 or one.parameter.high for one in effect.columns(3)])
-    found, _ = effect_deltas(FittedEffect(effect, theta, some_shape(effect)), rows)
+    found, _ = effect_deltas(FittedEffect(effect, theta, constants_of(effect)), rows)
     moved = predict(TRIPOD, rows, found).tip_mm - predict(TRIPOD, rows, {}).tip_mm
     by = effect_sensitivity(effect, rows, basis, sensitivities(TRIPOD, rows, effect.ports))
     assert by.tip.shape == (5, 3, len(theta))
@@ -91,11 +90,11 @@ def test_an_effects_columns_are_what_its_numbers_do(id_: str) -> None:
 
 
 def test_a_row_that_cannot_be_solved_says_so_and_harms_no_other() -> None:
-    arguments = varied(TRIPOD, 4)
+    arguments = random_inputs(TRIPOD, 4)
     arguments["scale_mm"] = arguments["scale_mm"].copy()
     arguments["scale_mm"][1] = -470.0
     arguments["joint_mm"][2, 4] = np.nan
-    rows = rows_of(TRIPOD, arguments)
+    rows = observe_rows(TRIPOD, arguments)
     found = predict(TRIPOD, rows, {})
     assert [Reason(int(code)) for code in found.reason] == [Reason.OK, found.reason[1], Reason.NOT_FINITE, Reason.OK]
     assert found.reason[1] != Reason.OK
@@ -109,7 +108,7 @@ def test_a_row_that_cannot_be_solved_says_so_and_harms_no_other() -> None:
 
 @pytest.mark.parametrize("model", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])
 def test_a_residual_pulled_back_leads_to_the_tip_again(model: MachineModel) -> None:
-    rows = rows_of(model, varied(model, 8))
+    rows = observe_rows(model, random_inputs(model, 8))
     link = sensitivities(model, rows, ["link"])["link"]
     errors_mm = np.random.default_rng(0).normal(0, 1e-3, (8, model.links))
     residual_mm = (link.tip @ errors_mm[:, :, None])[:, :, 0]
@@ -125,10 +124,10 @@ def test_a_residual_pulled_back_leads_to_the_tip_again(model: MachineModel) -> N
 def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
     """Inverse kinematics of what was predicted, with everything added, gives the readings that it came from."""
     model = MACHINES[name]
-    rows = rows_of(model, varied(model, 7))
+    rows = observe_rows(model, random_inputs(model, 7))
     machine_effects = [effect for effect in LIBRARY.values() if effect.live]
     fitted = [
-        FittedEffect(effect, np.full(len(effect.columns(model.links)), 0.8), some_shape(effect))
+        FittedEffect(effect, np.full(len(effect.columns(model.links)), 0.8), constants_of(effect))
         for effect in machine_effects
         if model is not HEXAPOD or "revolute_axes" not in effect.needs
     ]
@@ -164,7 +163,7 @@ def recorded(file: Path) -> tuple[Observations, Floats]:
         "session_start": np.concatenate([[True], np.diff(data["session"]) != 0]),
         "movement": movement,
     }
-    rows = rows_of(TRIPOD, arguments)
+    rows = observe_rows(TRIPOD, arguments)
     return rows, 1e3 * (several([f"reference_{axis}_mm" for axis in "xyz"]) - rows.tip_M_mm)
 
 

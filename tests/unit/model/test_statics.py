@@ -9,7 +9,7 @@ from compd.model.kinematics import forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.solve_status import Reason, require
 from compd.model.statics import link_forces
-from tests.support.model_machines import about, hexapod, tips, tripod
+from tests.support.model_machines import hexapod, rotation, tips, tripod
 
 TRIPOD, HEXAPOD = tripod(), hexapod()
 
@@ -85,7 +85,7 @@ def test_no_force_where_none_can_be_known() -> None:
     zero = HEXAPOD.zero
     mechanism = HEXAPOD.mechanism(zero.base_joints_M_mm)
     load = (np.zeros(3), zero.contact.tip_M_mm, 120.0, np.zeros(3))
-    singular = link_forces(mechanism, zero.platform_origin_M_mm, about("z", 90.0), *load)
+    singular = link_forces(mechanism, zero.platform_origin_M_mm, rotation("z", 90.0), *load)
     assert singular.reason == Reason.NEAR_SINGULAR
     assert np.isnan(singular.axial_N).all()
     for bad in (np.nan, np.inf):
