@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from compd.simulation.causes.catalogue import CAUSES
+from compd.simulation.causes.catalogue import CAUSES, shuffle_causes
 
 Kind = Literal["library", "nothing", "outside", "pair"]
 KINDS: tuple[Kind, ...] = ("library", "nothing", "outside", "pair")
@@ -65,9 +65,8 @@ def _size(seed: int) -> float:
 
 
 def _pair(library: Sequence[str], seed: int) -> Case:
-    rng = np.random.default_rng(seed)
-    first, second = rng.choice(library, 2, replace=False).tolist()
-    sizes = np.round(rng.uniform(*FLOORS, 2), 2).tolist()
+    first, second, *_ = shuffle_causes(library, seed, "pair")
+    sizes = np.round(np.random.default_rng(seed).uniform(*FLOORS, 2), 2).tolist()
     return Case("pair", (first, second), (sizes[0], sizes[1]), seed)
 
 

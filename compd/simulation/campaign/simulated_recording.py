@@ -63,7 +63,7 @@ def simulate_recording(
     geometry, wiring = configuration.geometry, configuration.wiring
     sizer = CauseSizer(geometry, wiring, seed)
     sized = tuple(sizer.size(cause) for cause in hidden)
-    weak = sizer.weak_disturbances([cause.id for cause in hidden], np.random.default_rng([seed, 3]))
+    weak = sizer.weak_disturbances([cause.id for cause in hidden])
     causes = [*(cause.cause for cause in sized), *weak]
     instrument = replace(INSTRUMENTS[reference], outlier_share=OUTLIER_SHARE)
     campaign: Campaign | PlannedCampaign

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
-from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
+from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes, shuffle_causes
 from compd.simulation.causes.hidden_cause import HiddenCause, SizedCause
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM
@@ -66,12 +64,11 @@ class CauseSizer:
             strength = wanted
         return SizedCause(self._build(hidden.id, strength), floors)
 
-    def weak_disturbances(self, besides: Sequence[str], rng: np.random.Generator) -> list[Cause]:
+    def weak_disturbances(self, besides: Sequence[str]) -> list[Cause]:
         """WEAK_CAUSES causes other than `besides`, each too weak to be found by a diagnosis."""
         others = [name for name in possible_causes(self.mechanism) if name not in besides]
-        names = rng.choice(others, WEAK_CAUSES, replace=False).tolist()
         causes = []
-        for name in names:
+        for name in shuffle_causes(others, self._seed, "weak")[:WEAK_CAUSES]:
             strength = FIRST_SHARE * CAUSES[name].max_strength
             floors = self.error_in_floors(self._build(name, strength))
             causes.append(self._build(name, strength * WEAK_FLOORS / floors if floors > 0 else strength))

@@ -1,11 +1,15 @@
 """The causes that can be hidden in a simulated machine, by id.
 
 A new cause is a class in the module of its family (and in that module's CAUSES); nothing else has to be edited.
+Random numbers belong to a cause's id, not to its place in a list: one cause more changes no other cause's parts, and
+a random choice only where the new cause is chosen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import zlib
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -30,5 +34,12 @@ def build_cause(name: str, strength: float, mechanism: Mechanism, seed: int) -> 
 
     strength : as `Cause.strength`, the reciprocal of what is stated for a stiffness.
     """
-    number = list(CAUSES).index(name)
-    return CAUSES[name](strength, mechanism, np.random.default_rng([seed, number]))
+    return CAUSES[name](strength, mechanism, np.random.default_rng([seed, zlib.crc32(name.encode())]))
+
+
+def shuffle_causes(names: Iterable[str], seed: int, purpose: str) -> list[str]:
+    """The names in a random order that follows from seed and purpose.
+
+    Sorted by a hash of (purpose, seed, name): one name more is inserted somewhere, and the others keep their order.
+    """
+    return sorted(names, key=lambda name: hashlib.sha256(f"{purpose}/{seed}/{name}".encode()).digest())

@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.errors import CompdError, Problem
 from compd.files import write_files
-from compd.simulation.causes.catalogue import CAUSES, possible_causes
+from compd.simulation.causes.catalogue import CAUSES, possible_causes, shuffle_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
 
@@ -66,11 +66,15 @@ def parse_hidden(texts: Sequence[str]) -> list[HiddenCause]:
 
 
 def draw_hidden(seed: int, mechanism: Mechanism) -> HiddenCause:
-    """Cause and size that follow from `seed` alone, among the causes that this machine can have."""
+    """Cause and size that follow from `seed` alone, among the causes that this machine can have.
+
+    With one cause more in the catalogue, the draw is the same for every seed by which the new one is not drawn.
+    """
     rng = np.random.default_rng([seed, 0x5EA1])
     outside = rng.uniform() < OUTSIDE_SHARE
     names = [name for name in possible_causes(mechanism) if CAUSES[name].in_library != outside]
-    return HiddenCause(str(rng.choice(names)), None, float(rng.uniform(LEAST_FLOORS, MOST_FLOORS)))
+    first, *_ = shuffle_causes(names, seed, "hidden")
+    return HiddenCause(first, None, float(rng.uniform(LEAST_FLOORS, MOST_FLOORS)))
 
 
 def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause], seed: int) -> None:
