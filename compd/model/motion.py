@@ -11,10 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.travel_direction import Travel, advance
 
-# A link counts as reversed once it has come back by more than this: a scale's noise is some 10 nm, a backlash that
-# matters 0.1 um or more.
-REVERSAL_MM = 1e-3
 # Time constant of the average velocity: unaveraged, one step of a scale, 10 nm, within a cycle of 1 ms is 10 um/s.
 VELOCITY_WINDOW_S = 0.02
 
@@ -67,19 +65,13 @@ def update_motion(before: Motion | None, time_s: float, scale_mm: FloatArray, jo
     """The motion after one more snapshot: scale_mm (n,), joint_mm (k,), all finite.
 
     before : None at the start, where the direction is unknown and the velocity zero.
-    A link has reversed when it has come back by more than REVERSAL_MM from its farthest reading. Example: a scale that
-    reads 0, 1.5, 2.3, 1.4, 1.2 um ends in direction -1, for 1.2 um is more than 1 um below 2.3 um, although no single
-    step back was that long.
+    The direction follows the rule of `compd.travel_direction`.
     Velocity is a first-order average, v += (1 - exp(-dt / VELOCITY_WINDOW_S)) (dx / dt - v).
     """
     if before is None:
         still = np.zeros_like(scale_mm)
         return Motion(time_s, scale_mm, joint_mm, scale_mm, still, still, np.zeros_like(joint_mm))
-    since_mm = scale_mm - before.turning_mm
-    direction = np.where(np.abs(since_mm) > REVERSAL_MM, np.sign(since_mm), before.direction)
-    # the farthest point follows the link while it goes on or has just reversed, and stays while it comes back by less
-    onwards = (direction != before.direction) | (since_mm * before.direction > 0)
-    turning_mm = np.where(onwards, scale_mm, before.turning_mm)
+    turning_mm, direction = _advance_links(before, scale_mm)
     elapsed_s = time_s - before.time_s
     if elapsed_s <= 0.0:
         return before._replace(turning_mm=turning_mm, direction=direction, scale_mm=scale_mm, joint_mm=joint_mm)
@@ -89,6 +81,13 @@ def update_motion(before: Motion | None, time_s: float, scale_mm: FloatArray, jo
     joint_speed = before.joint_velocity_mm_per_s
     joint_speed = joint_speed + share * ((joint_mm - before.joint_mm) / elapsed_s - joint_speed)
     return Motion(time_s, scale_mm, joint_mm, turning_mm, direction, speed, joint_speed)
+
+
+def _advance_links(before: Motion, scale_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Turning points and directions (n,) after one more reading of each scale; few links: plain floats are faster."""
+    links = zip(before.turning_mm.tolist(), before.direction.tolist(), scale_mm.tolist(), strict=True)
+    travels = [advance(Travel(turning_mm, direction), here_mm) for turning_mm, direction, here_mm in links]
+    return np.array([travel.turning_mm for travel in travels]), np.array([travel.direction for travel in travels])
 
 
 def track_motion(

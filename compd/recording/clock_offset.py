@@ -28,7 +28,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.errors import Problem, RecordingError
 from compd.recording.instrument_export import Track
 
-# Both must move by more than this for a pattern to be seen; ten times what `recording.STILL_MM` calls still.
+# Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
 MOTION_MM = 0.01
 # The least that the scales must explain of the instrument's variance. On simulated tripods the right offset
 # explains 0.995 or more; unrelated motions, with some twenty moves, reach up to 0.6 by chance.

@@ -29,8 +29,9 @@ from compd.recording.columns import (
 from compd.recording.csv_table import CsvTable, read_table
 from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.problem_list import ProblemList, rows_text
-from compd.recording.recording import Recording, travel_direction
+from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.travel_direction import row_directions
 from compd.units import UM_PER_MM
 
 # Comparators are converted from um to mm and rounded to a picometre, far below any gauge, so that a reading
@@ -145,7 +146,7 @@ def _build(
     scale_mm = stack(scale_columns(layout.scales))
     approach = stack(approach_columns(layout.scales)) if layout.approach else None
     if approach is None and scale_mm is not None:
-        approach = travel_direction(scale_mm, session)
+        approach = row_directions(scale_mm, session)
     joint_um = stack(joint_columns(layout.joints))
     frame_um = stack(FRAME_COLUMNS) if layout.frame else None
     position = stack(POSITION_COLUMNS)

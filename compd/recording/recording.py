@@ -19,9 +19,6 @@ from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).
 BLOCKS = 8
-# A scale that stands still shows less than this (display noise and thermal creep between two rows);
-# a move that is meant is longer.
-STILL_MM = 0.001
 
 
 class UsableRows(NamedTuple):
@@ -50,7 +47,7 @@ class Recording:
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
-        the scales (`travel_direction`); nan where it is not known.
+        the scales (`compd.travel_direction`); nan where it is not known.
     approach_measured : whether it is from the columns.
     quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
     reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
@@ -172,39 +169,3 @@ class Recording:
         _, first, inverse = np.unique(self.visit, return_index=True, return_inverse=True)
         block_of_visit = block[first][inverse]
         return np.where(self.visit >= 0, block_of_visit, block).astype(np.int64)
-
-
-def travel_direction(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
-    """Direction of travel of each link from its scale: the sign of its last movement of STILL_MM or more.
-
-    A movement is measured from the last value at which a direction was set, so that slow creep counts once it has
-    added up. What happened between two rows is not known: a link that went out and came back looks as if it stood
-    still. Where that matters, record the `approach` columns.
-
-    Parameters
-    ----------
-    scale_mm : (N, n), nan where there is no value. session : (N,) or None; every session begins anew.
-
-    Returns
-    -------
-    (N, n) +1 or -1; nan before a link's first movement in a session.
-
-    Examples
-    --------
-    Of one link at 0, 0.0005, 0.002, 0.0015, 0.0008 mm: nan, nan, 1, 1, -1.
-    """
-    direction = np.full(scale_mm.shape, np.nan)
-    first_rows = {0} if session is None else {0, *(np.flatnonzero(np.diff(session)) + 1).tolist()}
-    for link in range(scale_mm.shape[1]):
-        sign, anchor_mm = np.nan, np.nan
-        signs: list[float] = []
-        for row, value_mm in enumerate(scale_mm[:, link].tolist()):
-            if row in first_rows:
-                sign, anchor_mm = np.nan, np.nan
-            if not np.isfinite(anchor_mm):
-                anchor_mm = value_mm
-            elif abs(value_mm - anchor_mm) >= STILL_MM:
-                sign, anchor_mm = (1.0 if value_mm > anchor_mm else -1.0), value_mm
-            signs.append(sign)
-        direction[:, link] = signs
-    return direction

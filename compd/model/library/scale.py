@@ -7,8 +7,8 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, columns_per_link, memoryless_basis
 from compd.model.memory import friction
-from compd.model.motion import REVERSAL_MM
 from compd.model.observations import Observations
+from compd.travel_direction import REVERSAL_MM
 
 PPM = 1e-6
 UM = 1e-3  # mm

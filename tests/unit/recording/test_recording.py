@@ -15,9 +15,9 @@ from compd.cli.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording
-from compd.recording.recording import travel_direction
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
+from compd.travel_direction import row_directions
 from tests.support.paths import ROOT, SHARED
 from tests.support.recordings import (
     HEADER,
@@ -70,7 +70,7 @@ def test_direction_from_the_scales_is_the_recorded_one(name: str) -> None:
     recording = read_recording(path)
     assert recording.scale_mm is not None
     assert recording.approach is not None
-    derived = travel_direction(recording.scale_mm, recording.session)
+    derived = row_directions(recording.scale_mm, recording.session)
     known = np.isfinite(derived)
     assert known.mean() > 0.95
     assert (derived[known] == recording.approach[known]).mean() > 0.95
@@ -261,13 +261,6 @@ def test_check_against_counts_gauges(tmp_path: Path) -> None:
     recording = read_recording(write_recording_files(tmp_path, drop_columns("joint_9_um")(csv_text())))
     with pytest.raises(RecordingError, match="8 joint comparator columns, tripod-cmm has 9"):
         check_against(recording, load(TRIPOD))
-
-
-def test_direction_ignores_creep_but_adds_it_up() -> None:
-    scale_mm = np.array([[0.0, 1.0, 1.0002, 0.9998, 0.5, 0.4996, 0.4992, 0.4988, 0.5]]).T
-    assert np.array_equal(
-        travel_direction(scale_mm, None)[:, 0], [math.nan, 1, 1, 1, -1, -1, -1, -1, 1], equal_nan=True
-    )
 
 
 def test_check_prints_what_there_is(tmp_path: Path) -> None:

@@ -1,0 +1,78 @@
+"""Direction of travel of a link: one rule for recordings, for the running daemon and for effects with friction.
+
+A link reverses when its scale has come back by more than `REVERSAL_MM` from the farthest position that it reached in
+its present direction. Noise below that is no movement, and slow creep counts once it has added up.
+
+>>> [travel.direction for travel in follow([0.0, 1.5e-3, 2.3e-3, 1.4e-3, 1.2e-3])]
+[0.0, 1.0, 1.0, 1.0, -1.0]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+
+# A scale's noise is some 10 nm, a backlash that matters 0.1 um or more.
+REVERSAL_MM = 1e-3
+
+
+class Travel(NamedTuple):
+    """State of one link.
+
+    turning_mm : the farthest position in the present direction, from which a reversal is measured; nan before the
+        first reading.
+    direction : +1.0 while the scale's reading grows, -1.0 while it shrinks, 0.0 until the link has moved.
+    """
+
+    turning_mm: float = math.nan
+    direction: float = 0.0
+
+
+def advance(travel: Travel, position_mm: float) -> Travel:
+    """The state after one more reading of the scale, in mm. A reading that is nan changes nothing."""
+    turning_mm, direction = travel
+    if math.isnan(turning_mm):
+        return Travel(position_mm, direction)
+    since_mm = position_mm - turning_mm
+    if abs(since_mm) > REVERSAL_MM:
+        return Travel(position_mm, math.copysign(1.0, since_mm))
+    # the farthest position moves on with the link, and stays while the link comes back by less
+    return Travel(position_mm, direction) if since_mm * direction > 0.0 else travel
+
+
+def follow(positions_mm: Iterable[float]) -> Iterator[Travel]:
+    """The state after each of a link's positions, in the order of time."""
+    travel = Travel()
+    for position_mm in positions_mm:
+        travel = advance(travel, position_mm)
+        yield travel
+
+
+def row_directions(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
+    """Direction of travel of each link in every row of a recording.
+
+    What happened between two rows is not known: a link that went out and came back looks as if it stood still. Where
+    that matters, record the `approach` columns.
+
+    Parameters
+    ----------
+    scale_mm : (N, n), nan where there is no value.
+    session : (N,) or None. Every session begins anew.
+
+    Returns
+    -------
+    (N, n) +1 or -1; nan before a link's first movement in a session.
+    """
+    begins = [0] if session is None else [0, *(np.flatnonzero(np.diff(session)) + 1).tolist()]
+    direction = np.zeros(scale_mm.shape)
+    for begin, end in zip(begins, [*begins[1:], len(scale_mm)], strict=True):
+        for link in range(scale_mm.shape[1]):
+            column = scale_mm[begin:end, link].tolist()
+            direction[begin:end, link] = [travel.direction for travel in follow(column)]
+    direction[direction == 0.0] = np.nan
+    return direction
