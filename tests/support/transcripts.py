@@ -20,7 +20,7 @@ from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines.modbus_rtu import RtuMaster
 from compd.lines.modbus_tcp import ModbusTcp
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
-from compd.simulation.wires.modbus_slaves import Slaves
+from compd.simulation.wires.modbus_slaves import ModbusSlaves
 
 PATIENCE_S = 5.0
 
@@ -270,7 +270,7 @@ def check_simulated_device(path: Path) -> None:
             options, lambda name, values=values: values.get(name, float("nan"))
         )
         if gauge.line_kind == "registers":
-            device = Slaves([device], over_tcp=transcript.over_tcp)
+            device = ModbusSlaves([device], over_tcp=transcript.over_tcp)
         for exchange in marked:
             assert device.hear(exchange.sent) == exchange.received, f"line {poll.line}"
             compared += 1

@@ -42,6 +42,8 @@ QUICK = (4, 8)
 ONE = (2, 3, 10, 18, 21, 24, 25, 33, 48, 49, 54, 56, 60, 69, 77, 89, 96, 131, 132, 178)
 PAIRS = ([4, 10], [8, 10], [18, 56])
 OUTSIDE = {20: HOURS, 15: DAYS, 1: DAYS}
+# Of the long tests, `make hidden-sample` runs the first pair and this one.
+SAMPLE_OUTSIDE = 20
 LEFT_OUT = {
     28: "gauge latency shows on the move alone, and here all is measured at rest",
     16: "a lag of minutes is seconds where weather is faster: below what the library takes for plausible",
@@ -143,7 +145,7 @@ def test_one_effect(hidden: int) -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(TIMEOUT_S)
-@pytest.mark.parametrize("hidden", PAIRS)
+@pytest.mark.parametrize("hidden", [pytest.param(PAIRS[0], marks=pytest.mark.sample), *PAIRS[1:]])
 def test_two_effects(hidden: list[int]) -> None:
     with run_directory() as directory:
         check_found(run_hidden(hidden, directory))
@@ -151,7 +153,7 @@ def test_two_effects(hidden: list[int]) -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(TIMEOUT_S)
-@pytest.mark.parametrize("hidden", OUTSIDE)
+@pytest.mark.parametrize("hidden", [pytest.param(SAMPLE_OUTSIDE, marks=pytest.mark.sample), 15, 1])
 def test_cause_that_the_library_has_not(hidden: int) -> None:
     with run_directory() as directory:
         check_described(run_hidden([hidden], directory, OUTSIDE[hidden]))

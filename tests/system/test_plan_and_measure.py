@@ -190,7 +190,7 @@ def test_the_machine_goes_through_its_plan_on_wires(tmp_path: Path) -> None:
 def test_without_a_plan_there_is_nothing_to_go_through() -> None:
     configuration = load(TRIPOD)
     with pytest.raises(CompdError, match="nothing is planned"):
-        World(configuration.geometry, configuration.wiring, 1).measure()
+        World(configuration.geometry, configuration.wiring, 1).start_plan()
 
 
 def test_a_wrong_plan_is_said_before_the_machine_starts(tmp_path: Path) -> None:

@@ -112,6 +112,7 @@ def run_all(directory: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.timeout(600)
 def test_every_command_of_the_section() -> None:
     with run_directory() as directory:

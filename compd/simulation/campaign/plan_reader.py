@@ -55,7 +55,7 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
     limits = {name: _LIMITS_BY_UNIT[name.rpartition("_")[2]] for name in names}
     problems: list[Problem] = []
     file = read_plan_file(path, mechanism.links, {**limits, SPEED_COLUMN: (0.0, SPEED_MM_PER_S)}, problems)
-    problems += _unmeasured(file, names, names if measured is None else measured)
+    problems[:0] = _unmeasured(file, names, names if measured is None else measured)  # header before cells
     rows = _planned_rows(file, mechanism, names, problems)
     if problems:
         raise CompdError(problems)
