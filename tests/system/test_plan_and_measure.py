@@ -16,7 +16,7 @@ import yaml
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from compd.cli.simulate import _planned
+from compd.cli.simulated.simulate import _planned
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.recording.reader import read_recording

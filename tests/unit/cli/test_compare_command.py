@@ -10,9 +10,9 @@ import typer
 import yaml
 from typer.testing import CliRunner
 
-from compd.cli.compare import compare
-from compd.cli.ledger import ledger
-from compd.cli.model_commands import add, fit, remove, undo
+from compd.cli.measurements.compare import compare
+from compd.cli.measurements.effect import add, fit, remove, undo
+from compd.cli.measurements.ledger import ledger
 from compd.errors import CompdError, RecordingError, StateError
 from tests.support.measured import gauges, hidden, record
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.effect import effect as command
+from compd.cli.measurements.effect import effect as command
 from compd.errors import CompdError
 from compd.model.library import BUNDLED
 from compd.report.effect_signature import compute_signature

@@ -10,8 +10,8 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from compd.cli import driver as driver_cli
-from compd.cli import gauge as gauge_cli
+from compd.cli.live import driver as driver_cli
+from compd.cli.live import gauge as gauge_cli
 from compd.commissioning.capture import read_capture
 from compd.commissioning.scan import PresetCandidate, preset_candidates, probe_port, serial_ports
 from compd.configuration.lines import ModbusRtuLine, SerialLine
@@ -48,7 +48,7 @@ def slave(tmp_path: Path) -> Iterator[str]:
 
 
 def run_gauge(*arguments: str, answers: str | None = None) -> tuple[int, str]:
-    result = RUNNER.invoke(gauge_cli.app, list(arguments), input=answers)
+    result = RUNNER.invoke(gauge_cli.gauge, list(arguments), input=answers)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result.exit_code, result.output
@@ -170,11 +170,11 @@ def test_learn_live(scale: str) -> None:
 
 
 def test_driver_test_prints_every_case_and_fails_by_exit_code(tmp_path: Path) -> None:
-    result = RUNNER.invoke(driver_cli.app, ["test", "heidenhain_nd28x", "--quick"])
+    result = RUNNER.invoke(driver_cli.driver, ["test", "heidenhain_nd28x", "--quick"])
     assert result.exit_code == 0
     assert "nothing failed" in result.output
     assert "not detectable on this wire" in result.output
     options = tmp_path / "options.yaml"
     options.write_text("unit: inch\n")
-    result = RUNNER.invoke(driver_cli.app, ["test", "heidenhain_nd28x", "--quick", "--options", str(options)])
+    result = RUNNER.invoke(driver_cli.driver, ["test", "heidenhain_nd28x", "--quick", "--options", str(options)])
     assert result.exit_code == 0

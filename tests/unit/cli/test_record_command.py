@@ -162,7 +162,7 @@ def test_a_daemon_that_goes_leaves_a_whole_recording_and_an_error(tmp_path):
 
 @pytest.mark.usefixtures("drifting")
 def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, capsys, monkeypatch):
-    from compd.cli.record import record
+    from compd.cli.live.record import record
 
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its own
     with daemon_at(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.cli.line_plan import print_line_plan
+from compd.cli.start.check import print_line_budgets
 from compd.commissioning.line_budget import (
     LineBudget,
     budget_of_line,
@@ -98,7 +98,7 @@ def test_warnings_where_they_belong() -> None:
 @pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])
 def test_shipped_machines(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     configuration = load(CONFIG / f"{name}.yaml")
-    assert print_line_plan(configuration) == []
+    assert print_line_budgets(configuration) == []
     printed = capsys.readouterr().out
     assert all(budget.known and budget.usual_hz > 1 for budget in line_budgets(configuration))
     assert all(line in printed for line in configuration.lines)

@@ -11,8 +11,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from compd.cli.diagnose import diagnose as diagnose_command
-from compd.cli.plan import plan as plan_command
+from compd.cli.measurements.diagnose import diagnose as diagnose_command
+from compd.cli.measurements.plan import plan as plan_command
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits

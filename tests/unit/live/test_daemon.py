@@ -225,7 +225,7 @@ def test_a_second_daemon_on_the_same_socket_is_refused(tmp_path, still):
 
 
 def test_json_lines_of_watch_are_the_daemons_own(tmp_path, still, capsys):
-    from compd.cli.watch import watch
+    from compd.cli.live.watch import watch
 
     with running(configuration(tmp_path)):
         watch(str(tmp_path / "s"), rate_hz=50, count=3, json_lines=True)
@@ -235,8 +235,8 @@ def test_json_lines_of_watch_are_the_daemons_own(tmp_path, still, capsys):
 
 
 def test_the_live_view_shows_state_tip_and_sources(tmp_path, still, capsys):
-    from compd.cli.watch import watch
-    from compd.cli.zero import zero
+    from compd.cli.live.watch import watch
+    from compd.cli.live.zero import zero
 
     with running(configuration(tmp_path)):
         watch(str(tmp_path / "s"), rate_hz=50, count=2)

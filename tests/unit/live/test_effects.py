@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.cli.adopt import adopt, shadow
+from compd.cli.live.adopt import adopt, shadow
 from compd.client import connect
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.errors import CompdError, DaemonError, StateError

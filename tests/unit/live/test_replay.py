@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.cli.replay import replay as replay_command
+from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import Models

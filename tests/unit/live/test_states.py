@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from compd.cli.watch import state_colour, view
+from compd.cli.live.watch import state_colour, view
 from compd.live.loop.states import State, state_named
 from tests.support.paths import ROOT
 

@@ -10,7 +10,7 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from compd.arrays import FloatArray
-from compd.cli.join import join as join_command
+from compd.cli.measurements.join import join as join_command
 from compd.errors import RecordingError
 from compd.recording.clock_offset import estimate_offset
 from compd.recording.instrument_export import Track, read_track

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.recording import recording as recording_command
+from compd.cli.measurements.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.zero import DEFAULT_SOCKET, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
 
 _MB = 1_000_000
 _S_PER_H = 3600.0
@@ -26,9 +26,7 @@ class WhenFull(StrEnum):
 
 def record(
     name: Annotated[Path, typer.Argument(help="Where to: NAME becomes NAME-0001.csv and so on.")],
-    address: Annotated[
-        str, typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it.")
-    ] = DEFAULT_SOCKET,
+    address: DaemonOption = DEFAULT_SOCKET,
     rate_hz: Annotated[float, typer.Option(min=0.001, help="Rows per second; the cycles between are left out.")] = 10.0,
     burst: Annotated[
         float | None, typer.Option(min=0.001, help="Every cycle, for so many seconds; another recorder may run beside.")

@@ -12,7 +12,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compd.cli.zero import unix_address
+from compd.cli.options import unix_address
 from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM

@@ -8,15 +8,15 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.options import MachineOption
+
 
 def plan(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv.")],
     rivals: Annotated[str, typer.Option(help="Two effects, by id: A,B.")],
     rows: Annotated[int, typer.Option(min=2, help="How many rows may be measured.")] = 40,
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
-    machine: Annotated[
-        Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
-    ] = None,
+    machine: MachineOption = None,
     model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
     workspace: Annotated[
         str | None, typer.Option(help="x0,x1,y0,y1,z0,z1 of the tip in mm; as in the recording if left out.")

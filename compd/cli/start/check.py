@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from compd.configuration import Configuration
+    from compd.errors import Problem
 
 
 def check(
@@ -25,13 +30,12 @@ def check(
         return
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
-    from compd.cli.line_plan import print_line_plan
     from compd.configuration import load
     from compd.machine_builder import build_model
 
     configuration = load(config)
     build_model(configuration.geometry, configuration.wiring)
-    for warning in (*configuration.warnings, *print_line_plan(configuration)):
+    for warning in (*configuration.warnings, *print_line_budgets(configuration)):
         typer.echo(f"warning: {warning}")
     wiring = configuration.wiring
     typer.echo(
@@ -52,3 +56,43 @@ def _list_drivers() -> None:
         driver = load(GAUGES, name, name)
         table.add_row(name, driver.line_kind, (driver.__doc__ or "").strip().splitlines()[0])
     Console().print(table)
+
+
+def print_line_budgets(configuration: Configuration) -> list[Problem]:
+    """Print bytes, milliseconds and rate per line; the warnings that follow."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.commissioning.line_budget import budget_warnings, line_budgets
+
+    budgets = line_budgets(configuration)
+    table = Table(
+        "line",
+        "gauges",
+        "exchanges",
+        "bytes",
+        "ms a round",
+        "ms, 10 ms turnaround",
+        "rate, Hz",
+        title="What the lines can carry",
+        title_justify="left",
+    )
+    for column in table.columns[1:]:
+        column.justify = "right"
+    table.columns[-1].no_wrap = True
+    for budget in budgets:
+        table.add_row(
+            budget.name,
+            str(budget.gauges),
+            str(budget.exchanges),
+            str(budget.bytes) if budget.known else "?",
+            f"{budget.ideal_s * 1e3:.1f}" if budget.known else "?",
+            f"{budget.usual_s * 1e3:.1f}" if budget.known else "?",
+            _rates(budget.usual_hz, budget.ideal_hz),
+        )
+    Console().print(table)
+    return budget_warnings(configuration, budgets)
+
+
+def _rates(usual_hz: float, ideal_hz: float) -> str:
+    return "?" if math.isnan(usual_hz) else f"{usual_hz:.3g} to {ideal_hz:.3g}"

@@ -11,15 +11,15 @@ if TYPE_CHECKING:
     from compd.commissioning.conformance.cases import CaseResult
     from compd.commissioning.conformance.report import DriverUnderTest
 
-app = typer.Typer(no_args_is_help=True, help="Gauge drivers.")
+driver = typer.Typer(no_args_is_help=True, help="Gauge drivers.")
 
 
-@app.callback()
+@driver.callback()
 def _drivers() -> None:
     """Gauge drivers."""
 
 
-@app.command("test")
+@driver.command("test")
 def try_on_wires(
     name: Annotated[
         str | None, typer.Argument(help="Entry point, or /absolute/file.py:ClassName; all installed if left out.")

@@ -46,15 +46,15 @@ def join(
     track = read_track(export, {role: name for role, name in roles.items() if name is not None}, unit)
     joined = join_reference(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
     typer.echo(f"{export}: " + ", ".join(f"{role} from {name!r}" for role, name in track.names.items()))
-    found = joined.offset
-    if math.isnan(found.std_s):
-        agreement = "not known" if math.isnan(found.agreement) else f"{found.agreement:.4f}"
-        typer.echo(f"clock offset {found.offset_s:+.4f} s, given; agreement with the scales {agreement}")
+    clock = joined.offset
+    if math.isnan(clock.std_s):
+        agreement = "not known" if math.isnan(clock.agreement) else f"{clock.agreement:.4f}"
+        typer.echo(f"clock offset {clock.offset_s:+.4f} s, given; agreement with the scales {agreement}")
     else:
         typer.echo(
-            f"clock offset {found.offset_s:+.4f} s +- {found.std_s:.4f} s (one standard uncertainty); "
-            f"agreement with the scales {found.agreement:.4f}"
-            + (f", next best {found.runner_up[1]:.4f} at {found.runner_up[0]:+.2f} s" if found.runner_up else "")
+            f"clock offset {clock.offset_s:+.4f} s +- {clock.std_s:.4f} s (one standard uncertainty); "
+            f"agreement with the scales {clock.agreement:.4f}"
+            + (f", next best {clock.runner_up[1]:.4f} at {clock.runner_up[0]:+.2f} s" if clock.runner_up else "")
         )
     typer.echo(
         f"{joined.matched} of {recording.rows} rows have a reference now (still within {joined.still_mm * 1e3:.1f} um)"

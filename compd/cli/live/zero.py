@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-DEFAULT_SOCKET = "/run/compd/compd.sock"
+from compd.cli.options import DEFAULT_SOCKET, unix_address
+
 # The daemon looks at the gauges for a second; a slow disk may take as long again.
 _TIMEOUT_S = 15.0
 
@@ -24,12 +24,3 @@ def zero(
         answer = client.zero()
     typer.echo(f"machine zero taken at {answer['taken_at']} from {len(answer['readings_mm'])} gauges")
     typer.echo(f"kept in {answer['path']}")
-
-
-def unix_address(address: str) -> str:
-    """An address as it is; for a configuration file, the Unix socket that it names."""
-    if not address.endswith((".yaml", ".yml")):
-        return address
-    from compd.configuration import load
-
-    return load(Path(address)).sockets.unix.path

@@ -15,12 +15,12 @@ Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tr
 Page = Annotated[Path, typer.Option(help="Where the page with the picture goes.")]
 Seed = Annotated[int, typer.Option(min=0, help="Joints, weather and noise follow from it.")]
 
-app = typer.Typer(
+paper = typer.Typer(
     no_args_is_help=True, help="The paper's experiments (T. Oiwa, figures 18, 20, 21) on the simulated machine."
 )
 
 
-@app.command()
+@paper.command()
 def fig18(config: Config = None, page: Page = Path("out/fig18.html"), seed: Seed = 1) -> None:
     """One link under load and temperature: scale against laser interferometer, compensated or not."""
     from compd.paper import link_experiment
@@ -28,7 +28,7 @@ def fig18(config: Config = None, page: Page = Path("out/fig18.html"), seed: Seed
     _show(link_experiment.reproduce(_configuration(config), seed), page)
 
 
-@app.command()
+@paper.command()
 def fig20(config: Config = None, page: Page = Path("out/fig20.html"), seed: Seed = 1) -> None:
     """Distances between the 17 balls of a 3D ball plate, joints compensated or not."""
     from compd.paper import plate_experiment
@@ -36,7 +36,7 @@ def fig20(config: Config = None, page: Page = Path("out/fig20.html"), seed: Seed
     _show(plate_experiment.reproduce(_configuration(config), seed), page)
 
 
-@app.command()
+@paper.command()
 def fig21(config: Config = None, page: Page = Path("out/fig21.html"), seed: Seed = 1) -> None:
     """A reference ball on the surface plate, measured again and again while the machine warms up."""
     from compd.paper import drift_experiment

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from compd.cli.options import MachineOption
+
 if TYPE_CHECKING:
     from compd.comparison.compare import Comparison
     from compd.model_file import ModelFile
@@ -20,9 +22,7 @@ def compare(
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING...", help="NAME.csv with NAME.yaml beside it.")
     ],
-    machine: Annotated[
-        Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
-    ] = None,
+    machine: MachineOption = None,
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with fitted effects; without it, no effect acts.")
     ] = None,
@@ -37,13 +37,13 @@ def compare(
     from compd.errors import CompdError, Problem
 
     problems: list[Problem] = []
-    found: list[Comparison] = []
+    comparisons: list[Comparison] = []
     file: ModelFile | None = None
     for path in recordings:
         try:
             aligned = open_recording(path, machine)
             file = open_model(model, aligned)
-            found.append(compared(aligned, file.fitted, file.covariance))
+            comparisons.append(compared(aligned, file.fitted, file.covariance))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -53,17 +53,17 @@ def compare(
         from compd.report.page import check_page_path
 
         check_page_path(html)
-        write_comparison_page(html, found, file)
+        write_comparison_page(html, comparisons, file)
     if as_json:
-        each = [one.as_json() for one in found]
-        typer.echo(json.dumps(each[0] if len(each) == 1 else {"recordings": each}, indent=1, allow_nan=False))
+        results = [comparison.as_json() for comparison in comparisons]
+        typer.echo(json.dumps(results[0] if len(results) == 1 else {"recordings": results}, indent=1, allow_nan=False))
         return
-    print_comparisons(found)
+    print_comparisons(comparisons)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
 
 
-def print_comparisons(found: list[Comparison]) -> None:
+def print_comparisons(comparisons: list[Comparison]) -> None:
     """The result for a person: a table, then sentences."""
     from rich.console import Console
     from rich.table import Table
@@ -71,28 +71,28 @@ def print_comparisons(found: list[Comparison]) -> None:
     from compd.report.comparison_page import name_of, no_trend_text, summary
 
     console = Console(highlight=False)
-    numbers = summary(found)
-    table = Table(*numbers.head)
+    overview = summary(comparisons)
+    table = Table(*overview.head)
     for column in table.columns[1:]:
         column.justify = "right"
         column.overflow = "fold"
-    for row in numbers.rows:
+    for row in overview.rows:
         table.add_row(*row)
     console.print(table)
-    for one in found:
-        if len(found) > 1:
-            console.print(f"[bold]{name_of(one)}[/]")
-        console.print(one.verdict)
-        console.print(f"Noise floor: {one.floor.how}.")
-        if not one.trends:
-            console.print(f"Where it fails: {no_trend_text(one)}.")
-        for trend in one.trends[:MOST_SENTENCES]:
+    for comparison in comparisons:
+        if len(comparisons) > 1:
+            console.print(f"[bold]{name_of(comparison)}[/]")
+        console.print(comparison.verdict)
+        console.print(f"Noise floor: {comparison.floor.how}.")
+        if not comparison.trends:
+            console.print(f"Where it fails: {no_trend_text(comparison)}.")
+        for trend in comparison.trends[:MOST_SENTENCES]:
             console.print(f"  - {trend.text}")
-        if len(one.trends) > MOST_SENTENCES:
-            console.print(f"  and {len(one.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
-        rows = one.aligned.recording.row[one.outlier].tolist()
+        if len(comparison.trends) > MOST_SENTENCES:
+            console.print(f"  and {len(comparison.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
+        rows = comparison.aligned.recording.row[comparison.outlier].tolist()
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")
             console.print(f"Rows beyond all noise, not used: {shown}")
-        for why, count in one.left_out.items():
+        for why, count in comparison.left_out.items():
             console.print(f"{count} rows left out: {why}")

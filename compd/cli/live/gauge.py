@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from compd.commissioning.open_gauge import GaugeTarget
     from compd.gauge import Reading
 
-app = typer.Typer(no_args_is_help=True, help="Gauges: list, show, find, read, watch, learn.")
+gauge = typer.Typer(no_args_is_help=True, help="Gauges: list, show, find, read, watch, learn.")
 
 TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
 NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
@@ -24,7 +24,7 @@ Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="How long to
 Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9. Repeatable.")]
 
 
-@app.command("list")
+@gauge.command("list")
 def list_gauges() -> None:
     """List the installed drivers and presets, and where each protocol comes from."""
     from rich.console import Console
@@ -40,7 +40,7 @@ def list_gauges() -> None:
     typer.echo('An unknown gauge: `compd gauge learn`. README.md, "Add a gauge", says the rest.')
 
 
-@app.command()
+@gauge.command()
 def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge list`.")]) -> None:
     """Show a driver: what it speaks, where that was read, an example, and every option."""
     from rich.console import Console
@@ -59,7 +59,7 @@ def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge
     console.print(table)
 
 
-@app.command()
+@gauge.command()
 def scan(
     probe: Annotated[
         bool, typer.Option("--probe", help="Ask every port with each preset's read request. SENDS BYTES to all ports.")
@@ -85,7 +85,7 @@ def scan(
         typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: {outcome}")
 
 
-@app.command()
+@gauge.command()
 def read(
     target: TargetArgument,
     name: NameArgument = None,
@@ -117,7 +117,7 @@ def read(
     raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
 
 
-@app.command()
+@gauge.command()
 def watch(
     target: TargetArgument,
     name: NameArgument = None,
@@ -148,7 +148,7 @@ def watch(
             return
 
 
-@app.command()
+@gauge.command()
 def learn(
     unit: Annotated[str, typer.Option(help="Unit of the numbers on the wire: mm, um, inch, degC ...")],
     capture: Annotated[

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compd.cli.options import MachineOption
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -27,9 +29,7 @@ def diagnose(
             help="NAME.csv to learn from; any others stay sealed until the end, when the result is tried on them once.",
         ),
     ],
-    machine: Annotated[
-        Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
-    ] = None,
+    machine: MachineOption = None,
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with what is known already; it is not changed.")
     ] = None,

@@ -1,0 +1,1 @@
+"""The live machine: the commands of this panel of `compd --help`, one module each."""

@@ -1,0 +1,247 @@
+"""`compd effect`: the library of physical causes, and changing a model file by them, one step at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from compd.cli.options import MachineOption
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from compd.comparison.aligned_recording import AlignedRecording
+    from compd.configuration import Configuration
+    from compd.diagnosis.model_changes import Change
+    from compd.model.effect import Effect
+    from compd.model_file import Declaration, ModelFile
+
+ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
+RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
+EFFECT_HELP = "An id from `compd effect list`, /absolute/file.py:NAME, or a YAML file with a formula."
+
+
+effect = typer.Typer(no_args_is_help=True, help="The library of physical causes: list them, show one on a machine.")
+
+
+@effect.command(name="list")
+def list_effects() -> None:
+    """List every effect that is installed: where it acts, what it needs, what it is."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.model.library import load_library
+
+    table = Table("effect", "port", "needs", "physics")
+    table.columns[0].no_wrap = True
+    table.columns[2].overflow = "fold"  # names of quantities are to be copied whole
+    for entry in load_library().values():
+        table.add_row(entry.id, entry.port, ", ".join(entry.needs) or "-", entry.physics)
+    Console().print(table)
+
+
+@effect.command()
+def show(
+    name: Annotated[
+        str, typer.Argument(metavar="ID", help="An id from `compd effect list`, or /absolute/file.py:NAME.")
+    ],
+    machine: Annotated[
+        Path | None, typer.Option("--machine", help="Machine configuration (YAML); the shipped tripod if left out.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Draw the effect's signature into this page.")] = None,
+) -> None:
+    """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
+    from rich.console import Console
+
+    from compd.configuration import load
+    from compd.configuration.shipped import shipped_configuration
+    from compd.model.library import find_effect
+
+    shown = find_effect(name, "compd effect show")
+    configuration = load(machine or shipped_configuration("tripod-cmm.yaml"))
+    Console().print(_card(shown, configuration))
+    if html is not None:
+        from compd.report.effect_page import write_effect_page
+
+        write_effect_page(html, shown, configuration)
+        typer.echo(f"{shown.id} on {configuration.machine}: {html}")
+
+
+@effect.command()
+def add(
+    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
+    recording: RecordingOption,
+    model: ModelOption,
+    machine: MachineOption = None,
+    dry_run: DryRunOption = False,
+) -> None:
+    """Add an effect to a model and fit all its effects together."""
+    from compd.comparison.open import open_recording
+    from compd.diagnosis.model_changes import add as add_effect
+
+    declared, declared_effect = _declaration(name)
+    aligned = open_recording(recording, machine)
+    file = _read_model(model, aligned) if model.exists() else _new_model(aligned)
+    change = add_effect(file, declared, declared_effect, aligned, _now())
+    _finish(model, change, f"added {declared_effect.id}", dry_run)
+
+
+@effect.command()
+def remove(
+    name: Annotated[str, typer.Argument(metavar="EFFECT", help="The id of an effect in the model.")],
+    recording: RecordingOption,
+    model: ModelOption,
+    machine: MachineOption = None,
+    dry_run: DryRunOption = False,
+) -> None:
+    """Take an effect out of a model and fit the others again."""
+    from compd.comparison.open import open_recording
+    from compd.diagnosis.model_changes import remove as remove_effect
+
+    aligned = open_recording(recording, machine)
+    _finish(model, remove_effect(_read_model(model, aligned), name, aligned, _now()), f"removed {name}", dry_run)
+
+
+@effect.command()
+def fit(
+    recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
+) -> None:
+    """Fit all effects of a model again, on another recording."""
+    from compd.comparison.open import open_recording
+    from compd.diagnosis.model_changes import refit
+
+    aligned = open_recording(recording, machine)
+    _finish(model, refit(_read_model(model, aligned), aligned, _now()), "fitted again", dry_run)
+
+
+@effect.command()
+def undo(model: ModelOption) -> None:
+    """Take back the last step; undo again for the step before it. The ledger keeps both."""
+    from compd.diagnosis.model_changes import undo as undo_step
+    from compd.model_file import read_stored, write_stored
+
+    after = undo_step(read_stored(model), _now(), str(model))
+    write_stored(model, after)
+    names = ", ".join(_declared_id(entry["effect"]) for entry in after.state["effects"]) or "none"
+    typer.echo(f"{model}: one step taken back; effects now: {names}")
+
+
+def _declared_id(declared: Declaration) -> str:
+    return declared if isinstance(declared, str) else str(declared["id"])
+
+
+def _declaration(text: str) -> tuple[Declaration, Effect]:
+    """What the person named, and the effect it stands for. Raises CompdError with every problem."""
+    from compd.configuration.document import read_document
+    from compd.model.library import find_effect
+
+    if Path(text).suffix in (".yaml", ".yml"):
+        declared = read_document(Path(text)).data
+        return declared, find_effect(declared, text)
+    return text, find_effect(text, "compd effect add")
+
+
+def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
+    """All its numbers are about to be fitted again, on this geometry."""
+    from compd.model_file import read_model_file
+
+    file = read_model_file(path, aligned.recording.machine, aligned.rows.links)
+    return replace(file, geometry=aligned.geometry_hash)
+
+
+def _new_model(aligned: AlignedRecording) -> ModelFile:
+    from compd.model_file import ModelFile
+
+    return ModelFile(aligned.recording.machine, geometry=aligned.geometry_hash)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
+    """Write the file, unless it is a dry run, then say what the step did."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.model_file import parameter_estimates, write_model_file
+
+    links = change.after.aligned.rows.links
+    if dry_run:
+        done = f"not written: would have {done}"
+    else:
+        write_model_file(path, change.file, links)
+    before, after = change.before, change.after
+    console = Console(highlight=False)
+    console.print(
+        f"{path}: {done}; residual {before.rms_um:.3g} um -> {after.rms_um:.3g} um, floor ratio "
+        f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
+    )
+    ranges = {
+        (fitted.effect.id, column.name): column.parameter
+        for fitted in change.file.fitted
+        for column in fitted.effect.columns(links)
+    }
+    table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
+    for effect_id, number in parameter_estimates(change.file.fitted, links):
+        parameter = ranges[effect_id, number["name"]]
+        inside = parameter.low <= number["value"] <= parameter.high
+        plausible = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
+        table.add_row(
+            effect_id, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], plausible
+        )
+    for fitted in change.file.fitted:
+        for name, value in fitted.constants.items():
+            unit = next(constant.unit for constant in fitted.effect.constants if constant.name == name)
+            table.add_row(fitted.effect.id, name, f"{value:.5g}", "searched", unit, "")
+    console.print(table)
+    typer.echo(after.verdict)
+
+
+def _card(effect: Effect, configuration: Configuration) -> RenderableType:
+    """Everything that the effect declares, and whether the machine has what it needs."""
+    from rich.console import Group
+    from rich.table import Table
+
+    from compd.machine_builder import build_model
+    from compd.model.effect import PORTS
+    from compd.model.effect_needs import unmet_needs
+    from compd.model.observations import available_settings
+
+    model = build_model(configuration.geometry, configuration.wiring)
+    assert model.constants is not None
+    measured = {wire.name for wire in configuration.wiring.quantities}
+    lacking = unmet_needs(effect, measured | available_settings(model.constants), model.links)
+
+    card = Table.grid(padding=(0, 2))
+    card.add_row("[bold]effect", effect.id)
+    card.add_row("physics", effect.physics)
+    for port in effect.ports:
+        card.add_row("port", f"{port}: {PORTS[port]}")
+    card.add_row("equation", effect.equation)
+    for symbol, meaning in effect.symbols.items():
+        card.add_row("", f"{symbol}: {meaning}")
+    card.add_row("source", effect.source)
+    card.add_row("needs", ", ".join(effect.needs) or "nothing but the links' gauges")
+    card.add_row("mistaken for", ", ".join(effect.mistaken_for) or "-")
+    card.add_row("separated by", effect.separated_by)
+    card.add_row(f"on {configuration.machine}", "\n".join(map(str, lacking)) or "has all that it needs")
+
+    numbers = Table("parameter", "unit", "plausible", "one per", "where the range comes from")
+    for parameter in effect.parameters:
+        numbers.add_row(
+            parameter.name,
+            parameter.unit,
+            f"{parameter.low:g} to {parameter.high:g}",
+            parameter.per.replace("_", " and "),
+            parameter.source,
+        )
+    for constant in effect.constants:
+        how = f"from {constant.setting}, else searched" if constant.setting else "searched"
+        numbers.add_row(constant.name, constant.unit, f"{constant.low:g} to {constant.high:g}", how, constant.source)
+    return Group(card, numbers)

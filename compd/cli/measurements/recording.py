@@ -1,0 +1,118 @@
+"""`compd recording`: what is in a recording, and can it be used?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from compd.cli.options import MachineOption
+
+if TYPE_CHECKING:
+    from compd.recording.recording import Recording
+
+recording = typer.Typer(no_args_is_help=True, help="Recordings: readings of the machine beside a reference.")
+
+
+@recording.callback()
+def _recording() -> None:
+    """Recordings: readings of the machine beside a reference."""
+
+
+@recording.command()
+def check(
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    machine: Annotated[
+        Path | None,
+        typer.Option("--machine", help="The machine's configuration; one that comes with compd is found by its name."),
+    ] = None,
+) -> None:
+    """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
+    from compd.comparison.open import read_with_machine
+
+    loaded, _ = read_with_machine(path, machine, needs_reference=False)
+    for warning in loaded.warnings:
+        typer.echo(f"warning: {warning}")
+    for line in _summary(loaded):
+        typer.echo(line)
+
+
+@recording.command()
+def merge(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING RECORDING...", help="NAME.csv with NAME.yaml, in time's order.")
+    ],
+    out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    machine: MachineOption = None,
+    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+) -> None:
+    """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
+    from compd.comparison.open import read_with_machine
+    from compd.errors import CompdError, Problem
+    from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
+
+    if len(recordings) < 2:
+        raise CompdError(
+            Problem(where="compd recording merge", what="needs two recordings or more", value=str(recordings[0]))
+        )
+    problems: list[Problem] = []
+    parts = []
+    for path in recordings:
+        try:
+            parts.append(read_with_machine(path, machine)[0])
+        except CompdError as error:
+            problems += error.problems
+    if problems:
+        raise CompdError(list(dict.fromkeys(problems)))
+    path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
+    merged = merge_recordings(parts, path, overwrite)
+    if not merged.gap_known:
+        typer.echo(f"when each began is not recorded: {ASSUMED_GAP_S / 3600:g} h is put between them")
+    counts = ", ".join(f"{part.path} {rows}" for part, rows in zip(parts, merged.rows, strict=True))
+    typer.echo(f"written: {path}, {sum(merged.rows)} rows ({counts})")
+
+
+def _summary(contents: Recording) -> list[str]:
+    """What a person wants to see before trusting a recording: sizes, reference, and every row that is not used."""
+    gauges = [
+        f"{values.shape[1]} {name}"
+        for name, values in (
+            ("scales", contents.scale_mm),
+            ("joint comparators", contents.joint_mm),
+            ("frame comparators", contents.frame_mm),
+        )
+        if values is not None
+    ]
+    needed = (*contents.gauge_columns, *contents.reference_columns, *contents.model_columns)
+    usable = contents.usable(needed)
+    hours = (contents.time_s[-1] - contents.time_s[0]) / 3600.0
+    lines = [
+        f"{contents.path}: {contents.machine}, {contents.rows} rows over {hours:.2f} h, {_sessions(contents)}",
+        f"    gauges: {', '.join(gauges) or 'none'}; {len(contents.quantities)} other quantities; "
+        f"approach {'recorded' if contents.approach_measured else 'from the scales' if gauges else 'not known'}",
+        f"    reference: {_reference(contents)}",
+        f"    {int(usable.mask.sum())} rows have all of these",
+    ]
+    lines += [f"    {count} rows left out: {why}" for why, count in {**contents.left_out, **usable.left_out}.items()]
+    reasons = dict.fromkeys(contents.sidecar.excluded.values())
+    lines += [f"    excluded: {reason}" for reason in reasons]
+    return [*lines, f"    sha256 {contents.sha256}"]
+
+
+def _sessions(contents: Recording) -> str:
+    if contents.session is None:
+        return f"no sessions: {len(set(contents.fold.tolist()))} blocks of time"
+    return f"{len(set(contents.session.tolist()))} sessions"
+
+
+def _reference(contents: Recording) -> str:
+    reference = contents.reference
+    if reference is None:
+        return "none yet; put an instrument's export beside it with `compd join`"
+    parts = [reference.quantity, ", ".join(contents.reference_columns)]
+    if reference.quantity != "link_length":
+        parts.append(f"in the {reference.frame}'s frame")
+    sigma = ", ".join(f"{value:g}" for value in reference.sigma_um)
+    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} um")
+    return "; ".join(parts)

@@ -1,0 +1,26 @@
+"""Options that several commands share, and the daemon's address."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+DEFAULT_SOCKET = "/run/compd/compd.sock"
+
+DaemonOption = Annotated[
+    str, typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it.")
+]
+MachineOption = Annotated[
+    Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
+]
+
+
+def unix_address(address: str) -> str:
+    """An address as it is; for a configuration file, the Unix socket that it names."""
+    if not address.endswith((".yaml", ".yml")):
+        return address
+    from compd.configuration import load
+
+    return load(Path(address)).sockets.unix.path

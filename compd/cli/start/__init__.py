@@ -1,0 +1,1 @@
+"""Begin: the commands of this panel of `compd --help`, one module each."""
