@@ -94,7 +94,7 @@ def first_order_uncertainty(
         variance = gauge_variance(by_port, noise)
     parameters = np.zeros(shape)
     if fitted:
-        derivatives = np.concatenate([aligned.columns(one.effect, one.constants) for one in fitted], axis=2)
+        derivatives = np.concatenate([aligned.columns(effect.effect, effect.constants) for effect in fitted], axis=2)
         parameters = np.sqrt(np.maximum(parameter_variance(derivatives, covariance), 0.0))
     return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM)
 
@@ -116,8 +116,8 @@ def monte_carlo(
     assert aligned.model is not None
     rng = np.random.default_rng(seed)
     rows = aligned.rows.select(index)
-    bases = [one.effect.basis(aligned.rows, one.constants, None)[0][index] for one in fitted]
-    theta = np.concatenate([np.zeros(0), *(one.theta for one in fitted)])
+    bases = [effect.effect.basis(aligned.rows, effect.constants, None)[0][index] for effect in fitted]
+    theta = np.concatenate([np.zeros(0), *(effect.theta for effect in fitted)])
     root = _covariance_root(covariance)
     predicted = np.empty((trials, len(index), len(aligned.axes)))
     for trial in range(trials):
@@ -127,9 +127,9 @@ def monte_carlo(
             for port in GAUGE_PORTS
         ]
         begin = 0
-        for one, basis in zip(fitted, bases, strict=True):
+        for effect, basis in zip(fitted, bases, strict=True):
             end = begin + basis.shape[2]
-            added.append(split_by_port(one.effect, rows, basis @ numbers[begin:end]))
+            added.append(split_by_port(effect.effect, rows, basis @ numbers[begin:end]))
             begin = end
         predicted[trial] = aligned.predicted_mm(sum_deltas(added), rows)
     return np.asarray(predicted.std(axis=0, ddof=1) * UM_PER_MM)

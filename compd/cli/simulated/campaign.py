@@ -68,23 +68,23 @@ def campaign(
                 next_step="leave --plan or --reference out",
             )
         )
-    given = () if plan is None else read_plan(plan, mechanism)
-    wanted = parse_hidden(effect or [])
+    planned = () if plan is None else read_plan(plan, mechanism)
+    hidden_causes = parse_hidden(effect or [])
     if hidden is not None:
-        wanted.append(draw_hidden(hidden, mechanism))
+        hidden_causes.append(draw_hidden(hidden, mechanism))
     plate = path.with_name(f"{path.stem}.plate.csv")
-    recorded = simulate_recording(configuration, seed, wanted, reference.value, plate.name, other_days, given)
+    recorded = simulate_recording(configuration, seed, hidden_causes, reference.value, plate.name, other_days, planned)
     write_recording(path, recorded.columns, recorded.sidecar, overwrite)
     if recorded.balls_M is not None:
         write_plate(plate, recorded.balls_M)
     answer = path.with_name(f"{path.stem}.answer.json")
     write_answer(answer, recorded.hidden, recorded.weak, seed)
     rows = len(recorded.columns["time_s"])
-    said = f"{rows} rows, {len(recorded.columns)} columns"
-    if given:
+    summary = f"{rows} rows, {len(recorded.columns)} columns"
+    if planned:
         measured = rows - sum(map(math.isnan, recorded.columns[min(recorded.reference_columns)]))
-        said = (
-            f"the plan's {len(given)} rows, {measured} with repeats, and {rows - measured} between them that only the "
+        summary = (
+            f"the plan's {len(planned)} rows, {measured} with repeats, and {rows - measured} between them that only the "
             "gauges saw"
         )
-    Console().print(f"{path}: {said}; under seal: {answer}", soft_wrap=True)
+    Console().print(f"{path}: {summary}; under seal: {answer}", soft_wrap=True)

@@ -72,15 +72,15 @@ def simulate(
     configuration = load(config)
     measured = [quantity.name for quantity in configuration.wiring.quantities]
     rows = () if plan is None else read_plan(plan, Mechanism(configuration.geometry), measured)
-    hid = [_hidden(configuration, seed, number) for number in hidden or ()]
+    sized = [_hidden(configuration, seed, number) for number in hidden or ()]
     world = World(
         configuration.geometry,
         configuration.wiring,
         seed,
         speedup,
         zero_hold,
-        strengths=FULLY_MEASURED if hid else None,
-        causes=[one.cause for one in hid],
+        strengths=FULLY_MEASURED if sized else None,
+        causes=[cause.cause for cause in sized],
         rows=rows,
     )
     stop = threading.Event()
@@ -94,8 +94,8 @@ def simulate(
         directory.mkdir(parents=True, exist_ok=True)
         simulation = Simulation(configuration, world, directory.resolve(), clock)
         stack.callback(simulation.stop)
-        if hid:
-            write_answer(directory / SEALED, hid, [], seed)
+        if sized:
+            write_answer(directory / SEALED, sized, [], seed)
         daemon = simulation.start()
         console.print(_lines(simulation))
         console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
