@@ -84,7 +84,7 @@ def campaign(
     if planned:
         measured = rows - sum(map(math.isnan, recorded.columns[min(recorded.reference_columns)]))
         summary = (
-            f"the plan's {len(planned)} rows, {measured} with repeats, and {rows - measured} between them that only the "
-            "gauges saw"
+            f"the plan's {len(planned)} rows, {measured} with repeats, and {rows - measured} between them that only "
+            "the gauges saw"
         )
     Console().print(f"{path}: {summary}; under seal: {answer}", soft_wrap=True)

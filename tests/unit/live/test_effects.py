@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.cli.live.adopt import adopt, shadow
+from compd.cli.live.adopt import adopt
+from compd.cli.live.shadow import shadow
 from compd.client import connect
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.errors import CompdError, DaemonError, StateError
