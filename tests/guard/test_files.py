@@ -1,4 +1,4 @@
-"""Files that release 0.1.0 wrote, or that people wrote for it, are read: none of them says a format but machine zero."""
+"""Files that release 0.1.0 wrote, or that people wrote for it, are read; of them only machine zero names a format."""
 
 from __future__ import annotations
 
