@@ -50,7 +50,7 @@ LEFT_OUT = {
 }
 # Named rightly, but what is left is above the noise floor.
 FALLS_SHORT = {
-    49: "friction of 3.9 floors, in the truth of another form than in the library: 0.20 of 0.81 um are left, floor 0.16",
+    49: "friction of 3.9 floors, of another form than the library's: 0.20 of 0.81 um are left, the floor is 0.16",
 }
 # Numbers below this are looked through; a cause is plain from so many times the noise.
 NUMBERS = 300
