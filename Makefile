@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help demo test long hidden hidden-sample lint wheel bench bench-sample scoreboard nightly clean
+.PHONY: help reference demo test long hidden hidden-sample lint wheel bench bench-sample scoreboard nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -75,6 +75,10 @@ bench-sample: $(STAMP)
 # More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
 scoreboard: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.scoreboard $(OPTIONS)
+
+# Pages that are made from the code; a test fails where they are not as it makes them.
+reference: $(STAMP)
+	$(BIN)/python -m docs.make_reference
 
 NIGHTLY_CASES ?= 200
 

@@ -87,14 +87,8 @@ def kinds(kind: type[Keys]) -> set[type[Keys]]:
 
 def test_every_message_and_part_is_described():
     assert all(kind.__doc__ for kind in kinds(Keys))
-    assert list(SENT_MESSAGES) == [
-        "WATCH",
-        "RELEASE",
-        "STATUS",
-        "VERSION",
-        "ZERO",
-        "MODEL",
-        "ERROR",
-        "SETPOINT",
-        "READINGS",
-    ]
+
+
+def test_no_message_of_the_protocol_is_lost():
+    kept = {"WATCH", "RELEASE", "STATUS", "VERSION", "ZERO", "MODEL", "ERROR", "SETPOINT", "READINGS"}
+    assert kept <= set(SENT_MESSAGES)
