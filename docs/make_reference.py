@@ -16,9 +16,9 @@ def states() -> str:
         [
             "# States of a setpoint",
             "",
-            "Made by `make reference` from `compd/live/loop/states.py`. `code` is the number in the UDP packet. A reader",
-            "that meets a state or a code which it does not know must take the setpoint for invalid: later releases may",
-            "add some.",
+            "Made by `make reference` from `compd/live/loop/states.py`. `code` is the number in the UDP packet.",
+            "A reader that meets a state or a code which it does not know must take the setpoint for invalid: later",
+            "releases may add some.",
             "",
             "| state | valid | code | meaning |",
             "|---|---|---|---|",
