@@ -51,7 +51,7 @@ def commands() -> Iterator[Shown]:
 def without_numbers(line: str) -> str:
     """The words of a line: numbers, and how wide they make a table, change from run to run."""
     line = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", line)
-    return " ".join(re.sub("━+", "━", line).split())
+    return " ".join(re.sub("([━─])+", r"\1", line).split())
 
 
 def check_printed(shown: Shown, output: str) -> None:
@@ -59,7 +59,7 @@ def check_printed(shown: Shown, output: str) -> None:
     printed = iter([without_numbers(line) for line in output.splitlines()])
     for line in shown.prints:
         wanted = re.compile(".*".join(map(re.escape, without_numbers(line).split("..."))))
-        assert line == "..." or any(wanted.fullmatch(one) for one in printed), (
+        assert line == "..." or any(wanted.fullmatch(text) for text in printed), (
             f"{shown.words}: {line!r} is not in\n{output}"
         )
 
