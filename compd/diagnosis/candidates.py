@@ -27,7 +27,6 @@ class Candidate:
 
     name: str
     effect: Effect
-    constants: ConstantValues
     columns_um: FloatArray
     limits: FloatArray
     searched_parameters: int
@@ -96,7 +95,7 @@ def _candidate(
 ) -> Candidate:
     limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
     columns_um = aligned.columns(effect, constants) * UM_PER_MM
-    return Candidate(effect.id, effect, constants, columns_um, limits, searched_parameters)
+    return Candidate(effect.id, effect, columns_um, limits, searched_parameters)
 
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:

@@ -54,8 +54,7 @@ class EmpiricalFit:
         """The term as a competitor of the library's effects; columns_um (N, m, P) on all rows."""
         name = f"{self.term.covariate} {self.term.form}"
         limits = np.tile([-np.inf, np.inf], (columns_um.shape[2], 1))
-        constants = self.term.constant_values(self.constant)
-        return Candidate(name, self.effect, constants, columns_um, limits, self.searched_parameters)
+        return Candidate(name, self.effect, columns_um, limits, self.searched_parameters)
 
 
 class EmpiricalSearch:

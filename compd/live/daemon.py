@@ -51,7 +51,7 @@ class Daemon:
         pipeline = build_pipeline(configuration, gauges)
         self.latest, self._wires = pipeline.latest, pipeline.wires
         self.commands = Commands(self._zero_on_disk(), models=_first_models(configuration, pipeline.loader))
-        self._model_adopter = ModelSwitch(pipeline.loader, self.commands)
+        self._model_switch = ModelSwitch(pipeline.loader, self.commands)
         by_line = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
@@ -65,7 +65,7 @@ class Daemon:
         packets = [] if self._packets is None else [self._packets.deliver]
         sinks = [*packets, directions.update, self.publisher.deliver]
         self.loop = Loop(pipeline.settings, self.latest, self.commands, sinks, self._notifier, clock)
-        self._zero_taker = ZeroCapture(
+        self._zero_capture = ZeroCapture(
             self._wires, self.latest, self.commands, _directory(configuration), configuration.zero_hash, clock
         )
         version: dict[str, Any] = {
@@ -96,9 +96,9 @@ class Daemon:
             keys,
             self.commands,
             report.message,
-            self._zero_taker.start,
+            self._zero_capture.start,
             ReadingsMessage(self._wires, self.latest.channels, directions),
-            self._model_adopter.start,
+            self._model_switch.start,
         )
         self._state: State | None = None
 
@@ -116,8 +116,8 @@ class Daemon:
         """Stop everything; returns when every thread has ended."""
         self._notifier.stopping()
         self.loop.stop()
-        self._zero_taker.stop()
-        self._model_adopter.stop()
+        self._zero_capture.stop()
+        self._model_switch.stop()
         self.publisher.stop()
         self.acquisition.stop()
         if self._packets is not None:

@@ -41,7 +41,7 @@ def search(y: FloatArray, values: Mapping[str, FloatArray], **changed: Candidate
 
 def candidate(name: str, array: FloatArray, limit: float = 100.0) -> Candidate:
     limits = np.tile([-limit, limit], (array.shape[2], 1))
-    return Candidate(name, ORDINARY, {}, array, limits, 0)
+    return Candidate(name, ORDINARY, array, limits, 0)
 
 
 def test_the_columns_in_the_residual_are_selected() -> None:

@@ -23,7 +23,7 @@ def test_an_effect_of_the_same_form_adds_its_whole_rms(tmp_path: Path) -> None:
     effect = LIBRARY["link_elasticity"]
     result = fit(aligned, [initial_effect(effect, {}, aligned.rows.links)], SIGMA_UM)
     columns_um = aligned.columns(effect, {}) * UM_PER_MM
-    twin = Candidate("twin", effect, {}, columns_um, np.array([[0.0, 1.0]]), 0)
+    twin = Candidate("twin", effect, columns_um, np.array([[0.0, 1.0]]), 0)
     criteria = Criteria(disturbance=0.3, disturbances=2)
     wider = with_disturbances(result, aligned, SIGMA_UM, [twin], criteria)
     rms = float(np.sqrt(np.mean((columns_um[result.used] / SIGMA_UM[:, None]) ** 2)))
