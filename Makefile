@@ -4,13 +4,14 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help reference demo test long hidden hidden-sample lint wheel bench bench-sample scoreboard nightly clean
+.PHONY: help docs demo test long hidden hidden-sample lint wheel bench bench-sample scoreboard nightly clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
 	@echo "make test    the tests; two hidden causes are found on wires among them (below 10 min)"
 	@echo "make lint    ruff, mypy, import contracts"
+	@echo "make docs    the documentation; compd docs opens it"
 	@echo "make wheel   build the wheel, install it in a clean environment, run it"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
@@ -76,9 +77,10 @@ bench-sample: $(STAMP)
 scoreboard: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.scoreboard $(OPTIONS)
 
-# Pages that are made from the code; a test fails where they are not as it makes them.
-reference: $(STAMP)
-	$(BIN)/python -m docs.make_reference
+docs: $(STAMP)
+	$(BIN)/python -m docs.generate
+	$(BIN)/sphinx-build --builder html --fail-on-warning --keep-going --quiet docs docs/_build/html
+	@echo "docs/_build/html/index.html"
 
 NIGHTLY_CASES ?= 200
 
@@ -87,4 +89,4 @@ nightly: lint wheel demo test long hidden bench
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,30 @@
+"""Sphinx's configuration; `make docs` builds the pages."""
+
+from __future__ import annotations
+
+from compd import __version__
+
+project = "compd"
+author = "the compd developers"
+copyright = "2026, the compd developers"
+version = release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
+myst_heading_anchors = 3
+
+autodoc_typehints = "description"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = f"compd {release}"
+html_static_path = ["static"]
+html_css_files = ["compd.css"]
+html_show_sphinx = False
+html_copy_source = False
+html_show_sourcelink = False
+templates_path: list[str] = []

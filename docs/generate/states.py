@@ -1,0 +1,23 @@
+"""The page of the states of a setpoint."""
+
+from __future__ import annotations
+
+from compd.live.loop.states import State
+
+
+def page() -> str:
+    """Markdown, from the table of states."""
+    rows = [f"| `{state}` | {'yes' if state.valid else 'no'} | {state.code} | {state.text} |" for state in State]
+    return "\n".join(
+        [
+            "# States of a setpoint",
+            "",
+            "`code` is the number in the UDP packet. A reader that meets a state or a code that it does not know must",
+            "treat the setpoint as invalid, because later releases may add some.",
+            "",
+            "| state | valid | code | meaning |",
+            "|---|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
