@@ -1,0 +1,179 @@
+"""A page's terminal: the commands of its console fences, run in order, and what they print compared."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from compd.client import connect
+from compd.demo.session import wait_for_gauges
+from tests.support.paths import ROOT
+
+# What the pages write, and what it is while a test runs.
+MACHINE = "/tmp/machine"
+WIDTH = "100"
+TIMEOUT_S = 200.0
+POLL_EVERY_S = 0.05
+# Sockets that exist once these commands are ready for the next one.
+READY = {"simulate": "control.sock", "run": "compd.sock"}
+EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
+
+
+class Shown(NamedTuple):
+    """A command as a page shows it, and the lines that it prints; `interrupt`: it is ended with Ctrl-C after them."""
+
+    command: str
+    beside: bool
+    prints: list[str]
+    interrupt: bool
+
+
+def shown_commands(console: str) -> Iterator[Shown]:
+    """Those of a console fence: lines that begin with `$ `, continued after a backslash, their output below them."""
+    lines = [line.rstrip() for line in console.splitlines() if line.strip()]
+    starts = [number for number, line in enumerate(lines) if line.startswith("$ ")]
+    assert starts[:1] == [0], f"a console fence begins with a command: {lines[:1]}"
+    for start, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+        command, first = lines[start][2:], start + 1
+        while command.endswith("\\"):
+            command = command[:-1] + lines[first].removeprefix("> ")
+            first += 1
+        beside = command.endswith("&")
+        prints = lines[first:end]
+        yield Shown(command.rstrip("& "), beside, [line for line in prints if line != "^C"], "^C" in prints)
+
+
+def without_numbers(line: str) -> str:
+    """The words of a line: numbers, and how wide they make a table, change from run to run."""
+    line = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", line)
+    return " ".join(re.sub("([━─])+", r"\1", line).split())
+
+
+def check_printed(shown: Shown, output: str) -> None:
+    """Every line of the page is there, in its order; `...` stands for anything, alone for any lines."""
+    printed = iter([without_numbers(line) for line in output.splitlines()])
+    for line in shown.prints:
+        wanted = re.compile(".*".join(map(re.escape, without_numbers(line).split("..."))))
+        assert line == "..." or any(wanted.fullmatch(text) for text in printed), (
+            f"$ {shown.command}\n{line!r} is not in\n{output}"
+        )
+
+
+class Terminal:
+    """One directory, in which `config` is the checkout's, and the processes that run beside the others."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
+        (directory / "config").symlink_to(ROOT / "config")
+
+    def run(self, console: str) -> None:
+        """Run a console fence."""
+        for shown in shown_commands(console):
+            command = shown.command.replace(MACHINE, str(self.directory / "machine"))
+            print("$", shown.command, "&" * shown.beside)
+            if shown.command.startswith("make "):
+                # minutes each: .ci/run runs them
+                assert f"\n{shown.command.partition('#')[0].strip()}\n" in (ROOT / ".ci" / "run").read_text()
+            elif shown.beside:
+                self._start(command)
+            else:
+                self._run(command, shown)
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file that the page shows."""
+        path = self.directory / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text.replace(MACHINE, str(self.directory / "machine")), encoding="utf-8")
+
+    def close(self) -> None:
+        """Wait for what ends by itself, stop what serves; raises where one has failed."""
+        failed = []
+        try:
+            for command, process, serves in reversed(self._beside):
+                if serves:
+                    process.terminate()
+                if process.wait(TIMEOUT_S) not in ((0, -signal.SIGTERM) if serves else (0,)):
+                    failed.append(command)
+        finally:
+            for _, process, _ in self._beside:
+                process.kill()
+        assert not failed, f"failed beside the others: {failed}\n{self._log()}"
+
+    def _start(self, command: str) -> None:
+        words = shlex.split(command, comments=True)
+        socket = self._ready_socket(words)
+        with (self.directory / "beside.log").open("ab") as log:
+            process = self._popen(f"exec {command}", log.fileno())
+        self._beside.append((command, process, socket is not None))
+        end_s = time.monotonic() + TIMEOUT_S
+        while socket is not None and not socket.exists():
+            running = process.poll() is None and time.monotonic() < end_s
+            assert running, f"{command} did not start\n{self._log()}"
+            time.sleep(POLL_EVERY_S)
+
+    def _ready_socket(self, words: list[str]) -> Path | None:
+        """The socket that a command which serves others makes; None for one that ends by itself."""
+        if words[:1] != ["compd"] or words[1] not in READY:
+            return None
+        if "--directory" in words:
+            return self.directory / words[words.index("--directory") + 1] / READY[words[1]]
+        return (self.directory / words[2]).parent / READY[words[1]]
+
+    def _run(self, command: str, shown: Shown) -> None:
+        words = shlex.split(command, comments=True)
+        if words[:2] == ["compd", "zero"]:
+            # a person types slower than gauges come up
+            with connect(words[2]) as observer, connect(words[2]) as daemon:
+                wait_for_gauges(observer, daemon.watch(10.0))
+        with self._popen(command, subprocess.PIPE) as process:
+            clock = threading.Timer(TIMEOUT_S, process.kill)
+            clock.start()
+            try:
+                output = self._interrupted(process, shown) if shown.interrupt else process.communicate()[0].decode()
+            finally:
+                clock.cancel()
+                process.kill()
+        print(output, end="")
+        wanted = EXIT_CODE.search(shown.command)
+        allowed = {int(wanted[1])} if wanted else {0, -signal.SIGINT, 128 + signal.SIGINT} if shown.interrupt else {0}
+        assert process.returncode in allowed, (
+            f"$ {shown.command}\nexit code {process.returncode}\n{output}{self._log()}"
+        )
+        check_printed(shown, output)
+
+    def _interrupted(self, process: subprocess.Popen[bytes], shown: Shown) -> str:
+        """Read until the lines that the page shows have come, then press Ctrl-C."""
+        assert process.stdout is not None
+        output, expected = "", [line for line in shown.prints if line != "..."]
+        for line in process.stdout:
+            output += line.decode()
+            if len(output.splitlines()) >= len(expected):
+                break
+        os.killpg(process.pid, signal.SIGINT)
+        return output + process.stdout.read().decode()
+
+    def _popen(self, command: str, output: int) -> subprocess.Popen[bytes]:
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        return subprocess.Popen(
+            ["bash", "-c", command],
+            cwd=self.directory,
+            env={**os.environ, "PATH": path, "COLUMNS": WIDTH, "NO_COLOR": "1", "PYTHONUNBUFFERED": "1"},
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+    def _log(self) -> str:
+        log = self.directory / "beside.log"
+        return log.read_text(errors="replace")[-4000:] if log.exists() else ""

@@ -1,0 +1,36 @@
+"""README and the pages of docs/: everything on them runs, and nothing on them is a command that no test runs."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.support.pages import RUN, SHOWN, fences, page_names, run_page
+from tests.support.paths import ROOT
+
+# tests/system/test_tutorial.py
+TUTORIAL = "docs/tutorials/missing-effect.md"
+
+
+@pytest.mark.parametrize("name", [name for name in page_names() if name != TUTORIAL])
+def test_everything_on_a_page_runs(name: str) -> None:
+    run_page(name)
+
+
+# A command, alone or in a block that is indented instead of fenced.
+COMMAND = re.compile(r"^ *(\$ |compd |make |pip )", re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", page_names())
+def test_every_fence_is_run_or_holds_no_command(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for kind, content in fences(text):
+        if kind.startswith("{"):
+            continue
+        assert kind in RUN | SHOWN, f"{name}: a fence is {' or '.join(sorted(RUN | SHOWN))}, not {kind!r}"
+        if kind in SHOWN:
+            assert not COMMAND.search(content), f"{name}: not run:\n{content}"
+    outside = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    indented = [line for line in outside.splitlines() if re.match(r" {4}(\$|compd|make|pip) ", line)]
+    assert not indented, f"{name}: commands that no test runs: {indented}"
