@@ -1,4 +1,4 @@
-"""What the documentation and its pictures name is there: files, folders, links, and every package in the architecture."""
+"""What the documentation and its pictures name is there: files, folders, links, every package in the architecture."""
 
 from __future__ import annotations
 
@@ -46,9 +46,8 @@ def packages() -> set[str]:
 @cache
 def tracked() -> frozenset[str]:
     """Files of the tree and the folders that they are in, without what tools leave behind."""
-    listed = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True
-    )
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode:  # an unpacked release
         files = [name_of(path) for path in ROOT.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     else:
@@ -104,6 +103,16 @@ def files_in(picture: Path) -> list[str]:
     return [name for text in texts for name in FILE.findall(text) if not name.startswith("NAME.")]
 
 
+@pytest.mark.parametrize("name", ["one-reading", "one-recording", "one-effect"])
+def test_the_numbers_in_a_picture_are_those_of_its_page(name: str) -> None:
+    picture = (DOCS / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
+    page = (DOCS / "explanation" / f"{name}.md").read_text(encoding="utf-8")
+    shown = re.findall(r"\d+\.\d+", " ".join(re.findall(r'<text class="v"[^>]*>([^<]+)<', picture)))
+    assert len(shown) > 5
+    computed = {float(number) for number in re.findall(r"\d+(?:\.\d+)?", page)}
+    assert [number for number in shown if float(number) not in computed] == []
+
+
 def test_the_architecture_has_every_package() -> None:
     folders = {name.rstrip("/") for name in files_in(DOCS / "pictures" / "architecture.svg") if name.endswith("/")}
     assert {name for name in folders if "/" not in name} == packages()
@@ -115,7 +124,7 @@ def test_the_tree_of_rooms_has_every_package() -> None:
 
 
 def test_a_path_that_is_not_there_is_noticed() -> None:
-    text = "See `compd/live/loop/cycle.py`, `live/loop/cycle.py` and `compd/live/loop/bicycle.py`.\n```text\n`docs/x`\n```\n"
+    text = "`compd/live/loop/cycle.py`, `live/loop/cycle.py`, `compd/live/loop/bicycle.py`.\n```text\n`docs/x`\n```\n"
     assert [path for path in paths_in(text) if not exists(path)] == ["compd/live/loop/bicycle.py"]
     assert exists("compd/model/library/PORT.py")
     assert not exists("compd/model/PORT.exe")
