@@ -36,7 +36,7 @@ WARM_UP_HOURS, EVERY_S = 10.0, 600.0
 _STEP_MM = 1e-3
 # Timing: one row per call, as in the daemon's cycle; many rows in one call, as in a comparison; the best of so many.
 ROWS_PER_CALL = 10_000
-_CALLS, _TURNS = 1000, 7
+_CALLS, _TURNS = 1000, 15
 
 
 class Difference(NamedTuple):

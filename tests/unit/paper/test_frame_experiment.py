@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from compd.model.machine import MachineModel
 from compd.paper import frame_experiment, frame_page
 from compd.paper.frame_experiment import SIZES_MM, FrameResult
 from compd.simulation.truth.strengths import Strengths
+from docs.pictures import instantaneous_frame
 
 # The ends of t1..t3, u1..u6 by equation (3) of the paper, counted from 0: supports 0..2, then plate points 3..5.
 ENDS = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5)])
@@ -143,3 +145,12 @@ def test_command_prints_table_and_sentences_and_draws_a_page(tmp_path: Path) -> 
     text = page.read_text(encoding="utf-8")
     assert text.count("Plotly.newPlot") >= 4
     assert "power 2.00" in text
+
+
+def test_the_committed_picture_is_what_the_command_finds() -> None:
+    def numbers(svg: str) -> list[float]:
+        return [float(number) for number in re.findall(r"\d+\.\d", svg)]
+
+    committed, drawn = instantaneous_frame.PICTURE.read_text(encoding="utf-8"), instantaneous_frame.picture()
+    assert re.sub(r"\d+\.\d", "#", committed) == re.sub(r"\d+\.\d", "#", drawn)
+    np.testing.assert_allclose(numbers(committed), numbers(drawn), rtol=0, atol=1.0)  # a pixel
