@@ -7,8 +7,9 @@ U (9,) are the changes of t1..t3, u1..u6 since machine zero and X (9,) the displ
 J is the unit vector along edge e, at its near support positive, at its far support negative: d|b - m| = (b - m) . db /
 |b - m|. J is constant, that of machine zero.
 
-The exact solution costs five microseconds, so the daemon uses that; this is the paper's other way, kept to compare.
-Example, on the tripod: u1 longer by 0.1 mm displaces {B} by 0.0862 mm, and the two ways differ by 7 nm and 0.02 urad.
+The exact solution costs five microseconds, so the daemon uses that; this is the paper's other way, kept to compare:
+`compd paper instantaneous` shows both side by side. Example, on the tripod: u1 longer by 0.1 mm displaces {B} by
+0.0862 mm, and the two ways differ by 7 nm and 0.02 urad.
 """
 
 from __future__ import annotations
@@ -22,6 +23,17 @@ from compd.arrays import FloatArray
 from compd.errors import KinematicsError, Problem
 from compd.model.frame import Frame, FrameGeometry, distances_mm
 from compd.model.solve_status import AMPLIFICATION_LIMIT
+
+
+class FrameJacobians(NamedTuple):
+    """What equation (5) needs of a machine; constant, computed once.
+
+    supports : (9, 9), d (b1, b2, b3) / d (t1..t3, u1..u6), pure numbers.
+    pose : (6, 9), d (displacement, rotation vector) of {B} / d (t1..t3, u1..u6); rows 3..5 in rad/mm.
+    """
+
+    supports: FloatArray
+    pose: FloatArray
 
 
 class InstantaneousFrame(NamedTuple):
@@ -93,15 +105,28 @@ def base_pose_jacobian(geometry: FrameGeometry) -> FloatArray:
     return np.vstack([thirds, axes @ turn_B])
 
 
-def instantaneous_frame(geometry: FrameGeometry, changes_mm: ArrayLike) -> InstantaneousFrame:
+def frame_jacobians(geometry: FrameGeometry) -> FrameJacobians:
+    """J^-1 of equation (5) at machine zero, for the supports and for the pose of {B}.
+
+    Raises KinematicsError where the frame at machine zero is near-singular.
+    """
+    supports = inverse_frame_jacobian(geometry)
+    return FrameJacobians(supports, base_pose_jacobian(geometry) @ supports)
+
+
+def instantaneous_frame(
+    geometry: FrameGeometry, changes_mm: ArrayLike, jacobians: FrameJacobians | None = None
+) -> InstantaneousFrame:
     """Equation (5): X = J^-1 U with the constant J of machine zero.
 
     changes_mm : (..., 9), U, of t1..t3, u1..u6 since machine zero. nan in, nan out.
+    jacobians : of this geometry, where they are at hand; computed if None.
     Raises KinematicsError where the frame at machine zero is near-singular.
     """
     changes = np.asarray(changes_mm, dtype=np.float64)
-    moved_mm = changes @ inverse_frame_jacobian(geometry).T
-    pose = moved_mm @ base_pose_jacobian(geometry).T
+    by_supports, by_pose = jacobians or frame_jacobians(geometry)
+    moved_mm = changes @ by_supports.T
+    pose = changes @ by_pose.T
     supports = geometry.zero_supports_M_mm + moved_mm.reshape(*changes.shape[:-1], 3, 3)
     return InstantaneousFrame(supports, pose[..., :3], pose[..., 3:])
 

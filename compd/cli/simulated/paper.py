@@ -15,8 +15,11 @@ Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tr
 Page = Annotated[Path, typer.Option(help="Where the page with the picture goes.")]
 Seed = Annotated[int, typer.Option(min=0, help="Joints, weather and noise follow from it.")]
 
+Machine = Annotated[Path | None, typer.Option("--machine", help="The machine; the shipped tripod if left out.")]
+
 paper = typer.Typer(
-    no_args_is_help=True, help="The paper's experiments (T. Oiwa, figures 18, 20, 21) on the simulated machine."
+    no_args_is_help=True,
+    help="The paper's experiments (T. Oiwa, figures 18, 20, 21) and its equations (4), (5) on the simulated machine.",
 )
 
 
@@ -42,6 +45,27 @@ def fig21(config: Config = None, page: Page = Path("out/fig21.html"), seed: Seed
     from compd.paper import drift_experiment
 
     _show(drift_experiment.reproduce(_configuration(config), seed), page)
+
+
+@paper.command()
+def instantaneous(machine: Machine = None, page: Page = Path("out/instantaneous.html"), seed: Seed = 1) -> None:
+    """Equations (4) and (5): how far the instantaneous frame is from the exact one, by the size of the change."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.paper import frame_experiment, frame_page
+
+    result = frame_experiment.run(_configuration(machine), seed)
+    table = Table(*frame_page.HEAD, title=frame_page.title(result), title_justify="left")
+    table.caption, table.caption_justify = frame_page.table_caption(), "left"
+    for row in frame_page.table_rows(result):
+        table.add_row(*row)
+    console = Console()
+    console.print(table)
+    for sentence in frame_page.sentences(result):
+        console.print(sentence, highlight=False)
+    frame_page.write_frame_page(result, page)
+    console.print(f"The same as a picture: {page}")
 
 
 def _configuration(config: Path | None) -> Configuration:
