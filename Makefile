@@ -11,7 +11,7 @@ help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
 	@echo "make test    the tests; two hidden causes are found on wires among them (below 10 min)"
 	@echo "make lint    ruff, mypy, import contracts"
-	@echo "make docs    the documentation; compd docs opens it"
+	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build the wheel, install it in a clean environment, run it"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
@@ -56,12 +56,13 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-wheel: $(STAMP)
+wheel: $(STAMP) docs
 	rm -rf dist build/wheel-test
 	$(BIN)/python -m build --wheel --outdir dist .
 	$(PYTHON) -m venv build/wheel-test
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
+	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 
 SAMPLE := kinematics cycle compare diagnose
 BENCH := $(SAMPLE) loop latency throughput
@@ -77,9 +78,20 @@ bench-sample: $(STAMP)
 scoreboard: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.scoreboard $(OPTIONS)
 
-docs: $(STAMP)
+# The gallery runs simulations for a minute: only when the code or the configurations have changed.
+# SCREENSHOTS=required makes it an error that there is no Chromium.
+GALLERY := docs/_build/gallery.made
+
+$(GALLERY): $(shell find compd drivers config docs/gallery -name '*.py' -o -name '*.yaml' -o -name '*.html') | $(STAMP)
+	$(BIN)/python -m docs.gallery --screenshots $(or $(SCREENSHOTS),where-possible)
+	@touch $@
+
+# Begun afresh, so that the wheel has no page of yesterday.
+docs: $(STAMP) $(GALLERY)
+	rm -rf docs/_build/html
 	$(BIN)/python -m docs.generate
-	$(BIN)/sphinx-build --builder html --fail-on-warning --keep-going --quiet docs docs/_build/html
+	$(BIN)/sphinx-build --builder html --fail-on-warning --keep-going --quiet \
+	  --doctree-dir docs/_build/doctrees docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 NIGHTLY_CASES ?= 200
@@ -89,4 +101,4 @@ nightly: lint wheel demo test long hidden bench
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +
-	rm -rf $(VENV) build dist docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist docs/_build docs/gallery/cases.md .pytest_cache .mypy_cache .ruff_cache .hypothesis

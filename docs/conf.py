@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from compd import __version__
 
 project = "compd"
@@ -11,7 +13,8 @@ version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["_build"]
+# gallery/cases.md is a part of gallery/index.md
+exclude_patterns = ["_build", "gallery/cases.md"]
 myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 
@@ -23,6 +26,8 @@ napoleon_use_rtype = False
 html_theme = "furo"
 html_title = f"compd {release}"
 html_static_path = ["static"]
+# the gallery's own pages, where `python -m docs.gallery` has made them
+html_extra_path = [name for name in ("_build/gallery",) if (Path(__file__).parent / name).is_dir()]
 html_css_files = ["compd.css"]
 html_show_sphinx = False
 html_copy_source = False

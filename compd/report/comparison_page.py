@@ -63,8 +63,10 @@ def no_trend_text(comparison: Comparison) -> str:
     return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
 
 
-def write_comparison_page(path: Path, comparisons: Sequence[Comparison], model: ModelFile | None) -> None:
-    """Write the page for one recording or more."""
+def write_comparison_page(
+    path: Path, comparisons: Sequence[Comparison], model: ModelFile | None, shared_script: bool = False
+) -> None:
+    """Write the page for one recording or more; shared_script as in `write_page`."""
     machine = comparisons[0].aligned.recording.machine
     effects = ", ".join(effect.effect.id for effect in comparisons[0].fitted) or "none"
     verdict = " ".join(
@@ -82,7 +84,8 @@ def write_comparison_page(path: Path, comparisons: Sequence[Comparison], model: 
     hashes = "; ".join(
         f"{name_of(comparison)} sha256 {comparison.aligned.recording.sha256}" for comparison in comparisons
     )
-    write_page(path, f"Model and measurement: {machine}", verdict, panels, f"Effects in the model: {effects}. {hashes}")
+    footer = f"Effects in the model: {effects}. {hashes}"
+    write_page(path, f"Model and measurement: {machine}", verdict, panels, footer, shared_script)
 
 
 def _panels(comparison: Comparison, prefix: str) -> list[Panel]:

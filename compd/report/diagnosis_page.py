@@ -20,14 +20,16 @@ from compd.report.small_multiples import small_multiples
 from compd.units import unit_of
 
 
-def write_diagnosis_page(path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> None:
-    """Write the page; it works offline."""
+def write_diagnosis_page(
+    path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout], shared_script: bool = False
+) -> None:
+    """Write the page; it works offline. shared_script : as in `write_page`."""
     recording = diagnosis.before.aligned.recording
     panels = [_falling_error(diagnosis, holdouts)]
     for number, step in enumerate(diagnosis.steps, start=1):
         panels += _step_panels(number, step, diagnosis)
     if diagnosis.depends_on:
-        panels += [_dependences(diagnosis), *_rest_against(diagnosis), _formula(diagnosis)]
+        panels += [*_rest_against(diagnosis), _dependences(diagnosis), _formula(diagnosis)]
     panels.append(_candidates(diagnosis.candidates))
     if diagnosis.next_measurement:
         panels.append(_next_rows(diagnosis))
@@ -35,12 +37,16 @@ def write_diagnosis_page(path: Path, diagnosis: Diagnosis, holdouts: Sequence[Ho
         f"{recording.path}, sha256 {recording.sha256[:16]}; {int(diagnosis.after.used.sum())} rows used; "
         f"noise floor: {diagnosis.before.floor.how}."
     )
-    write_page(path, f"{recording.machine}: what is missing? {diagnosis.verdict}", diagnosis.summary, panels, footer)
+    title = f"Diagnosis of {recording.machine}: {diagnosis.verdict}"
+    write_page(path, title, diagnosis.summary, panels, footer, shared_script)
 
 
 def _falling_error(diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> Panel:
     """Bars: the error as it was, with each effect, and on held-out recordings; the floor as a line."""
-    names = ["as it was", *(f"with {step.effect.id}" for step in diagnosis.steps)]
+    # each bar has the effects of those before it too
+    words = ["with", *["and"] * len(diagnosis.steps)]
+    steps = zip(words, diagnosis.steps, strict=False)
+    names = ["as it was", *(f"{word} {step.effect.id}" for word, step in steps)]
     values = [diagnosis.before.rms_um, *(step.heldout_rms_um for step in diagnosis.steps)]
     colours = [COLOURS["worst"], *[COLOURS["middle"]] * (len(diagnosis.steps) - 1), COLOURS["best"]][: len(names)]
     for first in diagnosis.depends_on[:1]:
@@ -49,18 +55,33 @@ def _falling_error(diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> Panel:
         colours.append(COLOURS["quiet"])
     for holdout in holdouts:
         name = holdout.after.aligned.recording.path.name
-        names += [f"{name}, before", f"{name}, after"]
-        values += [holdout.before.rms_um, holdout.after.rms_um]
-        colours += [COLOURS["quiet"], COLOURS["plain"]]
+        names.append(f"{name}, before")
+        values.append(holdout.before.rms_um)
+        colours.append(COLOURS["quiet"])
+        if diagnosis.steps:
+            names.append(f"{name}, after")
+            values.append(holdout.after.rms_um)
+            colours.append(COLOURS["plain"])
     figure = Figure()
-    figure.add_bar(x=names, y=values, marker_color=colours, text=[in_um(value) for value in values], name="error")
-    figure.add_hline(y=diagnosis.before.floor.um, line_dash="dot", annotation_text="noise alone")
-    figure.update_layout(showlegend=False)
+    figure.add_bar(
+        x=names,
+        y=values,
+        marker_color=colours,
+        text=[in_um(value) for value in values],
+        textposition="outside",
+        cliponaxis=False,
+        name="error",
+    )
+    floor_um = diagnosis.before.floor.um
+    figure.add_hline(y=floor_um, line_dash="dot")
+    beside = {"xref": "paper", "x": 1, "xanchor": "left", "showarrow": False}
+    figure.add_annotation(text=" noise alone", y=floor_um, **beside)
     caption = (
         "Error per coordinate, rms. With an effect or a description: on rows that were left out when its numbers were "
         "fitted."
     )
-    return Panel("The falling error", caption, style_figure(figure, "", "error, um", 300))
+    style_figure(figure, "", "error, um", 300).update_layout(showlegend=False, margin={"r": 100})
+    return Panel("The falling error", caption, figure)
 
 
 def _step_panels(number: int, step: DiagnosisStep, diagnosis: Diagnosis) -> list[Panel]:
@@ -69,7 +90,8 @@ def _step_panels(number: int, step: DiagnosisStep, diagnosis: Diagnosis) -> list
     rows += [
         [
             parameter.name,
-            f"{parameter.value:.4g} +- {parameter.std:.2g} {parameter.unit}"
+            f"{parameter.value:.4g} +- {parameter.std:.2g}"
+            + ("" if parameter.unit == "1" else f" {parameter.unit}")
             + ("" if parameter.plausible else ", implausible"),
         ]
         for parameter in step.parameters
@@ -85,10 +107,7 @@ def _step_panels(number: int, step: DiagnosisStep, diagnosis: Diagnosis) -> list
     drivers = _drivers(effect, diagnosis.before)
     return [
         Panel(
-            f"{number}. {effect.id}", "The effect with the numbers fitted on this recording.", PageTable(("", ""), rows)
-        ),
-        Panel(
-            f"{effect.id}: the error against what drives it, before",
+            f"{number}. {effect.id}: the error against what drives it, before",
             "Dots are rows, lines are means.",
             _plot_error(diagnosis.before, drivers),
         ),
@@ -96,6 +115,11 @@ def _step_panels(number: int, step: DiagnosisStep, diagnosis: Diagnosis) -> list
             f"{effect.id}: the same after",
             "Nothing should be left that follows the driver.",
             _plot_error(diagnosis.after, drivers),
+        ),
+        Panel(
+            f"{effect.id}: its numbers",
+            "The effect with the numbers fitted on this recording.",
+            PageTable(("", ""), rows),
         ),
     ]
 

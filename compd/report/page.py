@@ -23,6 +23,17 @@ from compd.errors import CompdError, Problem
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
 
+# Plotly 7 offers to upload a figure to its makers' site; a page of measurements does not.
+_PLOTLY_CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "showSendToCloud": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+}
+
+# Name of plotly's script where pages share it.
+SHARED_SCRIPT = "plotly.min.js"
+
 
 @dataclass(frozen=True)
 class PageTable:
@@ -56,8 +67,16 @@ def check_page_path(path: Path) -> None:
         )
 
 
-def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], footer: str) -> None:
-    """Write the page to `path`; all texts are escaped, and plotly's script is inside, once."""
+def write_page(
+    path: Path, title: str, verdict: str, panels: Sequence[Panel], footer: str, shared_script: bool = False
+) -> None:
+    """Write the page to `path`; all texts are escaped.
+
+    shared_script : plotly's script (4.8 MB) is inside the page, which is then a single file. True writes it to
+    SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
+    """
+    if shared_script:
+        path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
         title=title,
         verdict=verdict,
@@ -71,7 +90,8 @@ def write_page(path: Path, title: str, verdict: str, panels: Sequence[Panel], fo
             for number, panel in enumerate(panels)
         ],
         footer=footer,
-        plotly_script=get_plotlyjs(),
+        shared_script=SHARED_SCRIPT if shared_script else "",
+        plotly_script="" if shared_script else get_plotlyjs(),
     )
     path.write_text(page, encoding="utf-8")
 
@@ -109,7 +129,7 @@ def _figure_html(figure: Figure, number: int) -> str:
             full_html=False,
             include_plotlyjs=False,
             div_id=f"figure-{number}",
-            config={"displaylogo": False, "responsive": True},
+            config=_PLOTLY_CONFIG,
         )
     )
 

@@ -43,13 +43,14 @@ def small_multiples(
         lines,
         across,
         shared_yaxes=True,
-        subplot_titles=[covariate.name for covariate in changing],
+        # a difference of two has a long name, which would reach into the next figure
+        subplot_titles=[covariate.name.replace(" - ", "<br>- ") for covariate in changing],
         vertical_spacing=min(0.45 / lines, 0.3),
         horizontal_spacing=0.04,
     )
     style_figure(figure, "", "", 80 + 240 * lines).update_layout(
         legend={"y": 1 + 45 / (240 * lines), "itemsizing": "constant"}, margin={"t": 70}
-    )
+    ).update_annotations(font_size=14)
     for k, covariate in enumerate(changing):
         row, col = k // across + 1, k % across + 1
         for series, name in enumerate(names):
@@ -93,8 +94,9 @@ def add_dots_and_means(
     row, col = place
     figure.add_trace(
         Scatter(
-            x=x[dots],
-            y=y_um[dots],
+            # seven digits are more than a picture shows, and halve the page's size
+            x=x[dots].astype(np.float32),
+            y=y_um[dots].astype(np.float32),
             mode="markers",
             showlegend=False,
             legendgroup=name,

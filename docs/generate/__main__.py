@@ -9,6 +9,8 @@ from pathlib import Path
 import docs.generate
 
 REFERENCE = Path(__file__).parent.parent / "reference"
+# Written by `python -m docs.gallery`, which takes a minute.
+GALLERY_CASES = Path(__file__).parent.parent / "gallery" / "cases.md"
 
 
 def pages() -> dict[str, str]:
@@ -26,6 +28,8 @@ def main() -> None:
         path = REFERENCE / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    if not GALLERY_CASES.exists():
+        GALLERY_CASES.write_text("`make docs` computes the cases; they are not here.\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from plotly.graph_objects import Figure
 
-from compd.report.page import PageTable, Panel, write_page
+from compd.report.page import SHARED_SCRIPT, PageTable, Panel, write_page
 
 NASTY = '<script>alert("1 & 2")</script>'
 VOID = {"meta", "br", "!doctype"}
@@ -60,6 +60,22 @@ def test_elements_are_closed_and_nothing_is_loaded(outline: Outline) -> None:
     assert outline.open == []
     assert outline.loaded == []
     assert sum("Plotly.newPlot" in script for script in outline.texts["script"]) == 1
+
+
+def test_pages_of_a_directory_can_share_the_script(tmp_path: Path) -> None:
+    panels = [Panel("Figure", "A line.", Figure().add_scatter(x=[1, 2], y=[3, 4]))]
+    write_page(tmp_path / "page.html", "Title", "Verdict", panels, "", shared_script=True)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    outline = Outline()
+    outline.feed(text)
+    assert outline.loaded == [SHARED_SCRIPT]
+    assert "Plotly.newPlot" in text
+    assert len(text) < 50_000 < (tmp_path / SHARED_SCRIPT).stat().st_size
+
+
+def test_no_figure_offers_to_upload_itself(outline: Outline) -> None:
+    (call,) = [script for script in outline.texts["script"] if "Plotly.newPlot" in script and "figure-1" in script]
+    assert '"showSendToCloud": false' in call
 
 
 def test_only_columns_of_numbers_are_aligned_on_the_right(outline: Outline) -> None:

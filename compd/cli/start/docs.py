@@ -1,0 +1,85 @@
+"""`compd docs`: the documentation, which comes with compd and works offline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from compd.errors import CompdError, Problem
+
+_ROOT = Path(__file__).parents[3]
+# Inside an installed package, and in a checkout.
+_PLACES = (_ROOT / "compd" / "documentation", _ROOT / "docs" / "_build" / "html")
+
+
+def docs(
+    page: Annotated[
+        str, typer.Argument(help="A page by its name, such as effects or tutorials/missing-effect.")
+    ] = "index",
+    path: Annotated[bool, typer.Option("--path", help="Print the page's path and open no browser.")] = False,
+) -> None:
+    """Open the documentation in the browser; it needs no network."""
+    import webbrowser
+
+    file = find_page(documentation_directory(), page)
+    if path:
+        typer.echo(file)
+        return
+    typer.echo(file.as_uri())
+    if not webbrowser.open(file.as_uri()):
+        typer.echo("No browser was found here; open this address in one.")
+
+
+def documentation_directory() -> Path:
+    """The directory of the built pages. Raises CompdError where there are none."""
+    for place in _PLACES:
+        if (place / "index.html").is_file():
+            return place
+    raise CompdError(
+        Problem(
+            where=str(_PLACES[-1]),
+            what="the documentation is not built",
+            next_step="run `make docs` in a checkout of compd; the wheels that are published have it",
+        )
+    )
+
+
+def find_page(directory: Path, name: str) -> Path:
+    """The page of that name: its path below `directory`, or the end of one that no other page has.
+
+    A folder's page may be named by the folder: `tutorials` is `tutorials/index`. Raises CompdError with the names that
+    are near where no page or more than one has this name.
+    """
+    pages = {
+        file.relative_to(directory).with_suffix("").as_posix(): file
+        for file in sorted(directory.rglob("*.html"))
+        if file.relative_to(directory).parts[0] != "_static"
+    }
+    wanted = name.strip("/").removesuffix(".html").removesuffix(".md")
+    for exact in (wanted, f"{wanted}/index"):
+        if exact in pages:
+            return pages[exact]
+    ending = [page for page in pages if page.endswith(f"/{wanted}")]
+    if len(ending) == 1:
+        return pages[ending[0]]
+    raise CompdError(
+        Problem(
+            where="compd docs",
+            what="more than one page has this name" if ending else "there is no such page",
+            value=name,
+            allowed=", ".join(ending or _near(wanted, list(pages))),
+            next_step="name one of these, or leave the name out for the front page",
+        )
+    )
+
+
+def _near(wanted: str, pages: list[str]) -> list[str]:
+    """The pages whose name or whose last part is like `wanted`; the folders' pages where none is."""
+    from difflib import get_close_matches
+
+    parts = {page.rpartition("/")[2]: page for page in pages}
+    near = [*get_close_matches(wanted, pages), *(parts[part] for part in get_close_matches(wanted, list(parts)))]
+    near += [page for page in pages if wanted and wanted in page]
+    return list(dict.fromkeys(near)) or [page for page in pages if page.endswith("index")]
