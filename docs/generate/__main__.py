@@ -11,12 +11,16 @@ import docs.generate
 REFERENCE = Path(__file__).parent.parent / "reference"
 
 
+def page_names() -> list[str]:
+    """The modules that are pages, sorted: those with a function `page`; the others hold what pages share."""
+    modules = sorted(module.name for module in pkgutil.iter_modules(docs.generate.__path__))
+    return [name for name in modules if hasattr(importlib.import_module(f"docs.generate.{name}"), "page")]
+
+
 def pages() -> dict[str, str]:
     """The text of every generated page, by file name."""
-    names = [module.name for module in pkgutil.iter_modules(docs.generate.__path__) if module.name != "__main__"]
     return {
-        f"{name.replace('_', '-')}.md": importlib.import_module(f"docs.generate.{name}").page()
-        for name in sorted(names)
+        f"{name.replace('_', '-')}.md": importlib.import_module(f"docs.generate.{name}").page() for name in page_names()
     }
 
 

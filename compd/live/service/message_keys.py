@@ -138,8 +138,8 @@ class SetpointKeys(SentMessage):
     u_tip_um: Vector | None = Field(
         default=None,
         description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
-        "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew once "
-        "a second; absent while any of them is not known",
+        "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
+        "once a second; absent while any of them is not known",
     )
     shadow: ShadowKeys | None = Field(
         default=None, description="what the shadow model asks for in this cycle; absent without a shadow"
