@@ -2,9 +2,8 @@
 
 On disk a recording is NAME.csv (one row per instant, a header, `.` decimal, UTF-8) beside NAME.yaml, the sidecar.
 
-An empty cell is a missing value. A column's name ends in its unit. The tables of the format are where it is checked, and
-the reference is made from them: `columns.COLUMN_KINDS`, `sidecar.SECTIONS`, `checks.RULES` and `checks.LIMITS`,
-`plan_file.COLUMNS`. For example, a sidecar:
+An empty cell is a missing value. A column's name ends in its unit. The format is described where it is checked:
+`columns.COLUMN_KINDS`, `sidecar.SECTIONS`, `checks.LIMITS`. For example, a sidecar:
 
     format: 2                        # without it: 1, of release 0.1
     machine: tripod-cmm              # a machine configuration, or `external`

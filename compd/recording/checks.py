@@ -2,7 +2,7 @@
 
 A recording that breaks a rule is refused:
 
-- `time_s` rises from row to row, and no cell of it is empty.
+- `time_s` rises from row to row; a row without it is left out.
 - `session`, `visit`, `point` and `ball` are whole numbers from 0; `point` may be text.
 - `approach_<i>` is 1 or -1, or empty where it is not known.
 - At least two rows have all that is needed: the gauges, and a value of the reference.

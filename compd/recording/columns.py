@@ -69,13 +69,13 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "approach_<i>",
             r"approach_[1-9]\d*",
             "",
-            "1 or -1: the direction in which link i last moved; without it the direction comes from the scales",
+            "1 or -1: the direction in which link i last moved; without it, from the scales",
         ),
         (
             "reference_x_mm, reference_y_mm, reference_z_mm",
             r"(?:reference|model)_[xyz]",
             "mm",
-            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any of the axes",
+            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes",
         ),
         (
             "reference_rx_rad, reference_ry_rad, reference_rz_rad",
@@ -96,8 +96,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
         ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
     )
 )
-# Beside these: with `machine: external` a column model_... for every column reference_...; and <name>_<unit> for anything
-# else that was measured.
+# With `machine: external` there is also a column model_... for every column reference_...; and <name>_<unit> is a column
+# of anything else that was measured.
 # A name that begins like a column of the format but is none: probably misspelt, so no covariate.
 _RESERVED = re.compile(
     r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
 from compd.configuration.document import Document, read_document
 from compd.configuration.section import Section, refusal, unknown_key, validate
@@ -22,6 +22,7 @@ EXTERNAL = "external"
 Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
 Frame = Literal["machine", "instrument"]
 
+_SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
 _EXAMPLE = "machine: tripod-cmm, and under it reference: {quantity: tool_position, frame: machine}"
 # Row 1 is the header.
@@ -40,7 +41,10 @@ class Reference(Section):
         description="machine: the coordinates are in {M}; instrument: in the instrument's own frame, so that a "
         "registration of six parameters is always fitted; of a ball plate always instrument unless it is written",
     )
-    sigma_um: tuple[float, ...] = Field(
+    sigma_um: Annotated[
+        tuple[float, ...],
+        WithJsonSchema({"anyOf": [_SIGMA_SCHEMA, {"type": "array", "items": _SIGMA_SCHEMA}]}),
+    ] = Field(
         default=(math.nan,),
         description="standard uncertainty of the reference, um: one number, or one for each axis; left out where it is "
         "not known",
@@ -123,7 +127,12 @@ def _row_numbers(value: Any) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-RowNumbers = Annotated[tuple[int, ...], BeforeValidator(_row_numbers)]
+_ROW_SCHEMA = {"type": "integer", "minimum": _FIRST_ROW}
+RowNumbers = Annotated[
+    tuple[int, ...],
+    BeforeValidator(_row_numbers),
+    WithJsonSchema({"anyOf": [_ROW_SCHEMA, {"type": "array", "items": _ROW_SCHEMA}, {"type": "string"}]}),
+]
 
 
 class Exclusion(Section):

@@ -15,8 +15,8 @@ INTRODUCTION = """\
 `compd COMMAND --help` prints what stands here. Arguments in brackets may be left out; options may stand in any order.
 
 A command ends with exit code 0 when it has done what was asked; with 1 when the answer is no, where its text below says
-so; and with 2 when its arguments, a file or the daemon cannot be used. Every problem is then on standard error: where it
-is, what it is, what is allowed, and what to do.
+so; and with 2 when its arguments, a file or the daemon cannot be used. Every problem is then on standard error: where
+it is, what it is, what is allowed, and what to do.
 """
 # How the kinds of values are written in a synopsis.
 _VALUES = {"str": "TEXT", "path": "PATH", "int": "INTEGER", "float": "NUMBER"}

@@ -18,7 +18,7 @@ enters.
 Losses are mean squares per measured value divided by the variance of the noise: 1.0 is the noise floor, and a
 difference of losses is in squares of the noise floor. Where the unit is 1, the number has none.
 
-In Python, hand other thresholds to `compd.diagnose` as `criteria=`: see [the Python interface](python.md).
+In Python, hand other thresholds to `compd.diagnose` as `criteria=`.
 """
 
 

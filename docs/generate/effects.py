@@ -9,14 +9,15 @@ from docs.generate.markdown import code, escape, heading, join, link, sentence, 
 
 INTRODUCTION = f"""\
 An effect is one physical cause of error. It adds something at one place of the machine, its port, and the kinematics
-carries that to the tip. compd knows these {len(BUNDLED)}; `compd effect show ID --html page.html` draws what one of them
-does to the tip of your machine. [Add an effect](../how-to/add-an-effect.md) says how to fit one, and how to write
+carries that to the tip. compd knows these {len(BUNDLED)}; `compd effect show ID --html page.html` draws what one of
+them does to the tip of your machine. [Add an effect](../how-to/add-an-effect.md) says how to fit one, and how to write
 your own as a [formula](model-file.md) or with code.
 
 An effect is linear in its parameters, which are fitted. What it is not linear in, such as a time constant or a period,
-is a constant: it is taken from the configuration where a key there gives it, and searched otherwise. The plausible range
-of a parameter comes from the source that is named beside it; a parameter that is fitted far outside it says that the
-cause is another one. "Needs" are the quantities that have to be measured; where one is missing the effect is not tried.
+is a constant: it is taken from the configuration where a key there gives it, and searched otherwise. The plausible
+range of a parameter comes from the source that is named beside it; a parameter that is fitted far outside it says that
+the cause is another one. "Needs" are the quantities that have to be measured; where one is missing the effect is not
+tried.
 """
 _PER = {"machine": "the machine", "link": "each link", "axis": "each axis", "link_axis": "each link and axis"}
 

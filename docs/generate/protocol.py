@@ -33,7 +33,7 @@ INTRODUCTION = f"""\
 The daemon listens on TCP ({TcpSocket().host}:{TcpSocket().port} unless [configured](#configuration-sockets) otherwise)
 and on a Unix socket (`sockets.unix.path`). Both speak the same protocol, version {PROTOCOL}: one JSON object per line,
 UTF-8, ended by `\\n`. Every message has its name under the key `class`. Any language that opens a socket and reads JSON
-will do; in Python, [`compd.client`](python.md) does it for you.
+will do; in Python, `compd.client` does it for you.
 [Connect a controller](../how-to/connect-a-controller.md) goes from the first line to the corrected drive command.
 
 Lengths are in mm, angles in radians, times in seconds on the daemon's monotonic clock (`CLOCK_MONOTONIC`, in Python
@@ -62,9 +62,9 @@ ends. The mode then returns to `{Mode.CMM}`.
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
 """
 PACKET = f"""\
-With [`sockets.udp`](#configuration-sockets-udp) every cycle also sends one UDP packet of {PACKET_SIZE} bytes to
-the controller: little-endian, IEEE 754 numbers. The compute loop sends it itself, without waiting: a packet that the network
-does not take at once is dropped, and counted in [`STATUS`](#protocol-status).
+With [`sockets.udp`](#configuration-sockets-udp) every cycle also sends one UDP packet of {PACKET_SIZE} bytes to the
+controller: little-endian, IEEE 754 numbers. The compute loop sends it itself, without waiting: a packet that the
+network does not take at once is dropped, and counted in [`STATUS`](#protocol-status).
 
 Links that the machine does not have are nan. When the setpoint is invalid, every number of the tip, the frame and the
 links is nan.
@@ -186,7 +186,8 @@ def _all_keys(kind: type[SentMessage], prefix: str, keys: list[Key]) -> str:
     for model, definition in schema.definitions.items():
         if "properties" in definition:
             blocks += [
-                f"({where}-{model.lower()})=\n**{_part_name(model).capitalize()}.** {escape(definition['description'])}",
+                f"({where}-{model.lower()})=\n**{_part_name(model).capitalize()}.** "
+                + escape(definition["description"]),
                 keys_table(schema.keys(model)),
             ]
     return join(*blocks)

@@ -14,26 +14,27 @@ from docs.generate.schema import ModelSchema
 
 INTRODUCTION = """\
 A recording is what a machine's gauges showed, row by row, with or without a reference instrument beside it. It is two
-files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both; `compd record` writes
-them from the running daemon, and `compd join` adds an instrument's export. `compd recording check NAME.csv` reports every
-mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and
-[record and replay](../how-to/record-and-replay.md).
+files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both; `compd record`
+writes them from the running daemon, and `compd join` adds an instrument's export. `compd recording check NAME.csv`
+reports every mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and [record and
+replay](../how-to/record-and-replay.md).
 """
 TABLE_RULES = """\
-The CSV file has one header row, `,` between cells, `.` as the decimal mark, and is UTF-8. An empty cell is a missing value.
-A column's name ends in its unit.
+The CSV file has one header row, `,` between cells, `.` as the decimal mark, and is UTF-8. An empty cell is a missing
+value. A column's name ends in its unit.
 """
 EXTERNAL_MODEL = f"""\
-With `machine: {EXTERNAL}` in the sidecar a column `model_...` stands beside every column `reference_...`: the prediction of
-your own model. Neither gauges nor a configuration are needed then.
+With `machine: {EXTERNAL}` in the sidecar a column `model_...` stands beside every column `reference_...`: the
+prediction of your own model. Neither gauges nor a configuration are needed then.
 
 Anything else that was measured is a column `<name>_<unit>` in lower case, such as `flow_coolant_l_per_min`; a number
 without unit ends in `_1`. `compd diagnose` tries every such column as an explanation of the error.
 """
 CYCLES = f"""\
-`compd record` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then for every row
-the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed from,
-so `compd replay` computes the same setpoint again, bit for bit. Model files that were in use are copied beside it.
+`compd record` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then for every
+row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed
+from, so `compd replay` computes the same setpoint again, bit for bit. Model files that were in use are copied beside
+it.
 """
 
 
@@ -90,9 +91,8 @@ def _section_row(name: str, kind: Any) -> list[str]:
 
 
 def _keys(kind: Any) -> str:
-    return table(
-        ["key", "value", "meaning"], [[code(k.name), k.type_text, k.meaning] for k in ModelSchema(kind).keys()]
-    )
+    keys = ModelSchema(kind).keys()
+    return table(["key", "value", "meaning"], [[code(key.name), key.type_text, key.meaning] for key in keys])
 
 
 def _example() -> dict[str, Any]:

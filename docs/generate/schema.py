@@ -74,9 +74,8 @@ class ModelSchema:
             names += [name] if "properties" in self.definitions[name] else []
         for inside in ("anyOf", "oneOf", "prefixItems"):
             names += [name for option in part.get(inside, ()) for name in self.models(option)]
-        for inside in ("items", "additionalProperties"):
-            if isinstance(part.get(inside), dict):
-                names += self.models(part[inside])
+        for inside_part in (part.get("items", {}), self._values(part)):
+            names += self.models(inside_part) if inside_part else []
         return list(dict.fromkeys(names))
 
     def type_text(self, part: Schema) -> str:
@@ -99,20 +98,27 @@ class ModelSchema:
         if kind == "array":
             return self._list_text(part)
         if kind == "object":
-            values = part.get("additionalProperties")
-            return f"mapping of names to {_plural(self.type_text(values))}" if isinstance(values, dict) else "mapping"
+            values = self._values(part)
+            return f"mapping of names to {_plural(self.type_text(values))}" if values else "mapping"
         if kind in ("number", "integer"):
             return _number_text(part)
         if kind == "string":
             return f"text, pattern {code(part['pattern'])}" if "pattern" in part else "text"
         return {"boolean": "true or false", "null": "nothing"}.get(kind or "", "any value")
 
+    def _values(self, part: Schema) -> Schema:
+        """The schema of the values of a mapping; {} where they may be anything, or for any other type."""
+        values = part.get("additionalProperties")
+        patterns = part.get("patternProperties", {})
+        return values if isinstance(values, dict) else next(iter(patterns.values()), {})
+
     def _list_text(self, part: Schema) -> str:
         fixed = part.get("prefixItems", ())
         if fixed:
             texts = list(dict.fromkeys(map(self.type_text, fixed)))
             return f"{len(fixed)} {_plural(texts[0])}" if len(texts) == 1 else f"list of {' and '.join(texts)}"
-        item = _plural(self.type_text(part.get("items", {}))).removeprefix("lists of ")
+        item = _plural(self.type_text(part.get("items", {})))
+        item = item.removeprefix("lists of ") if item[9:10].isdigit() else item
         item += " each" if item[:1].isdigit() else ""
         least, most = part.get("minItems", 0), part.get("maxItems")
         if most is not None:
@@ -130,7 +136,7 @@ def default_text(key: Key) -> str:
     """The default of a key that a person writes."""
     if key.needed:
         return "needed"
-    return "-" if key.default in ("null", "[]", "{}", '""') else code(key.default)
+    return "-" if key.default in ("null", "[]", "{}", '""', "NaN") else code(key.default.strip('"'))
 
 
 def _plural(text: str) -> str:
@@ -140,6 +146,8 @@ def _plural(text: str) -> str:
         return "whole numbers" + text.removeprefix("whole number")
     if text.startswith("text"):
         return "texts" + text.removeprefix("text")
+    if text.startswith("list of "):
+        return "lists of " + text.removeprefix("list of ")
     return f"lists of {text}" if text[:1].isdigit() else text
 
 
