@@ -60,7 +60,7 @@ class Quality(StrEnum):
 
     text: str
 
-    def __new__(cls, name: str, text: str) -> Self:
+    def __new__(cls, name: str, text: str = "") -> Self:
         quality = str.__new__(cls, name)
         quality._value_ = name
         quality.text = text

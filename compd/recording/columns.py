@@ -96,8 +96,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
         ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
     )
 )
-# With `machine: external` there is also a column model_... for every column reference_...; and <name>_<unit> is a column
-# of anything else that was measured.
+# With `machine: external` there is also a column model_... for every column reference_...; and anything else that was
+# measured is a column <name>_<unit>.
 # A name that begins like a column of the format but is none: probably misspelt, so no covariate.
 _RESERVED = re.compile(
     r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"

@@ -17,17 +17,17 @@ def page_names() -> list[str]:
     return [name for name in modules if hasattr(importlib.import_module(f"docs.generate.{name}"), "page")]
 
 
-def pages() -> dict[str, str]:
-    """The text of every generated page, by file name."""
-    return {
-        f"{name.replace('_', '-')}.md": importlib.import_module(f"docs.generate.{name}").page() for name in page_names()
-    }
+def page_of(name: str) -> str:
+    """The text of one page, by the name of its module."""
+    text: str = importlib.import_module(f"docs.generate.{name}").page()
+    return text
 
 
 def main() -> None:
     """Write every page that has changed, so that Sphinx builds no more than it must."""
-    for name, text in pages().items():
-        path = REFERENCE / name
+    for name in page_names():
+        text = page_of(name)
+        path = REFERENCE / f"{name.replace('_', '-')}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 

@@ -6,19 +6,19 @@ from pydantic import TypeAdapter
 
 from compd.configuration.machine_configuration import SECTIONS
 from compd.gauge import GaugeOptions
-from docs.generate.markdown import code, escape, fence, heading, join, link, table, target
+from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term
 from docs.generate.schema import Key, ModelSchema, default_text, key_unit
 
-INTRODUCTION = """\
+INTRODUCTION = f"""\
 A machine is described by one YAML file. `compd check FILE` reports every error in it at once, each with file, line,
 key, value, what is allowed, and what to do. `compd check --schema > compd.schema.json` writes the JSON Schema, with
 which an editor completes and checks keys while you type.
 
-Lengths are in mm, angles in radians, times in seconds; a quantity's key ends in its unit. Before the unit stands
-the coordinate frame of a vector: `M` is the surface plate, `B` the base platform, `B0` the base platform at
-machine zero, `P` the moving platform. A rotation is a rotation vector: the direction of its axis times the angle.
-Links, joints and comparators count from 1. A key with the default "-" may be left out. A key that is not listed here is
-an error.
+Lengths are in mm, angles in radians, times in seconds; a quantity's key ends in its unit. Before the unit stands the
+coordinate frame of a vector: `M` is the surface plate, `B` the base platform, `B0` the base platform at
+{term("machine zero")}, `P` the moving platform. A rotation is a rotation vector: the direction of its axis times the
+angle. Links, joints and {term("comparator", "comparators")} count from 1. A key with the default "-" may be left
+out. A key that is not listed here is an error.
 
 [Describe a machine](../how-to/describe-a-machine.md) goes through the sections in order.
 """
@@ -61,20 +61,21 @@ def _meaning(name: str) -> str:
     if name == "gauges":
         return GAUGES.partition(".")[0] + "."
     schema = TypeAdapter(SECTIONS[name]).json_schema()
-    return str(schema["description"]).partition("\n")[0]
+    return sentence(str(schema["description"]).partition("\n")[0])
 
 
 def _section(name: str) -> str:
     """One section with all that is nested in it, each under its path in the file."""
     paths = _paths(name)
     schema = ModelSchema(SECTIONS[name], lambda model: link(code(paths[model]), target("configuration", paths[model])))
-    blocks = [heading(2, code(name), target("configuration", name)), escape(schema.description(schema.schema))]
+    blocks = [
+        heading(2, code(name), target("configuration", name)),
+        escape(sentence(schema.description(schema.schema))),
+    ]
     if "properties" in schema.schema:
         blocks.append(keys_table(schema.keys()))
-    elif not schema.models(schema.schema):
-        blocks.append(f"Value: {schema.type_text(schema.schema)}.")
     else:
-        blocks.append(fence(f"{name}:\n  NAME: {{...}}", "yaml"))
+        blocks.append(f"Value: {schema.type_text(schema.schema)}.")
     for model, path in paths.items():
         blocks += [
             heading(3, code(path), target("configuration", path)),

@@ -7,15 +7,15 @@ from typing import Any
 
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
-from docs.generate.markdown import code, escape, heading, join, sentence, table, target
+from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
-INTRODUCTION = """\
+INTRODUCTION = f"""\
 The result of `compd compare` and the verdict of `compd diagnose` rest on the thresholds of this page and on no others.
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says
 that there is no derivation. [How a verdict is reached](../explanation/how-a-verdict-is-reached.md) shows where each
 enters.
 
-Losses are mean squares per measured value divided by the variance of the noise: 1.0 is the noise floor, and a
+Losses are mean squares per measured value divided by the variance of the noise: 1.0 is the {term("noise floor")}, and a
 difference of losses is in squares of the noise floor. Where the unit is 1, the number has none.
 
 In Python, hand other thresholds to `compd.diagnose` as `criteria=`.

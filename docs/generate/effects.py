@@ -5,13 +5,13 @@ from __future__ import annotations
 from compd.model.effect import PORTS, Constant, Effect, Parameter
 from compd.model.effect_needs import NEEDS
 from compd.model.library import BUNDLED
-from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target
+from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term
 
 INTRODUCTION = f"""\
-An effect is one physical cause of error. It adds something at one place of the machine, its port, and the kinematics
-carries that to the tip. compd knows these {len(BUNDLED)}; `compd effect show ID --html page.html` draws what one of
-them does to the tip of your machine. [Add an effect](../how-to/add-an-effect.md) says how to fit one, and how to write
-your own as a [formula](model-file.md) or with code.
+An {term("effect")} is one physical cause of error. It adds something at one place of the machine, its {term("port")},
+and the kinematics carries that to the tip. compd knows these {len(BUNDLED)}; `compd effect show ID --html page.html`
+draws what one of them does to the tip of your machine. [Add an effect](../how-to/add-an-effect.md) says how to fit one,
+and how to write your own as a [formula](model-file.md) or with code.
 
 An effect is linear in its parameters, which are fitted. What it is not linear in, such as a time constant or a period,
 is a constant: it is taken from the configuration where a key there gives it, and searched otherwise. The plausible
@@ -58,7 +58,7 @@ def _effect(effect: Effect) -> str:
     facts = [
         ["source", escape(effect.source)],
         ["needs", needs],
-        ["mistaken for", ", ".join(map(_link, effect.mistaken_for)) or "-"],
+        ["mistaken for", ", ".join(map(_link, effect.mistaken_for)) or "no other effect of the library"],
         ["separated by", escape(effect.separated_by)],
     ]
     return join(
@@ -73,7 +73,7 @@ def _effect(effect: Effect) -> str:
         table(["constant", "unit", "plausible", "where the range comes from"], map(_constant, effect.constants))
         if effect.constants
         else "",
-        "\n".join(f"{name.capitalize()}\n: {value}\n" for name, value in facts),
+        "\n".join(f"- **{name.capitalize()}:** {value}" for name, value in facts),
         "" if effect.live else "It belongs to the reference instrument: it is fitted, and never applied by the daemon.",
     )
 

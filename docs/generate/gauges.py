@@ -10,14 +10,14 @@ from compd.commissioning.catalogue import GIVEN_BY_THE_CONFIGURATION, catalogue,
 from compd.gauge import Gauge, GaugeOptions, Quality
 from compd.plugins import GAUGES, load
 from docs.generate.configuration import keys_table
-from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, target
+from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema
 
-INTRODUCTION = """\
-A gauge of the configuration names its driver and its line; every other key belongs to the driver. A driver is a class,
-or a preset: a description in a YAML file that the drivers `serial_ascii`, `serial_frame` and `modbus` carry out. `compd
-gauge show NAME` prints what stands here. [Add a gauge](../how-to/add-a-gauge.md) goes from the plug to the number, for
-a gauge that is here and for one that is not.
+INTRODUCTION = f"""\
+A gauge of the configuration names its driver and its line; every other key belongs to the driver. A {term("driver")} is
+a class, or a {term("preset")}: a description in a YAML file that the drivers `serial_ascii`, `serial_frame` and
+`modbus` carry out. `compd gauge show NAME` prints what stands here. [Add a gauge](../how-to/add-a-gauge.md) goes from
+the plug to the number, for a gauge that is here and for one that is not.
 
 Drivers for bytes need a line of kind `serial` or `tcp`, drivers for registers one of kind `modbus_rtu` or `modbus_tcp`;
 see [lines](#configuration-lines). In the descriptions, (M) stands for what was read in a maker's manual, (C) for what

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
 
+GLOSSARY = Path(__file__).parent.parent / "glossary.md"
 _CODE_SPAN = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)
 _SPECIAL = re.compile(r"([\\*<\[\]$])")
 
@@ -47,6 +50,20 @@ def heading(level: int, text: str, target: str = "") -> str:
 def link(text: str, target: str) -> str:
     """A link to a heading's target."""
     return f"[{text}](#{target})"
+
+
+def term(name: str, shown: str = "") -> str:
+    """A link to a term of the glossary, where the glossary has it; else the words alone."""
+    words = shown or name
+    return f"{{term}}`{words} <{name}>`" if name in _glossary() else words
+
+
+@cache
+def _glossary() -> frozenset[str]:
+    """The terms of the glossary: the lines of its `{glossary}` blocks that are not indented."""
+    text = GLOSSARY.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```\{glossary\}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    return frozenset(line for block in blocks for line in block.split("\n") if line[:1].strip())
 
 
 def target(*parts: str) -> str:

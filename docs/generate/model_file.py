@@ -24,13 +24,13 @@ from compd.model.formula.evaluator import FUNCTIONS, LAG
 from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
 from compd.model.library import find_effect
 from compd.model_file import EffectEntry, ModelDocument, ModelFile, ModelStep, ParameterEntry, write_model_file
-from docs.generate.markdown import code, codes, escape, fence, heading, join, link, table
+from docs.generate.markdown import code, codes, escape, fence, heading, join, link, table, term
 from docs.generate.schema import ModelSchema, default_text
 
-INTRODUCTION = """\
-The model file holds what a machine has beyond its geometry: its effects with their fitted parameters, and every step by
-which they came to be. `compd effect add`, `remove`, `fit` and `undo` write it; `compd compare --model`, `compd diagnose
---model` and the daemon (`state.model_file`, `compd adopt`) read it. It is written whole or not at all.
+INTRODUCTION = f"""\
+The {term("model file")} holds what a machine has beyond its geometry: its effects with their fitted parameters, and
+every step by which they came to be. `compd effect add`, `remove`, `fit` and `undo` write it; `compd compare --model`,
+`compd diagnose --model` and the daemon (`state.model_file`, `compd adopt`) read it. It is written whole or not at all.
 """
 FORMULA = """\
 An effect that the library lacks can be written as a formula, without code, in a YAML file of its own that `compd effect

@@ -13,7 +13,7 @@ from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL
 from compd.live.service.publisher import MAX_CLIENTS
 from compd.live.service.requests import REQUESTS, Asker, Request
 from docs.generate.live_examples import Exchange, exchanges, shown
-from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target
+from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema
 
 # Messages that the daemon sends, in the order of the page, with those keys of an example that are not shown in full.
@@ -38,7 +38,7 @@ will do; in Python, `compd.client` does it for you.
 
 Lengths are in mm, angles in radians, times in seconds on the daemon's monotonic clock (`CLOCK_MONOTONIC`, in Python
 `time.monotonic()`). The letters before a unit are the frame of a vector: `M` is the surface plate, `B` the base
-platform, `B0` the base platform at machine zero, `P` the moving platform.
+platform, `B0` the base platform at {term("machine zero")}, `P` the moving platform.
 """
 RULES = f"""\
 **Absent means unknown.** There is no `null` and no NaN. A key without a value is left out.
@@ -48,9 +48,9 @@ RULES = f"""\
 **Treat an unknown state as invalid.** A [state](states.md), or in a packet a code, that you do not know comes from a
 newer daemon: use nothing of that setpoint.
 
-**Enforce expiry yourself.** Do not use a setpoint later than its `valid_until`. On the daemon's computer compare it
-with `CLOCK_MONOTONIC`. On another computer, whose clock is not that one, use the setpoint for `valid_until - time_s`
-seconds from the moment of its arrival. The daemon cannot tell you that it has died.
+**Enforce expiry yourself.** Do not use a {term("setpoint")} later than its `valid_until`. On the daemon's computer
+compare it with `CLOCK_MONOTONIC`. On another computer, whose clock is not that one, use the setpoint for `valid_until -
+time_s` seconds from the moment of its arrival. The daemon cannot tell you that it has died.
 
 **Keep up.** The daemon waits for no client. It disconnects one that is {MAX_BEHIND_BYTES // 1024} KiB behind,
 {MAX_READINGS_BEHIND_BYTES // 1024**2} MiB while it watches readings.
@@ -143,7 +143,9 @@ def _first_line(kind: type[object]) -> str:
 
 def _request_row(kind: type[Request]) -> list[str]:
     message = link(code(kind.wire_name), target("protocol", "send", kind.wire_name))
-    return [message, kind.asker.value, "none" if kind.reply is None else code(kind.reply.wire_name)]
+    if kind.reply is None:
+        return [message, kind.asker.value, "none"]
+    return [message, kind.asker.value, _link(kind.reply) if kind.reply in SENT else code(kind.reply.wire_name)]
 
 
 def _request(kind: type[Request]) -> str:

@@ -9,14 +9,14 @@ from compd.live.record.recording_part import CYCLES_SUFFIX
 from compd.recording import ball_plate, checks, plan_file
 from compd.recording.columns import COLUMN_KINDS, DECIMALS
 from compd.recording.sidecar import EXTERNAL, SECTIONS, Exclusion, Reference, sidecar_contents, sidecar_text
-from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table
+from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, term
 from docs.generate.schema import ModelSchema
 
-INTRODUCTION = """\
-A recording is what a machine's gauges showed, row by row, with or without a reference instrument beside it. It is two
-files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both; `compd record`
-writes them from the running daemon, and `compd join` adds an instrument's export. `compd recording check NAME.csv`
-reports every mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and [record and
+INTRODUCTION = f"""\
+A {term("recording")} is what a machine's gauges showed, row by row, with or without a {term("reference")} instrument
+beside it. It is two files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both;
+`compd record` writes them from the running daemon, and `compd join` adds an instrument's export. `compd recording check
+NAME.csv` reports every mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and [record and
 replay](../how-to/record-and-replay.md).
 """
 TABLE_RULES = """\
