@@ -127,7 +127,7 @@ def _row_numbers(value: Any) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-_ROW_SCHEMA = {"type": "integer", "minimum": _FIRST_ROW}
+_ROW_SCHEMA = {"type": "integer"}
 RowNumbers = Annotated[
     tuple[int, ...],
     BeforeValidator(_row_numbers),
