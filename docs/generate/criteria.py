@@ -36,7 +36,7 @@ def _part(title: str, name: str, kind: type[Any]) -> str:
     criteria = [field for field in fields(kind) if isinstance(field.default, int | float)]
     return join(
         heading(2, title, target("criteria", name)),
-        table(["criterion", "default", "meaning, and the reason for the value"], map(_row, criteria)),
+        table(["criterion and its default", "meaning, and the reason for the default"], map(_row, criteria)),
     )
 
 
@@ -44,4 +44,4 @@ def _row(criterion: Field[Any]) -> list[str]:
     unit = criterion.metadata["unit"]
     default = f"{criterion.default:g}" + ("" if unit == "1" else f" {escape(unit)}")
     meaning, reason = (escape(sentence(criterion.metadata[key])) for key in ("meaning", "reason"))
-    return [code(criterion.name), default, f"{meaning}<br>*Reason:* {reason}"]
+    return [f"{code(criterion.name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
