@@ -50,29 +50,37 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 
 class Quality(StrEnum):
-    """Whether a reading has a value, and if not, why. Only OK carries a number."""
+    """Whether a reading has a value, and if not, why. Only OK carries a number. text : meaning, for people."""
 
-    OK = "ok"
-    NEVER_READ = "never_read"  # nothing has been asked yet
-    TIMEOUT = "timeout"  # no byte came
-    INCOMPLETE = "incomplete"  # the reply was cut short
-    CRC = "crc"  # a checksum or parity does not fit
-    MISMATCH = "mismatch"  # a whole reply, but not to what was asked
-    DEVICE_ERROR = "device_error"  # the device answered with an error of its own
-    OVER_RANGE = "over_range"
-    UNDER_RANGE = "under_range"
-    SENSOR_FAULT = "sensor_fault"
-    NOT_FINITE = "not_finite"
-    SILENT = "silent"  # silent by design (in its menu), not lost
-    LINE_LOST = "line_lost"  # the port is gone; the line is backing off
-    DRIVER_ERROR = "driver_error"  # the driver itself failed: a defect in it, to be reported
-    STALE = "stale"  # was good, is too old now
+    text: str
+
+    def __new__(cls, name: str, text: str = "") -> Self:
+        quality = str.__new__(cls, name)
+        quality._value_ = name
+        quality.text = text
+        return quality
+
+    OK = "ok", "there is a value"
+    NEVER_READ = "never_read", "nothing has been asked yet"
+    TIMEOUT = "timeout", "no byte came"
+    INCOMPLETE = "incomplete", "the reply was cut short"
+    CRC = "crc", "a checksum or parity does not fit"
+    MISMATCH = "mismatch", "a whole reply came, but not to what was asked"
+    DEVICE_ERROR = "device_error", "the device answered with an error of its own"
+    OVER_RANGE = "over_range", "the device says that the value is above its range"
+    UNDER_RANGE = "under_range", "the device says that the value is below its range"
+    SENSOR_FAULT = "sensor_fault", "the device says that its sensor is faulty or absent"
+    NOT_FINITE = "not_finite", "the reply is no finite number"
+    SILENT = "silent", "the device is silent by design, for instance in its menu, and not lost"
+    LINE_LOST = "line_lost", "the port is gone; the line is opened again after a pause"
+    DRIVER_ERROR = "driver_error", "the driver itself failed: a defect in it, to be reported"
+    STALE = "stale", "there was a value, which is too old now"
 
 
 class Reading(NamedTuple):

@@ -45,22 +45,18 @@ NOTHING: State = {"effects": [], "covariance": []}
 
 @dataclass(frozen=True)
 class ModelStep:
-    """One command that changed the model; um per coordinate.
+    """One command that changed the model."""
 
-    effect : what was added or removed, "" for a fit of all.  date : UTC, ISO 8601.
-    recording, sha256 : what it was fitted on.  undone : whether a later step took it back.
-    """
-
-    kind: Kind
-    effect: str
-    date: str
-    recording: str
-    sha256: str
-    rms_before_um: float
-    rms_after_um: float
-    noise_floor_um: float
-    replaced: State
-    undone: bool = False
+    kind: Annotated[Kind, Field(description="what was done")]
+    effect: Annotated[str, Field(description='the effect that was added or removed; "" for a fit of all')]
+    date: Annotated[str, Field(description="when, UTC, ISO 8601")]
+    recording: Annotated[str, Field(description="the recording that it was fitted on")]
+    sha256: Annotated[str, Field(description="hash of that recording with its sidecar")]
+    rms_before_um: Annotated[float, Field(description="residual before, root mean square per coordinate, um")]
+    rms_after_um: Annotated[float, Field(description="residual after, um")]
+    noise_floor_um: Annotated[float, Field(description="noise floor of the recording, um")]
+    replaced: Annotated[State, Field(description="`effects` and `covariance` as they were before, for undo")]
+    undone: Annotated[bool, Field(description="whether a later step took it back")] = False
 
     # for pydantic, which checks the steps of a file
     __pydantic_config__ = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
@@ -116,33 +112,48 @@ _EmptyList = BeforeValidator(lambda value: [] if value is None else value)
 _EmptyMapping = BeforeValidator(lambda value: {} if value is None else value)
 
 
-class _FileModel(BaseModel):
+class FilePart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, coerce_numbers_to_str=True)
 
 
-class _ParameterInFile(_FileModel):
-    name: str
-    value: float
-    std: float = float("nan")
-    unit: str = ""
+class ParameterEntry(FilePart):
+    """One fitted parameter."""
+
+    name: str = Field(description="name of the parameter; b_1, b_2, ... where there is one for each link")
+    value: float = Field(description="in its unit")
+    std: float = Field(default=float("nan"), description="standard error, in the same unit; nan where it is not known")
+    unit: str = Field(default="", description="the unit, for people")
 
 
-class _EffectInFile(_FileModel):
-    effect: Declaration
-    shape: Annotated[dict[str, float], _EmptyMapping] = {}
-    parameters: list[_ParameterInFile]
+class EffectEntry(FilePart):
+    """One effect with its fitted parameters."""
+
+    effect: Declaration = Field(description="an id of the library, /absolute/file.py:NAME, or a formula's declaration")
+    shape: Annotated[dict[str, float], _EmptyMapping] = Field(
+        default={}, description="values of its nonlinear constants, by name"
+    )
+    parameters: list[ParameterEntry] = Field(description="its fitted parameters")
 
 
-class _Document(_FileModel):
+class ModelDocument(FilePart):
     """The keys of the file."""
 
-    format: Annotated[int, Field(ge=1)] = 1
-    machine: str
-    geometry: str = ""
-    release: str = ""
-    effects: Annotated[list[_EffectInFile], _EmptyList] = []
-    covariance: Annotated[list[list[float]], _EmptyList, AfterValidator(_square)] = []
-    steps: Annotated[list[ModelStep], _EmptyList] = []
+    format: Annotated[int, Field(ge=1)] = Field(
+        default=1, description=f"number of the format: {FORMAT}; 1, of release 0.1, has the same keys"
+    )
+    machine: str = Field(description='name of the machine\'s configuration, or "external"')
+    geometry: str = Field(
+        default="",
+        description="hash of the geometry that it was fitted on; on another one its parameters are of no use",
+    )
+    release: str = Field(default="", description="release of compd that wrote the file")
+    effects: Annotated[list[EffectEntry], _EmptyList] = Field(default=[], description="the effects of the machine")
+    covariance: Annotated[list[list[float]], _EmptyList, AfterValidator(_square)] = Field(
+        default=[], description="covariance of all fitted parameters jointly, in the order of the file, one row a list"
+    )
+    steps: Annotated[list[ModelStep], _EmptyList] = Field(
+        default=[], description="every step by which the model came to be, the last one last"
+    )
 
 
 def read_stored(path: Path) -> StoredModel:
@@ -214,7 +225,7 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
     )
 
 
-def _read(path: Path) -> tuple[_Document, StoredModel]:
+def _read(path: Path) -> tuple[ModelDocument, StoredModel]:
     """The checked file, and the same with its effects as they were written."""
     where = str(path)
     try:
@@ -231,7 +242,7 @@ def _read(path: Path) -> tuple[_Document, StoredModel]:
                 where=where,
                 what="is no model file",
                 value=str(data)[:80],
-                allowed=", ".join(_Document.model_fields),
+                allowed=", ".join(ModelDocument.model_fields),
                 next_step="`compd effect add` writes one",
             )
         )
@@ -246,7 +257,7 @@ def _read(path: Path) -> tuple[_Document, StoredModel]:
             )
         )
     try:
-        document = _Document.model_validate(data)
+        document = ModelDocument.model_validate(data)
     except ValidationError as error:
         raise StateError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
@@ -261,7 +272,7 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
             place += f" {part + 1}"
         elif part not in ("str", "dict[str,any]"):  # pydantic's names for the two kinds of declaration
             place += f", {part}"
-    top_level_keys = ", ".join(_Document.model_fields) if len(detail["loc"]) == 1 else ""
+    top_level_keys = ", ".join(ModelDocument.model_fields) if len(detail["loc"]) == 1 else ""
     what, allowed = {
         "missing": ("is missing", ""),
         "extra_forbidden": ("is no key that belongs here", top_level_keys),
@@ -322,7 +333,7 @@ def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray)
     )
 
 
-def _fitted_effect(entry: _EffectInFile, links: int, where: str, problems: list[Problem]) -> FittedEffect:
+def _fitted_effect(entry: EffectEntry, links: int, where: str, problems: list[Problem]) -> FittedEffect:
     """The effect with its numbers; what is missing goes to `problems`. Raises CompdError where it is not installed."""
     effect = find_effect(entry.effect, where)
     values = {parameter.name: parameter.value for parameter in entry.parameters}

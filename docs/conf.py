@@ -23,6 +23,9 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
+# `--option` and "" are to be read as they are typed.
+smartquotes = False
+
 html_theme = "furo"
 html_title = f"compd {release}"
 html_static_path = ["static"]

@@ -80,7 +80,7 @@ class MovingPlatform(Section):
 class ToolOnPlatformSettings(Section):
     """The usual arrangement: the tool moves, the work lies on the surface plate."""
 
-    on: Literal["platform"]
+    on: Literal["platform"] = Field(description="the moving platform carries the tool")
     at_P_mm: Vector = Field(description="tool tip in {P}")
     zero_tip_M_mm: Vector = Field(description="tool tip in {M} at machine zero")
     zero_rotation_P_in_M_rad: Vector = Field(
@@ -91,7 +91,7 @@ class ToolOnPlatformSettings(Section):
 class ToolOnPlateSettings(Section):
     """Figure 15 of the paper: the tool stands on the surface plate, the work moves."""
 
-    on: Literal["plate"]
+    on: Literal["plate"] = Field(description="the surface plate carries the tool")
     at_M_mm: Vector = Field(description="tool tip in {M}")
     zero_tip_P_mm: Vector = Field(description="the place on the work, in {P}, that the tool touches at machine zero")
     zero_rotation_P_in_M_rad: Vector = Field(
@@ -102,10 +102,15 @@ class ToolOnPlateSettings(Section):
 class Geometry(Section):
     """Everything that the kinematics needs to know about the machine."""
 
-    kinematics: Literal["tripod_3spr", "hexapod_6ups"]
-    base: BasePlatform
-    platform: MovingPlatform
-    tool: Annotated[ToolOnPlatformSettings | ToolOnPlateSettings, Field(discriminator="on")]
+    kinematics: Literal["tripod_3spr", "hexapod_6ups"] = Field(
+        description="three links with spherical base joints and revolute platform joints, or six with universal base "
+        "joints and spherical platform joints"
+    )
+    base: BasePlatform = Field(description="the base platform, which carries the base joints")
+    platform: MovingPlatform = Field(description="the moving platform")
+    tool: Annotated[ToolOnPlatformSettings | ToolOnPlateSettings, Field(discriminator="on")] = Field(
+        description="the tool, on the moving platform or on the surface plate"
+    )
     plate_points_M_mm: tuple[Vector, Vector, Vector] = Field(description="reference points m1, m2, m3, in {M}")
     link_length_mm: tuple[Positive, Positive] | None = Field(
         default=None, description="shortest and longest length of a link, joint to joint; a target beyond is refused"

@@ -30,32 +30,35 @@ class _SerialSettings(_LineSettings):
     low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")
 
 
+_HOST = "name or address of the device or of the serial device server"
+
+
 class SerialLine(_SerialSettings):
     """RS-232 or RS-485: a serial port, or a pyserial URL."""
 
-    kind: Literal["serial"]
+    kind: Literal["serial"] = Field(description="bytes over a serial port")
 
 
 class TcpLine(_LineSettings):
     """A stream of bytes over TCP."""
 
-    kind: Literal["tcp"]
-    host: str = Field(min_length=1)
-    port: Annotated[int, Field(ge=1, le=65535)]
+    kind: Literal["tcp"] = Field(description="bytes over TCP")
+    host: str = Field(min_length=1, description=_HOST)
+    port: Annotated[int, Field(ge=1, le=65535)] = Field(description="TCP port of the device")
 
 
 class ModbusRtuLine(_SerialSettings):
     """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
 
-    kind: Literal["modbus_rtu"]
+    kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
 
 
 class ModbusTcpLine(_LineSettings):
     """Modbus TCP."""
 
-    kind: Literal["modbus_tcp"]
-    host: str = Field(min_length=1)
-    port: Annotated[int, Field(ge=1, le=65535)] = 502
+    kind: Literal["modbus_tcp"] = Field(description="Modbus TCP registers")
+    host: str = Field(min_length=1, description=_HOST)
+    port: Annotated[int, Field(ge=1, le=65535)] = Field(default=502, description="TCP port of the device")
 
 
 LineSettings = Annotated[SerialLine | TcpLine | ModbusRtuLine | ModbusTcpLine, Field(discriminator="kind")]

@@ -7,9 +7,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
@@ -23,9 +23,11 @@ from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 
 SECTIONS: Mapping[str, Any] = {
-    "machine": str,
+    "machine": Annotated[str, Field(description="the machine's name, which recordings and model files repeat")],
     "geometry": Geometry,
-    "lines": dict[str, LineSettings],
+    "lines": Annotated[
+        dict[str, LineSettings], Field(description="The lines (ports), by name; each is polled by a thread of its own.")
+    ],
     "wiring": Wiring,
     "loop": LoopSettings,
     "limits": LimitSettings,

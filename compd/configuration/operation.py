@@ -13,35 +13,43 @@ from compd.configuration.section import Positive, Section
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
 FRAME_DISTANCES: tuple[FrameDistance, ...] = get_args(FrameDistance)
 GaugeChannel = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$")]
+LinkNumber = Annotated[int, Field(ge=1, le=6)]
 Sign = Literal[1, -1]
+_GAUGE = "the gauge's name under `gauges:`; where it has several channels, `gauge.channel`"
 
 
 class ScaleWire(Section):
     """Which gauge is the linear scale of a link."""
 
-    link: Annotated[int, Field(ge=1, le=6)]
-    gauge: GaugeChannel = Field(description="gauge, or gauge.channel")
+    link: LinkNumber = Field(description="the link, counted from 1")
+    gauge: GaugeChannel = Field(description=_GAUGE)
     sign: Sign = Field(default=1, description="-1 where the display counts down as the link grows")
 
 
 class JointWire(Section):
     """Which gauge is which joint comparator; their order numbers them 1, 2, 3 ..."""
 
-    link: Annotated[int, Field(ge=1, le=6)]
+    link: LinkNumber = Field(description="the link, counted from 1, at whose joint it is")
     role: Literal["S", "Ra", "Rb", "B"] = Field(
         description="S: spherical joint, counts once; Ra, Rb: the ball shanks of a revolute joint, half each; "
         "B: one comparator at the other joint, counts once"
     )
-    gauge: GaugeChannel
-    sign: Sign = 1
+    gauge: GaugeChannel = Field(description=_GAUGE)
+    sign: Sign = Field(
+        default=1,
+        description="-1 where the display counts down as the joint makes its link shorter",
+    )
 
 
 class FrameWire(Section):
     """Which gauge measures which of the nine frame distances."""
 
-    distance: FrameDistance
-    gauge: GaugeChannel
-    sign: Sign = 1
+    distance: FrameDistance = Field(
+        description="t1 = b1 b2, t2 = b2 b3, t3 = b3 b1, between the supports of the base platform; u1 = b1 m1, "
+        "u2 = b1 m3, u3 = b2 m1, u4 = b2 m2, u5 = b3 m2, u6 = b3 m3, from them to the plate points"
+    )
+    gauge: GaugeChannel = Field(description=_GAUGE)
+    sign: Sign = Field(default=1, description="-1 where the display counts down as the distance grows")
 
 
 class QuantityWire(Section):
@@ -50,37 +58,41 @@ class QuantityWire(Section):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*_(degC|N|hPa|pct|mm|1)$")] = Field(
         description="name with its unit, as a recording's column: temperature_link_1_degC"
     )
-    gauge: GaugeChannel
+    gauge: GaugeChannel = Field(description=_GAUGE)
     noise: Positive | None = Field(default=None, description="standard deviation of one reading, in the name's unit")
 
 
 class Wiring(Section):
     """Which gauge measures which quantity of the machine."""
 
-    scale: tuple[ScaleWire, ...]
-    joint: tuple[JointWire, ...]
-    frame: tuple[FrameWire, ...]
-    quantities: tuple[QuantityWire, ...] = ()
+    scale: tuple[ScaleWire, ...] = Field(description="one entry for the linear scale of every link")
+    joint: tuple[JointWire, ...] = Field(description="one entry for every joint comparator")
+    frame: tuple[FrameWire, ...] = Field(description="one entry for each of the nine frame comparators")
+    quantities: tuple[QuantityWire, ...] = Field(
+        default=(), description="whatever else is measured: temperatures, forces, air pressure"
+    )
 
 
 class LoopSettings(Section):
     """The compute loop."""
 
-    rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)]
+    rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)] = Field(description="cycles per second")
     stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
     on_stale: Literal["hold", "fade", "stop"] = Field(
         description="hold: keep the last correction for hold_s, then stop; fade: take it back to zero over hold_s, "
         "then stop; stop: invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
-    priority: Annotated[int, Field(ge=1, le=98)] = Field(default=40, description="SCHED_FIFO priority, where permitted")
-    lock_memory: bool = Field(default=True, description="mlockall, where permitted")
+    priority: Annotated[int, Field(ge=1, le=98)] = Field(
+        default=40, description="real-time priority of the loop (SCHED_FIFO), where permitted"
+    )
+    lock_memory: bool = Field(default=True, description="keep the daemon in memory (mlockall), where permitted")
 
 
 class LimitSettings(Section):
     """What a correction may be: per link."""
 
-    correction_mm: Positive = Field(description="largest correction of one link")
+    correction_mm: Positive = Field(description="largest correction of one link, to either side")
     slew_mm_per_s: Positive = Field(description="fastest change of a correction")
     on_limit: Literal["clamp", "refuse"] = Field(
         description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
@@ -91,7 +103,9 @@ class TcpSocket(Section):
     """Clients over TCP."""
 
     host: str = Field(default="127.0.0.1", description="address to listen on; loopback unless you write another")
-    port: Annotated[int, Field(ge=0, le=65535)] = Field(default=7750, description="0 = any free port")
+    port: Annotated[int, Field(ge=0, le=65535)] = Field(
+        default=7750, description="TCP port to listen on; 0: any free port"
+    )
 
     @field_validator("host")
     @classmethod
@@ -110,23 +124,25 @@ class UnixSocket(Section):
 class UdpTarget(Section):
     """Where the binary SETPOINT goes, one packet per cycle."""
 
-    host: str
-    port: Annotated[int, Field(ge=1, le=65535)]
+    host: str = Field(description="name or address of the controller")
+    port: Annotated[int, Field(ge=1, le=65535)] = Field(description="UDP port of the controller")
 
 
 class SocketSettings(Section):
     """Where clients connect."""
 
-    tcp: TcpSocket | None = None
-    unix: UnixSocket
-    udp: UdpTarget | None = None
+    tcp: TcpSocket | None = Field(default=None, description="clients over TCP; left out: none")
+    unix: UnixSocket = Field(description="clients on this computer; machine zero and models are asked for here only")
+    udp: UdpTarget | None = Field(
+        default=None, description="where every setpoint goes as a packet of fixed size; left out: none is sent"
+    )
     valid_for_s: Positive = Field(description="how long a setpoint may be used: valid_until = time + this")
 
 
 class StateSettings(Section):
     """What the daemon keeps across restarts, and what it starts with."""
 
-    directory: str = Field(pattern=r"^/", description="absolute directory for machine zero")
+    directory: str = Field(pattern=r"^/", description="absolute path of the directory in which machine zero is kept")
     model_file: str | None = Field(
         default=None, pattern=r"^/", description="absolute path of the model file to start with; without: no effects"
     )

@@ -26,7 +26,11 @@ def json_schema() -> dict[str, Any]:
         "required": ["driver", "line"],
         "properties": {"driver": {"type": "string", "pattern": r"^/.+\.py:[A-Za-z_]\w*$"}},
     }
-    properties["gauges"] = {"type": "object", "additionalProperties": {"oneOf": [*gauges, by_path]}}
+    properties["gauges"] = {
+        "description": "The gauges, by name. `driver` and `line` are common to all; every other key is the driver's.",
+        "type": "object",
+        "additionalProperties": {"oneOf": [*gauges, by_path]},
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "compd machine configuration",

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from compd.errors import Problem
 from compd.model.effect import Effect
 
+# The words that an effect's `needs` may hold beside names of quantities, and what each stands for.
+NEEDS: Mapping[str, str] = {
+    "force": "the force on the tip: `force_x_N`, `force_y_N`, `force_z_N`",
+    "direction": "the direction in which each link came to its place: from the scales, or columns `approach_1` ...",
+    "motion": "the links' speeds, from the scales of rows that were taken on the move",
+    "time": "the time of each row",
+    "order": "the rows in the order in which they were measured",
+    "revolute_axes": "a machine with revolute axes, that is a tripod",
+    "plate_thickness_mm": "`plate_thickness_mm` in the configuration",
+    "scale_signal_period_mm": "`scale_signal_period_mm` in the configuration",
+}
 # Needs that stand for several quantities, or for none: direction, motion, time and order come from the scales and the
 # clock, which every machine has.
 _QUANTITIES_OF_NEED: dict[str, tuple[str, ...]] = {

@@ -1,7 +1,8 @@
-"""A calibrated ball plate: ball, x_mm, y_mm, z_mm (the paper's figure 20)."""
+"""A calibrated ball plate, as in the paper's figure 20: a CSV file with one row per ball."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,13 @@ from compd.files import write_files
 from compd.recording.csv_table import CsvTable, read_table
 from compd.recording.problem_list import ProblemList, rows_text, values_text
 
-_COLUMNS = ("ball", "x_mm", "y_mm", "z_mm")
+COLUMNS: Mapping[str, str] = {
+    "ball": "number of the ball, each once",
+    "x_mm": "calibrated x of its centre in the plate's own frame",
+    "y_mm": "calibrated y",
+    "z_mm": "calibrated z",
+}
+_COLUMNS = tuple(COLUMNS)
 
 
 class BallPlate(NamedTuple):

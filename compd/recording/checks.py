@@ -1,9 +1,21 @@
-"""Checks of a recording's numbers: rules that they must keep, and limits beyond which a person should look."""
+"""Checks of a recording's numbers: rules that they must keep, and limits beyond which a person should look.
+
+A recording that breaks a rule is refused:
+
+- `time_s` rises from row to row; a row without it is left out.
+- `session`, `visit`, `point` and `ball` are whole numbers from 0; `point` may be text.
+- `approach_<i>` is 1 or -1, or empty where it is not known.
+- At least two rows have all that is needed: the gauges, and a value of the reference.
+
+A value beyond a limit is used all the same, with a warning: its unit is probably not the one that the column's name
+ends in.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,24 +24,62 @@ from compd.recording.columns import ID_COLUMNS
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList, rows_text, values_text
 
-# (columns, lowest, highest, why): outside, the unit is probably not what the name says. Not an error.
-_LIMITS: tuple[tuple[re.Pattern[str], float, float, str], ...] = tuple(
-    (re.compile(pattern), low, high, why)
-    for pattern, low, high, why in (
-        (r"scale_\d+_mm", -2000.0, 2000.0, "a link's travel in mm; are these um?"),
+
+class Limit(NamedTuple):
+    """What values are plausible: outside, the unit is probably not what the column's name says. Not an error.
+
+    names : the columns as people write them. pattern : what matches their names.
+    """
+
+    names: str
+    pattern: re.Pattern[str]
+    low: float
+    high: float
+    why: str
+
+
+# The first that matches a column's name counts.
+LIMITS: tuple[Limit, ...] = tuple(
+    Limit(names, re.compile(pattern), low, high, why)
+    for names, pattern, low, high, why in (
+        ("scale_<i>_mm", r"scale_\d+_mm", -2000.0, 2000.0, "a link's travel in mm; are these um?"),
         # the comparators of the paper and of the presets reach +-1 mm at most
-        (r"joint_\d+_um|frame_[tu]\d_um", -1000.0, 1000.0, "a comparator's range in um"),
-        (r"temperature_(?:room|base|frame|platform|tool|plate_\w+|link_\d+)_degC", -20.0, 150.0, "degrees Celsius"),
-        (r"temperature_\w+_degC", -100.0, 600.0, "degrees Celsius"),
-        (r"pressure_hPa", 500.0, 1100.0, "air pressure on Earth's surface in hPa; is this Pa or kPa?"),
-        (r"humidity_pct", 0.0, 100.0, "relative humidity in percent"),
-        (r"force_[xyz]_N", -20000.0, 20000.0, "a force on the tip in N"),
-        (r"(?:reference|model)_(?:[xyz]|link_\d+)_mm", -20000.0, 20000.0, "a length in mm; are these um?"),
-        (r"(?:reference|model)_r[xyz]_rad", -3.15, 3.15, "a rotation vector in rad; are these degrees?"),
+        (
+            "joint_<k>_um, frame_t<k>_um, frame_u<k>_um",
+            r"joint_\d+_um|frame_[tu]\d_um",
+            -1000.0,
+            1000.0,
+            "a comparator's range in um",
+        ),
+        # room air outside this is not the room where a machine is measured, but may be degrees Fahrenheit
+        ("temperature_room_degC", r"temperature_room_degC", 0.0, 50.0, "degrees Celsius"),
+        (
+            "temperature of a part of the machine",
+            r"temperature_(?:base|frame|platform|tool|plate_\w+|link_\d+)_degC",
+            -20.0,
+            150.0,
+            "degrees Celsius",
+        ),
+        ("any other temperature", r"temperature_\w+_degC", -100.0, 600.0, "degrees Celsius"),
+        ("pressure_hPa", r"pressure_hPa", 500.0, 1100.0, "air pressure on Earth's surface in hPa; is this Pa or kPa?"),
+        ("humidity_pct", r"humidity_pct", 0.0, 100.0, "relative humidity in percent"),
+        ("force_x_N, force_y_N, force_z_N", r"force_[xyz]_N", -20000.0, 20000.0, "a force on the tip in N"),
+        (
+            "reference_..._mm, model_..._mm",
+            r"(?:reference|model)_(?:[xyz]|link_\d+)_mm",
+            -20000.0,
+            20000.0,
+            "a length in mm; are these um?",
+        ),
+        (
+            "reference_..._rad, model_..._rad",
+            r"(?:reference|model)_r[xyz]_rad",
+            -3.15,
+            3.15,
+            "a rotation vector in rad; are these degrees?",
+        ),
     )
 )
-# Room air outside this is not the room where a machine is measured, but may be degrees Fahrenheit.
-_ROOM_DEGC = (0.0, 50.0)
 # Comparators of +-1 mm resolve 0.01 to 0.1 um; a whole set below that is probably in mm.
 _SMALLEST_JOINT_UM = 0.05
 
@@ -107,18 +157,17 @@ def _check_time(table: CsvTable, problems: ProblemList) -> None:
 def _check_limits(table: CsvTable, problems: ProblemList) -> None:
     """Warn of values that are implausible for their unit; the values are used all the same."""
     for name, values in table.columns.items():
-        for pattern, low, high, why in _LIMITS:
-            if pattern.fullmatch(name):
-                least, most = _ROOM_DEGC if name == "temperature_room_degC" else (low, high)
+        for limit in LIMITS:
+            if limit.pattern.fullmatch(name):
                 with np.errstate(invalid="ignore"):
-                    strange = (values < least) | (values > most)
+                    strange = (values < limit.low) | (values > limit.high)
                 _report(
                     table,
                     name,
                     strange,
                     problems,
                     "implausible for its unit",
-                    f"{least:g} to {most:g}: {why}",
+                    f"{limit.low:g} to {limit.high:g}: {limit.why}",
                     "look; it is used as it stands",
                     warn=True,
                 )

@@ -22,25 +22,82 @@ ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
 # that the conversion from mm to um leaves no digits of its own behind. Other units are written in full.
 DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
 
-# A stem (the name without its unit) and the one unit that the format gives it; "" = no unit.
-_STEMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
-    (re.compile(pattern), unit)
-    for pattern, unit in (
-        (r"time", "s"),
-        (r"session|visit|point|ball", ""),
-        (r"scale_[1-9]\d*", "mm"),
-        (r"joint_[1-9]\d*", "um"),
-        (r"frame_(?:t[1-3]|u[1-6])", "um"),
-        (r"approach_[1-9]\d*", ""),
-        (r"(?:reference|model)_[xyz]", "mm"),
-        (r"(?:reference|model)_r[xyz]", "rad"),
-        (r"(?:reference|model)_link_[1-9]\d*", "mm"),
-        (r"temperature_[a-z][a-z0-9_]*", "degC"),
-        (r"force_[xyz]", "N"),
-        (r"pressure", "hPa"),
-        (r"humidity", "pct"),
+
+class ColumnKind(NamedTuple):
+    """A column of the format, or several of one kind.
+
+    Attributes
+    ----------
+    names : as people write them, `<i>` for a number from 1.
+    stem : what matches the name without its unit.
+    unit : the one unit that the format gives it; "" = no unit.
+    meaning : for the reference.
+    """
+
+    names: str
+    stem: re.Pattern[str]
+    unit: str
+    meaning: str
+
+
+COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
+    ColumnKind(names, re.compile(stem), unit, meaning)
+    for names, stem, unit, meaning in (
+        ("time_s", r"time", "s", "seconds from the start; every row is later than the one above"),
+        (
+            "session",
+            r"session",
+            "",
+            "number of an independent measuring session, which cross-validation leaves out as a whole; optional",
+        ),
+        (
+            "visit",
+            r"visit",
+            "",
+            "number of a visit: its rows are immediate repeats, and their scatter is the noise floor; optional",
+        ),
+        ("point", r"point", "", "number or name of the nominal target; optional"),
+        ("scale_<i>_mm", r"scale_[1-9]\d*", "mm", "linear scale of link i, zero at machine zero"),
+        ("joint_<k>_um", r"joint_[1-9]\d*", "um", "joint comparator k of the wiring, zero at machine zero"),
+        (
+            "frame_t<k>_um, frame_u<k>_um",
+            r"frame_(?:t[1-3]|u[1-6])",
+            "um",
+            "frame comparators: change of the distances t1 to t3, u1 to u6 since machine zero",
+        ),
+        (
+            "approach_<i>",
+            r"approach_[1-9]\d*",
+            "",
+            "1 or -1: the direction in which link i last moved; without it, from the scales",
+        ),
+        (
+            "reference_x_mm, reference_y_mm, reference_z_mm",
+            r"(?:reference|model)_[xyz]",
+            "mm",
+            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes",
+        ),
+        (
+            "reference_rx_rad, reference_ry_rad, reference_rz_rad",
+            r"(?:reference|model)_r[xyz]",
+            "rad",
+            "the attitude as it was measured: rotation vector of {P} in {M}; optional",
+        ),
+        (
+            "reference_link_<i>_mm",
+            r"(?:reference|model)_link_[1-9]\d*",
+            "mm",
+            "in place of the tip: the change of link i as an interferometer measured it",
+        ),
+        ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
+        ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
+        ("force_x_N, force_y_N, force_z_N", r"force_[xyz]", "N", "force on the tip, in {M}"),
+        ("pressure_hPa", r"pressure", "hPa", "air pressure"),
+        ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
     )
 )
+# With `machine: external` there is also a column model_... for every column reference_...; and anything else that was
+# measured is a column <name>_<unit>.
 # A name that begins like a column of the format but is none: probably misspelt, so no covariate.
 _RESERVED = re.compile(
     r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
@@ -90,10 +147,10 @@ def number_text(value: float) -> str:
 
 def parse_name(name: str) -> ColumnName | None:
     """The parts of a name that is exactly a column of the format; None for every other name."""
-    for pattern, unit in _STEMS:
-        stem = name.removesuffix(f"_{unit}") if unit else name
-        if (stem != name or not unit) and pattern.fullmatch(stem):
-            return ColumnName(stem, unit)
+    for kind in COLUMN_KINDS:
+        stem = name.removesuffix(f"_{kind.unit}") if kind.unit else name
+        if (stem != name or not kind.unit) and kind.stem.fullmatch(stem):
+            return ColumnName(stem, kind.unit)
     return None
 
 
@@ -126,8 +183,9 @@ def intended_column(name: str) -> str | None:
         stem = re.sub(r"(?<=[a-z])(?=\d)", "_", stem.lower())
         stem = re.sub(r"^temp_", "temperature_", stem)
         stem = re.sub(r"frame_(?:([tu])_|_)?(?=[tu1-9])", lambda m: f"frame_{m[1] or ''}", stem)
-        for pattern, right in _STEMS:
-            if pattern.fullmatch(stem) and (not right or right == unit or not unit or _convertible(unit, right)):
+        for kind in COLUMN_KINDS:
+            right = kind.unit
+            if kind.stem.fullmatch(stem) and (not right or right == unit or not unit or _convertible(unit, right)):
                 return f"{stem}_{right}" if right else stem
     close = difflib.get_close_matches(tidy.lower(), _COMMON, n=1, cutoff=0.85)
     return close[0] if close and not _RESERVED.match(name) else None

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
 from compd.configuration.document import Document, read_document
 from compd.configuration.section import Section, refusal, unknown_key, validate
@@ -22,6 +22,7 @@ EXTERNAL = "external"
 Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
 Frame = Literal["machine", "instrument"]
 
+_SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
 _EXAMPLE = "machine: tripod-cmm, and under it reference: {quantity: tool_position, frame: machine}"
 # Row 1 is the header.
@@ -29,22 +30,30 @@ _FIRST_ROW = 2
 
 
 class Reference(Section):
-    """What the reference instrument measured.
+    """What the reference instrument measured. An unknown `sigma_um` is nan; `balls` is relative to the sidecar."""
 
-    Attributes
-    ----------
-    quantity : which columns hold it.
-    frame : `machine`: in {M}; `instrument`: in the instrument's own frame, so that six registration
-        parameters are always fitted. A ball plate's coordinates are its own: `instrument` unless it is written.
-        A link's length has no frame: `machine`.
-    sigma_um : standard uncertainty: one for every axis, or one for each; nan where it is not known.
-    balls : the ball plate's file (ball_plate only), relative to the sidecar's directory.
-    """
-
-    quantity: Quantity
-    frame: Frame = Field(default="machine", validate_default=True)
-    sigma_um: tuple[float, ...] = (math.nan,)
-    balls: Path | None = Field(default=None, validate_default=True)
+    quantity: Quantity = Field(
+        description="what was measured: the tip, the tip and the attitude, the links' change, or balls of a ball plate"
+    )
+    frame: Frame = Field(
+        default="machine",
+        validate_default=True,
+        description="machine: the coordinates are in {M}; instrument: in the instrument's own frame, so that a "
+        "registration of six parameters is always fitted; of a ball plate always instrument unless it is written",
+    )
+    sigma_um: Annotated[
+        tuple[float, ...],
+        WithJsonSchema({"anyOf": [_SIGMA_SCHEMA, {"type": "array", "items": _SIGMA_SCHEMA}]}),
+    ] = Field(
+        default=(math.nan,),
+        description="standard uncertainty of the reference, um: one number, or one for each axis; left out where it is "
+        "not known",
+    )
+    balls: Path | None = Field(
+        default=None,
+        validate_default=True,
+        description="ball_plate only: the ball plate's file, relative to the sidecar",
+    )
 
     @field_validator("quantity", mode="before")
     @classmethod
@@ -118,15 +127,20 @@ def _row_numbers(value: Any) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-RowNumbers = Annotated[tuple[int, ...], BeforeValidator(_row_numbers)]
+_ROW_SCHEMA = {"type": "integer"}
+RowNumbers = Annotated[
+    tuple[int, ...],
+    BeforeValidator(_row_numbers),
+    WithJsonSchema({"anyOf": [_ROW_SCHEMA, {"type": "array", "items": _ROW_SCHEMA}, {"type": "string"}]}),
+]
 
 
 class Exclusion(Section):
     """Rows that a person left out, and why: `{row: 17, reason: ...}`, `{rows: [17, 20], ...}`, `{rows: 17-20, ...}`."""
 
-    row: RowNumbers = ()
-    rows: RowNumbers = ()
-    reason: str = Field(default="", validate_default=True)
+    row: RowNumbers = Field(default=(), description="the row as a spreadsheet shows it; the header is row 1")
+    rows: RowNumbers = Field(default=(), description="several rows: a list, or `17-20` for the first to the last")
+    reason: str = Field(default="", validate_default=True, description="why they are left out; it must be written")
 
     @model_validator(mode="before")
     @classmethod
@@ -181,13 +195,31 @@ def _text_or_nothing(value: Any) -> Any:
     return value or ""
 
 
-_SECTIONS: Mapping[str, Any] = {
-    "format": Annotated[int, BeforeValidator(_checked_format)],
-    "machine": Annotated[str, BeforeValidator(_checked_machine)],
-    "reference": Reference | None,
-    "excluded_rows": Annotated[tuple[Exclusion, ...], BeforeValidator(_checked_exclusions)],
-    "provenance": Annotated[dict[Any, Any], BeforeValidator(_mapping_or_nothing)],
-    "notes": Annotated[str, BeforeValidator(_text_or_nothing)],
+SECTIONS: Mapping[str, Any] = {
+    "format": Annotated[
+        int,
+        BeforeValidator(_checked_format),
+        Field(description=f"number of the format: {FORMAT}; a sidecar without it counts as 1, of release 0.1"),
+    ],
+    "machine": Annotated[
+        str,
+        BeforeValidator(_checked_machine),
+        Field(description=f"name of the machine's configuration, or `{EXTERNAL}` with your own model's prediction"),
+    ],
+    "reference": Annotated[
+        Reference | None, Field(description="what the reference instrument measured; left out where there was none")
+    ],
+    "excluded_rows": Annotated[
+        tuple[Exclusion, ...],
+        BeforeValidator(_checked_exclusions),
+        Field(description="rows that a person left out, each with the reason"),
+    ],
+    "provenance": Annotated[
+        dict[Any, Any],
+        BeforeValidator(_mapping_or_nothing),
+        Field(description="how the recording came to be; kept, and not interpreted"),
+    ],
+    "notes": Annotated[str, BeforeValidator(_text_or_nothing), Field(description="any text")],
 }
 
 
@@ -233,8 +265,8 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         problems += error.problems
         return None
     _refuse_newer_format(document)
-    problems += [unknown_key(document, (key,), list(_SECTIONS)) for key in document.data if key not in _SECTIONS]
-    sections = {key: validate(kind, document, (key,), problems) for key, kind in _SECTIONS.items()}
+    problems += [unknown_key(document, (key,), list(SECTIONS)) for key in document.data if key not in SECTIONS]
+    sections = {key: validate(kind, document, (key,), problems) for key, kind in SECTIONS.items()}
     reference = sections["reference"]
     if reference is None:
         reference = _quantity_alone(document)

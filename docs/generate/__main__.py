@@ -13,19 +13,23 @@ REFERENCE = Path(__file__).parent.parent / "reference"
 GALLERY_CASES = Path(__file__).parent.parent / "gallery" / "cases.md"
 
 
-def pages() -> dict[str, str]:
-    """The text of every generated page, by file name."""
-    names = [module.name for module in pkgutil.iter_modules(docs.generate.__path__) if module.name != "__main__"]
-    return {
-        f"{name.replace('_', '-')}.md": importlib.import_module(f"docs.generate.{name}").page()
-        for name in sorted(names)
-    }
+def page_names() -> list[str]:
+    """The modules that are pages, sorted: those with a function `page`; the others hold what pages share."""
+    modules = sorted(module.name for module in pkgutil.iter_modules(docs.generate.__path__))
+    return [name for name in modules if hasattr(importlib.import_module(f"docs.generate.{name}"), "page")]
+
+
+def page_of(name: str) -> str:
+    """The text of one page, by the name of its module."""
+    text: str = importlib.import_module(f"docs.generate.{name}").page()
+    return text
 
 
 def main() -> None:
     """Write every page that has changed, so that Sphinx builds no more than it must."""
-    for name, text in pages().items():
-        path = REFERENCE / name
+    for name in page_names():
+        text = page_of(name)
+        path = REFERENCE / f"{name.replace('_', '-')}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
     if not GALLERY_CASES.exists():

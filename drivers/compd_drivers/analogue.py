@@ -109,7 +109,13 @@ class AnalogueModule(DescriptionSection):
         if self.ranges:
             choice: Any = Literal[self.ranges]
             setting = Field(description="what the input is set to in the module")
-            model = create_model(model_name, __base__=_RangedInput, __module__=__name__, range=(choice, setting))
+            model = create_model(
+                model_name,
+                __base__=_RangedInput,
+                __module__=__name__,
+                __doc__=AnalogueInput.__doc__,
+                range=(choice, setting),
+            )
         inputs: Any = Annotated[tuple[model, ...], AfterValidator(_check_once)]
         return inputs, Field(min_length=1, description="the inputs that are wired")
 

@@ -32,8 +32,8 @@ class ErrorReply(DescriptionSection):
 class Exchange(DescriptionSection):
     """One request and its reply, without a value in it."""
 
-    out: str = Field(min_length=1)
-    in_: str = Field(alias="in")
+    out: str = Field(min_length=1, description="what is sent, without its terminator")
+    in_: str = Field(alias="in", description="what the reply looks like, without its terminator")
 
 
 class Echo(Exchange):
@@ -49,7 +49,7 @@ class SerialAsciiOptions(ExchangeOptions):
     out_terminator: str = Field(default="", description="what ends every request")
     in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
     in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
-    channels: tuple[AsciiChannel, ...] = Field(min_length=1)
+    channels: tuple[AsciiChannel, ...] = Field(min_length=1, description="the numbers in the reply, in their order")
     errors: tuple[ErrorReply, ...] = Field(default=(), description="the first that fits counts")
     init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
     echo: Echo | None = Field(default=None, description="finds a reply that is one behind")

@@ -66,7 +66,7 @@ class FrameLayout(NamedTuple):
 class FrameChecksum(DescriptionSection):
     """How the checksum of a frame is made."""
 
-    kind: ChecksumKind
+    kind: ChecksumKind = Field(description="how it is computed")
     first: Annotated[int, Field(ge=0)] = Field(default=0, description="first byte that it covers, from 0")
     end: Annotated[int, Field(ge=1)] | None = Field(
         default=None, description="byte before which it ends; the checksum itself if left out"
@@ -91,7 +91,7 @@ class FrameChannel(MeasuredChannel):
     """One number in the frame."""
 
     at: Annotated[int, Field(ge=0)] = Field(description="its first byte, from 0")
-    type: NumberType
+    type: NumberType = Field(description="how the number is stored")
     byte_order: Literal["little", "big"] = Field(default="little", description="of a number in several bytes")
     invalid: dict[float, ReplyQuality] = Field(default={}, description="numbers that are none, and what they mean")
 
@@ -126,7 +126,7 @@ class SerialFrameOptions(ExchangeOptions):
     )
     frame: str = Field(min_length=2, description="the reply: hexadecimal bytes, `..` for any, `CS` for the checksum")
     checksum: FrameChecksum | None = Field(default=None, description="how `CS` is made")
-    channels: tuple[FrameChannel, ...] = Field(min_length=1)
+    channels: tuple[FrameChannel, ...] = Field(min_length=1, description="the numbers in the reply")
     errors: tuple[ErrorFrame, ...] = Field(default=(), description="replies that are errors")
 
     @model_validator(mode="after")

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from compd.commissioning.conformance.cases import CaseResult
     from compd.commissioning.conformance.report import DriverUnderTest
 
-driver = typer.Typer(no_args_is_help=True, help="Gauge drivers.")
+driver = typer.Typer(no_args_is_help=True, help="Try gauge drivers.")
 
 
 @driver.callback()
 def _drivers() -> None:
-    """Gauge drivers."""
+    """Try gauge drivers."""
 
 
 @driver.command("test")

@@ -13,15 +13,17 @@ if TYPE_CHECKING:
     from compd.commissioning.open_gauge import GaugeTarget
     from compd.gauge import Reading
 
-gauge = typer.Typer(no_args_is_help=True, help="Gauges: list, show, find, read, watch, learn.")
+gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
 
 TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
 NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
 Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, or host:port.")]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
-Format = Annotated[str | None, typer.Option("--format", help="8N1, 7E2 ..., from the device's manual.")]
+Format = Annotated[
+    str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
+]
 Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="How long to wait for the first byte, s.")]
-Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9. Repeatable.")]
+Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9.")]
 
 
 @gauge.command("list")
@@ -161,7 +163,9 @@ def learn(
     out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
     replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
     names: Annotated[str, typer.Option(help="Names of the channels, with commas between.")] = "",
-    error: Annotated[list[str] | None, typer.Option(help="An error reply: 'ERR0=sensor_fault'. Repeatable.")] = None,
+    error: Annotated[
+        list[str] | None, typer.Option(help="An error reply and its quality: 'ERR0=sensor_fault'.")
+    ] = None,
     to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
 ) -> None:
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""

@@ -23,7 +23,7 @@ _STATUS_EVERY_S = 1.0
 
 def watch(
     address: Annotated[
-        str, typer.Argument(help="host:port, a Unix socket, or the configuration (YAML) that names one.")
+        str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names one.")
     ] = DEFAULT_ADDRESS,
     rate_hz: Annotated[float, typer.Option(min=0.1, help="Setpoints per second.")] = 10.0,
     count: Annotated[int, typer.Option(min=0, help="Stop after so many setpoints; 0 = until Ctrl-C.")] = 0,

@@ -20,13 +20,14 @@ MOST_SENTENCES = 6
 
 def compare(
     recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING...", help="NAME.csv with NAME.yaml beside it.")
+        list[Path],
+        typer.Argument(metavar="RECORDING...", help="The recordings: NAME.csv, each with NAME.yaml beside it."),
     ],
     machine: MachineOption = None,
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with fitted effects; without it, no effect acts.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print numbers for programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[
         Path | None, typer.Option("--html", help="Write the page with the pictures; works offline.")
     ] = None,

@@ -33,7 +33,7 @@ def diagnose(
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with what is known already; it is not changed.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print numbers for programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
 ) -> None:
     """Learn which physical effect is missing: the verdict, then the evidence, then what to measure next."""

@@ -26,7 +26,7 @@ DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would h
 EFFECT_HELP = "An id from `compd effect list`, /absolute/file.py:NAME, or a YAML file with a formula."
 
 
-effect = typer.Typer(no_args_is_help=True, help="The library of physical causes: list them, show one on a machine.")
+effect = typer.Typer(no_args_is_help=True, help="List and show physical causes, and add them to a model file.")
 
 
 @effect.command(name="list")

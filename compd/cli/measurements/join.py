@@ -32,8 +32,10 @@ def join(
         float | None,
         typer.Option(help="Recording time minus instrument time, in s; estimated from the motion if left out."),
     ] = None,
-    frame: Annotated[FrameChoice, typer.Option(help="Whose coordinates they are.")] = FrameChoice.INSTRUMENT,
-    sigma_um: Annotated[float | None, typer.Option(help="Its standard uncertainty per axis.")] = None,
+    frame: Annotated[
+        FrameChoice, typer.Option(help="Frame of the coordinates: {M}, or the instrument's own, which is then fitted.")
+    ] = FrameChoice.INSTRUMENT,
+    sigma_um: Annotated[float | None, typer.Option(help="Standard uncertainty of the instrument per axis, um.")] = None,
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
 ) -> None:
     """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""

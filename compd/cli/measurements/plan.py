@@ -19,13 +19,18 @@ def plan(
     machine: MachineOption = None,
     model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
     workspace: Annotated[
-        str | None, typer.Option(help="x0,x1,y0,y1,z0,z1 of the tip in mm; as in the recording if left out.")
+        str | None,
+        typer.Option(help="Where the tip may go, in mm: x0,x1,y0,y1,z0,z1; as in the recording if left out."),
     ] = None,
-    force: Annotated[float | None, typer.Option(min=0, help="Largest load in N; as in the recording.")] = None,
+    force: Annotated[
+        float | None, typer.Option(min=0, help="Largest load in N; as in the recording if left out.")
+    ] = None,
     temperature: Annotated[
         str | None, typer.Option(help="Lowest,highest in degC; as in the recording if left out.")
     ] = None,
-    speed: Annotated[float | None, typer.Option(min=0, help="Fastest in mm/s; as in the recording.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=0, help="Highest speed in mm/s; as in the recording if left out.")
+    ] = None,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
     from compd.comparison.compare import compare

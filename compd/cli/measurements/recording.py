@@ -12,12 +12,14 @@ from compd.cli.options import MachineOption
 if TYPE_CHECKING:
     from compd.recording.recording import Recording
 
-recording = typer.Typer(no_args_is_help=True, help="Recordings: readings of the machine beside a reference.")
+recording = typer.Typer(
+    no_args_is_help=True, help="Check and merge recordings: readings of the machine beside a reference."
+)
 
 
 @recording.callback()
 def _recording() -> None:
-    """Recordings: readings of the machine beside a reference."""
+    """Check and merge recordings: readings of the machine beside a reference."""
 
 
 @recording.command()
@@ -41,7 +43,10 @@ def check(
 @recording.command()
 def merge(
     recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING RECORDING...", help="NAME.csv with NAME.yaml, in time's order.")
+        list[Path],
+        typer.Argument(
+            metavar="RECORDING RECORDING...", help="The recordings, NAME.csv with NAME.yaml, in the order of time."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
     machine: MachineOption = None,

@@ -19,7 +19,7 @@ class ReferenceKind(StrEnum):
 
 def campaign(
     config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
-    out: Annotated[Path, typer.Option(help="NAME.csv; NAME.yaml is written beside it.")],
+    out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
     seed: Annotated[int, typer.Option(min=0, help="Machine, weather, points and noise follow from it.")] = 1,
     effect: Annotated[
         list[str] | None,

@@ -37,7 +37,7 @@ def simulate(
         list[int] | None,
         typer.Option(
             min=0,
-            help="Hide a cause that follows from this number, in a machine whose gauges see all else; again for two.",
+            help="Hide a cause that follows from this number, in a machine whose gauges see all else.",
         ),
     ] = None,
     plan: Annotated[

@@ -19,7 +19,7 @@ def tracker(
     simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in.")],
     out: Annotated[Path, typer.Option(help="The export, a CSV for `compd join`.")],
     seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
-    rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Looks per second.")] = 20.0,
+    rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Measurements per second.")] = 20.0,
 ) -> None:
     """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
 

@@ -22,9 +22,9 @@ from compd.live.loop.limits import limit_correction, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
-from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues, ShadowResult
+from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
-from compd.live.loop.states import State
+from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_uncertainty import uncertainty_um
 from compd.live.loop.wiring import MachineWires
 from compd.model.solve_status import MEANING, Reason

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,17 +12,16 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.json_text import encode_compact
 from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.states import State
-
-
-class Mode(StrEnum):
-    """What determines the tip: the scales as they are read (cmm), or the target of a controller (machine_tool)."""
-
-    CMM = "cmm"
-    MACHINE_TOOL = "machine_tool"
-
-
-_MODE_CODES: Mapping[Mode, int] = {Mode.CMM: 0, Mode.MACHINE_TOOL: 1}
+from compd.live.loop.packet_layout import (
+    BODY,
+    FLAG_TOOL_ON_PLATE,
+    FLAG_VALID,
+    LAYOUT_VERSION,
+    MAGIC,
+    PACKET_LINKS,
+    PACKET_SIZE,
+)
+from compd.live.loop.states import Mode, State
 
 # 0.1 nm: a hundredth of the resolution of the best comparators.
 _DECIMALS_MM = 7
@@ -34,17 +31,7 @@ _DECIMALS_S = 6
 # 0.1 nm, as lengths: an uncertainty is not known better.
 _DECIMALS_UM = 4
 
-# magic, version, size, seq, time, valid_until, age, flags, state, mode, links, 3 spare bytes, tip 3, frame
-# displacement 3, frame rotation 3, then link length, scale setpoint and correction for 6 links, configuration hash;
-# a CRC-32 follows. README.md gives every offset.
-_PACKET = struct.Struct("<4sHHQdddHBBB3x3d3d3d6d6d6d8s")
-_MAGIC = b"CMPD"
-_VERSION = 1
-_FLAG_VALID = 1
-_FLAG_TOOL_ON_PLATE = 2  # the tip's three coordinates are then tip_P
-PACKET_SIZE = _PACKET.size + 4
-_LINKS = 6
-_NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * _LINKS)
+_NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * PACKET_LINKS)
 
 
 class ShadowResult(NamedTuple):
@@ -163,8 +150,8 @@ class Setpoint(NamedTuple):
         if values is not None:
             tip_mm = values.tip_M_mm if values.tip_P_mm is None else values.tip_P_mm
             links = len(values.correction_mm)
-            flags = _FLAG_VALID if values.tip_P_mm is None else _FLAG_VALID | _FLAG_TOOL_ON_PLATE
-            unused = (math.nan,) * (_LINKS - links)
+            flags = FLAG_VALID if values.tip_P_mm is None else FLAG_VALID | FLAG_TOOL_ON_PLATE
+            unused = (math.nan,) * (PACKET_LINKS - links)
             vectors = (
                 *tip_mm.tolist(),
                 *values.frame_displacement_M_mm.tolist(),
@@ -176,9 +163,9 @@ class Setpoint(NamedTuple):
                 *values.correction_mm.tolist(),
                 *unused,
             )
-        body = _PACKET.pack(
-            _MAGIC,
-            _VERSION,
+        body = BODY.pack(
+            MAGIC,
+            LAYOUT_VERSION,
             PACKET_SIZE,
             self.seq,
             self.time_s,
@@ -186,7 +173,7 @@ class Setpoint(NamedTuple):
             self.age_s,
             flags,
             self.state.code,
-            _MODE_CODES[self.mode],
+            self.mode.code,
             links,
             *vectors,
             config_hash,

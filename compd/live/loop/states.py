@@ -1,4 +1,4 @@
-"""The states of a setpoint: one row for each, used by the packet, the JSON, `compd watch` and the reference.
+"""The states and modes of a setpoint: one row for each, used by packet, JSON, `compd watch` and the reference.
 
 To add a state, append a row and return it where it arises (cycle.py, stale_policy.py or limits.py). Names and codes
 are part of the protocol: they never change and are never used again. A reader that meets a name or a code which it
@@ -46,3 +46,19 @@ class State(StrEnum):
 def state_named(name: str) -> State | None:
     """The state of that name; None where this release does not know it: the setpoint is then invalid."""
     return next((state for state in State if state == name), None)
+
+
+class Mode(StrEnum):
+    """What determines the tip. code : number of the mode in the UDP packet. text : meaning, for people."""
+
+    code: int
+    text: str
+
+    def __new__(cls, name: str, code: int, text: str) -> Self:
+        mode = str.__new__(cls, name)
+        mode._value_ = name
+        mode.code, mode.text = code, text
+        return mode
+
+    CMM = "cmm", 0, "the scales, as they are read, say where the tip is"
+    MACHINE_TOOL = "machine_tool", 1, "a controller's `TARGET` says where the tip is to be"

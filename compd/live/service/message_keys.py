@@ -13,8 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from compd.gauge import Quality
-from compd.live.loop.setpoint import Mode
-from compd.live.loop.states import State
+from compd.live.loop.states import Mode, State
 from compd.live.service.messages import ErrorCode
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -72,8 +71,8 @@ class FrameKeys(Keys):
     """The frame of the base platform, {B}."""
 
     origin_M_mm: Vector = Field(description="its origin in {M}, mm")
-    displacement_M_mm: Vector = Field(description="displacement of its origin since machine zero, mm")
-    rotation_M_rad: Vector = Field(description="rotation vector since machine zero, rad")
+    displacement_M_mm: Vector = Field(description="displacement of its origin since machine zero, in {M}, mm")
+    rotation_M_rad: Vector = Field(description="its rotation since machine zero, as a rotation vector in {M}, rad")
 
 
 class ShadowKeys(Keys):
@@ -87,40 +86,64 @@ class ShadowKeys(Keys):
 
 
 class SetpointKeys(SentMessage):
-    """The result of one cycle. All keys below `age_s` are absent unless `valid` is true."""
+    """The result of one cycle. Where `valid` is false, no key is there that holds a value a controller could use.
+
+    In mode `cmm` the uncompensated command is what the scales show, and `correction_mm` is what would have to be added
+    to bring the tip to where the scales alone believe it to be. While a correction is clamped or slews to that of a
+    newly adopted model, the tip in mode `cmm` is the one that belongs to the correction which is applied.
+
+    While setpoints are invalid the last correction is remembered, and the next valid one slews from it: hold your last
+    command meanwhile.
+    """
 
     wire_name = "SETPOINT"
-    seq: int = Field(description="number of the cycle; a gap is a missed cycle, a lower rate or a dropped message")
+    seq: int = Field(
+        description="number of the cycle, which rises by one per period; a gap is a missed cycle, a lower rate or a "
+        "dropped message"
+    )
     time_s: float = Field(description="when the gauges were looked at, s on the daemon's monotonic clock")
-    valid: bool = Field(description="false: use nothing of this message")
+    valid: bool = Field(description="false: use nothing of this message; from `tip_M_mm` on every key is absent")
     state: State = Field(description="how the setpoint came about")
-    reason: str = Field(description='why the state is not ok; "" when it is')
-    valid_until: float = Field(description="not to be used later than this, s; time_s itself when it is not valid")
-    mode: Mode = Field(description="cmm: the scales give the tip; machine_tool: a TARGET does")
+    reason: str = Field(description='why the state is not `ok`, for a person; "" when it is')
+    valid_until: float = Field(description="not to be used later than this, s; `time_s` itself when it is not valid")
+    mode: Mode = Field(description="cmm: the scales say where the tip is; machine_tool: a `TARGET` does")
     model: str | None = Field(
         default=None, description="hash of the model file that is applied; absent without effects"
     )
     age_s: float | None = Field(default=None, description="age of the oldest reading used, s")
-    tip_M_mm: Vector | None = Field(default=None, description="the tip in {M}, the surface plate, mm")
+    tip_M_mm: Vector | None = Field(
+        default=None,
+        description="the tip in {M}, the surface plate, mm; in mode cmm measured, in mode machine_tool the target, "
+        "which is reached in state ok",
+    )
     tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, the base platform at machine zero, mm")
     tip_P_mm: Vector | None = Field(default=None, description="tool on the plate: the touched place in {P}, mm")
-    frame: FrameKeys | None = None
+    frame: FrameKeys | None = Field(default=None, description="where the base platform is, and how it has moved")
     link_length_mm: Links | None = Field(
-        default=None, description="of each link, measured or (machine_tool) needed, mm"
+        default=None, description="length of each link, mm: measured (cmm) or needed (machine_tool)"
     )
     scale_setpoint_mm: Links | None = Field(
         default=None, description="what each scale is to show, from machine zero, mm: command the drives with this"
     )
     correction_mm: Links | None = Field(
-        default=None, description="what was added to each link's uncompensated command, within its limits, mm"
+        default=None,
+        description="what was added to each link's uncompensated command, within its limits, mm; "
+        "`scale_setpoint_mm - correction_mm` is that command",
     )
     sources_mm: dict[str, Links] | None = Field(
-        default=None, description="what joints, frame and each effect ask for, before limits, for each link, mm"
+        default=None,
+        description="how much each cause asks for, for each link, mm: `joints`, `frame`, then by its id what each "
+        "effect adds to those before it; their sum is the correction before its limits",
     )
     u_tip_um: Vector | None = Field(
-        default=None, description="standard uncertainty of the tip in {M} (tool on the plate: in {P}), um"
+        default=None,
+        description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
+        "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
+        "once a second; absent while any of them is not known",
     )
-    shadow: ShadowKeys | None = None
+    shadow: ShadowKeys | None = Field(
+        default=None, description="what the shadow model asks for in this cycle; absent without a shadow"
+    )
 
 
 class ReadingKeys(Keys):
@@ -143,9 +166,9 @@ class ZeroFileKeys(Keys):
 class NoZeroKeys(Keys):
     """Why there is no machine zero."""
 
-    where: str
-    what: str
-    next_step: str
+    where: str = Field(description="the file in which it was looked for")
+    what: str = Field(description="what is wrong")
+    next_step: str = Field(description="what a person is to do")
 
 
 class RecordedTargetKeys(Keys):
@@ -161,24 +184,29 @@ class ReadingsKeys(SentMessage):
     wire_name = "READINGS"
     seq: int = Field(description="number of the cycle")
     time_s: float = Field(description="when the gauges were looked at, s on the daemon's monotonic clock")
-    readings: dict[str, ReadingKeys] = Field(description="by channel")
+    readings: dict[str, ReadingKeys] = Field(description="the reading of each channel, by its name")
     approach: list[Literal[-1, 0, 1]] | None = Field(
-        default=None, description="direction in which each link last moved; 0 until it has"
+        default=None,
+        description="direction in which each link last moved, by the scales of every cycle: 1, -1, or 0 until "
+        "it has; the columns approach_1 ... of a recording",
     )
-    zero: ZeroFileKeys | None = None
+    zero: ZeroFileKeys | None = Field(default=None, description="the machine zero that was subtracted")
     no_zero: NoZeroKeys | None = Field(default=None, description="instead of `zero` where there is none")
     target: RecordedTargetKeys | None = Field(default=None, description="in mode machine_tool")
     model: str | None = Field(default=None, description="hash of the model file that was applied")
     shadow: str | None = Field(default=None, description="hash of the model file that ran as a shadow")
     model_files: dict[str, str] | None = Field(default=None, description="paths of these files, by hash")
-    carried: dict[str, Any] = Field(description="the state from the cycle before, for replay; arrays in base64")
+    carried: dict[str, Any] = Field(
+        description="what the cycle had from the one before it, for replay: where Newton's method starts, the "
+        "correction that stood, the last good comparators, what effects remember; arrays in base64"
+    )
     setpoint: dict[str, Any] = Field(description="the SETPOINT message of this cycle")
 
 
 class ZeroStatusKeys(Keys):
     """Whether there is a machine zero."""
 
-    taken: bool
+    taken: bool = Field(description="whether there is one that fits this configuration")
     taken_at: str | None = Field(default=None, description="when, UTC, ISO 8601")
     reason: str | None = Field(default=None, description="why there is none")
 
@@ -187,7 +215,7 @@ class LoopStatusKeys(Keys):
     """The loop's timing since its start."""
 
     rate_hz: float = Field(description="configured rate, Hz")
-    cycles: int
+    cycles: int = Field(description="cycles that were computed")
     missed_cycles: int = Field(description="cycles that were skipped because one before them took too long")
     period_mean_ms: float | None = Field(default=None, description="mean period, ms")
     period_deviation_ms: float | None = Field(default=None, description="standard deviation of the period, ms")
@@ -202,14 +230,14 @@ class LoopStatusKeys(Keys):
 class PermissionKeys(Keys):
     """Whether the system granted a real-time property."""
 
-    granted: bool
+    granted: bool = Field(description="whether the daemon has it")
     detail: str = Field(description="what the system said")
 
 
 class PublisherStatusKeys(Keys):
     """The sockets."""
 
-    clients: int
+    clients: int = Field(description="clients that are connected")
     dropped_clients: int = Field(description="clients that were too far behind")
     dropped_setpoints: int = Field(description="setpoints that the publisher was too late for")
     packets_sent: int | None = Field(default=None, description="where UDP is configured")
@@ -220,7 +248,7 @@ class GaugePollsKeys(Keys):
     """One gauge on its line."""
 
     quality: Quality = Field(description="of its last poll")
-    polls: int
+    polls: int = Field(description="how often it was asked")
     ok: int = Field(description="polls in which every channel had a value")
     faults: dict[str, int] = Field(description="polls by quality, for every quality that occurred")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
@@ -230,20 +258,20 @@ class GaugePollsKeys(Keys):
 class LineStatusKeys(Keys):
     """One line."""
 
-    state: Literal["opening", "open", "lost", "stopped"]
+    state: Literal["opening", "open", "lost", "stopped"] = Field(description="of its port")
     opened: int = Field(description="how often it was opened")
     lost: int = Field(description="how often it was lost")
     detail: str | None = Field(default=None, description="why it is lost")
     round_s: float | None = Field(default=None, description="duration of the last round of polls, s")
     unexpected_bytes: int | None = Field(default=None, description="bytes that came without a request")
-    gauges: dict[str, GaugePollsKeys] = Field(description="by name")
+    gauges: dict[str, GaugePollsKeys] = Field(description="the gauges on it, by name")
 
 
 class ChannelStatusKeys(Keys):
     """One channel of a gauge."""
 
     channel: str = Field(description='"gauge.channel"')
-    quality: Quality
+    quality: Quality = Field(description="`ok`, or why there is no value")
     measures: str | None = Field(default=None, description="what the wiring says that it measures")
     age_s: float | None = Field(default=None, description="age of its reading, s")
     value: float | None = Field(default=None, description="raw value, before sign and machine zero, in its unit")
@@ -256,10 +284,12 @@ class StatusKeys(VersionKeys):
     wire_name = "STATUS"
     time_s: float = Field(description="now, s on the daemon's monotonic clock")
     mode: Mode = Field(description="cmm, or machine_tool while there is a controller")
-    zero: ZeroStatusKeys
-    model: ModelsKeys
-    loop: LoopStatusKeys
-    realtime: dict[str, PermissionKeys] = Field(description="by name: sched_fifo, locked_memory ...")
-    publisher: PublisherStatusKeys
-    lines: dict[str, LineStatusKeys] = Field(description="by name")
+    zero: ZeroStatusKeys = Field(description="whether there is a machine zero")
+    model: ModelsKeys = Field(description="the models that it runs with, without the paths of their files")
+    loop: LoopStatusKeys = Field(description="how well the loop keeps time")
+    realtime: dict[str, PermissionKeys] = Field(
+        description="what the loop asked the system for, by name: `sched_fifo`, `locked_memory` ..."
+    )
+    publisher: PublisherStatusKeys = Field(description="the clients")
+    lines: dict[str, LineStatusKeys] = Field(description="every line, by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import ValidationError
 
@@ -25,19 +25,34 @@ QUOTED_CHARACTERS = 40
 
 
 class ErrorCode(StrEnum):
-    """What was wrong with a request: `code` of an ERROR message."""
+    """What was wrong with a request: `code` of an ERROR message. text : when it is sent, for people."""
 
-    BAD_JSON = "bad_json"  # not one JSON object on one line
-    LINE_TOO_LONG = "line_too_long"
-    UNKNOWN_CLASS = "unknown_class"
-    BAD_MESSAGE = "bad_message"  # a key is missing, unknown, of the wrong type or out of range
-    ROLE_TAKEN = "role_taken"  # another client is the controller
-    NOT_CONTROLLER = "not_controller"
-    UNIX_ONLY = "unix_only"  # asked over TCP for what only the Unix socket allows
-    BUSY = "busy"
-    ZERO_REFUSED = "zero_refused"
-    MODEL_REFUSED = "model_refused"
-    TOO_MANY_CLIENTS = "too_many_clients"
+    text: str
+
+    def __new__(cls, name: str, text: str) -> Self:
+        code = str.__new__(cls, name)
+        code._value_ = name
+        code.text = text
+        return code
+
+    BAD_JSON = "bad_json", "the line is not one JSON object; NaN and Infinity are not JSON either"
+    LINE_TOO_LONG = "line_too_long", f"the line has more than {MAX_LINE_BYTES} bytes; it is skipped"
+    UNKNOWN_CLASS = "unknown_class", "there is no such message"
+    BAD_MESSAGE = "bad_message", "a key is missing, unknown, of the wrong type or out of range"
+    ROLE_TAKEN = "role_taken", "`TARGET` while another client is the controller"
+    NOT_CONTROLLER = "not_controller", "`RELEASE` from a client that is not the controller"
+    UNIX_ONLY = "unix_only", "asked over TCP for what only the Unix socket allows"
+    BUSY = "busy", "machine zero is being taken already, or another model is being read"
+    ZERO_REFUSED = "zero_refused", "a gauge was not good, the machine moved, or the disk refused; `text` says which"
+    MODEL_REFUSED = (
+        "model_refused",
+        "the model file cannot be used: it is another machine's, or an effect lacks its gauge; `text` says every "
+        "problem, and which gauge to add",
+    )
+    TOO_MANY_CLIENTS = (
+        "too_many_clients",
+        "no further client is accepted; sent instead of `VERSION`, then the connection is closed",
+    )
 
 
 class ProtocolError(Exception):

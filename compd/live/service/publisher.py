@@ -30,7 +30,7 @@ from compd.live.service.requests import Requests
 
 # Half a second at 1 kHz: longer than any pause of the publisher that is not a fault.
 _QUEUE_LENGTH = 512
-_MAX_CLIENTS = 32
+MAX_CLIENTS = 32
 
 _log = structlog.get_logger()
 
@@ -134,8 +134,8 @@ class Publisher:
         if not local:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         session = ClientSession(connection, "unix" if local else f"{address[0]}:{address[1]}", local)
-        if len(self._sessions) >= _MAX_CLIENTS:
-            session.send(ProtocolError(ErrorCode.TOO_MANY_CLIENTS, f"{_MAX_CLIENTS} clients at most").to_json())
+        if len(self._sessions) >= MAX_CLIENTS:
+            session.send(ProtocolError(ErrorCode.TOO_MANY_CLIENTS, f"{MAX_CLIENTS} clients at most").to_json())
             session.close()
             return
         self._sessions.add(session)

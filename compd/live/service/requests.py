@@ -121,13 +121,16 @@ class WatchKeys(SentMessage):
 
 
 class WatchRequest(Request):
-    """Send me setpoints, or the readings behind them, from now on; answered by WATCH with the same keys."""
+    """Asks for setpoints, or for the readings behind them, from now on.
+
+    The answer has the same keys. Then the messages come until the connection ends or another `WATCH` asks for others.
+    """
 
     wire_name = "WATCH"
     reply = WatchKeys
     what: Literal["setpoints", "readings"] = Field(
         default="setpoints",
-        description="setpoints: SETPOINT messages; readings: READINGS messages, over the Unix socket only",
+        description="setpoints: `SETPOINT` messages; readings: `READINGS` messages, over the Unix socket only",
     )
     rate_hz: Annotated[int | float, Field(ge=0, le=LARGEST_NUMBER)] = Field(
         default=math.inf, description="messages per second (Hz); left out: one for every cycle; 0: none"
@@ -146,9 +149,10 @@ class WatchRequest(Request):
 
 
 class TargetRequest(Request):
-    """Compute the setpoints for this target of the tip. There is no answer; the next setpoint is for it.
+    """Asks for setpoints that bring the tip to this target. There is no answer; the next setpoint is for it.
 
-    The first client that sends one is the controller, until it sends RELEASE or its connection ends.
+    The first client that sends a valid one is the controller, until it sends `RELEASE` or its connection ends. Which of
+    the two tips it gives depends on where the machine has its tool.
     """
 
     wire_name = "TARGET"
@@ -187,7 +191,7 @@ class ReleaseKeys(SentMessage):
 
 
 class ReleaseRequest(Request):
-    """Take the controller's role back from me: the mode is CMM again. Answered by RELEASE."""
+    """Gives the controller's role back: the mode is CMM again."""
 
     wire_name = "RELEASE"
     reply = ReleaseKeys
@@ -200,7 +204,7 @@ class ReleaseRequest(Request):
 
 
 class StatusRequest(Request):
-    """How is the daemon doing? Answered by STATUS."""
+    """Asks how the daemon, its lines and its gauges are doing."""
 
     wire_name = "STATUS"
     reply = StatusKeys
@@ -210,7 +214,7 @@ class StatusRequest(Request):
 
 
 class VersionRequest(Request):
-    """Which daemon, machine and configuration is this? Answered by VERSION, which also greets every new client."""
+    """Asks which daemon, machine and configuration this is. The answer also greets every new client."""
 
     wire_name = "VERSION"
     reply = VersionKeys
@@ -229,7 +233,10 @@ class ZeroKeys(SentMessage):
 
 
 class ZeroRequest(Request):
-    """Take machine zero, with the machine at rest at its zero position. Answered by ZERO after about a second."""
+    """Takes machine zero, with the machine at rest at its zero position. The answer comes after about a second.
+
+    It does not come in turn: other answers may come before it.
+    """
 
     wire_name = "ZERO"
     reply = ZeroKeys
@@ -248,9 +255,11 @@ class ModelKeys(SentMessage, ModelsKeys):
 
 
 class ModelRequest(Request):
-    """Which models does the daemon run with? With `file`, adopt that one first. Answered by MODEL.
+    """Asks which models the daemon runs with; with `file` the daemon adopts that one first.
 
-    For clients of the Unix socket alone: both request and answer name files of the daemon's computer.
+    With a file the answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
+    `model_refused` comes, and nothing has changed. An adopted model lasts until the daemon starts anew. Only clients
+    of the Unix socket may ask, because request and answer name files of the daemon's computer.
     """
 
     wire_name = "MODEL"

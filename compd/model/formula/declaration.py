@@ -15,7 +15,7 @@ from compd.arrays import FloatArray
 from compd.errors import ConfigurationError, Problem
 from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, Port
 from compd.model.formula.evaluator import Formula
-from compd.model.formula.parser import LARGEST_EXPONENT, parse
+from compd.model.formula.parser import LARGEST_EXPONENT, LONGEST, parse
 from compd.model.observations import Observations
 
 PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
@@ -25,9 +25,24 @@ GRID = 9
 UM = 1e-3  # mm
 TO_MM: Mapping[str, float] = {"um": UM, "mm": 1.0}
 
-# Columns that every machine has: at ports with one value per link, and at all ports.
-OF_LINK = ("scale_mm", "link_mm", "direction", "velocity_mm_per_s", "axial_force_N", "temperature_link")
-ANYWHERE = ("time_s", "tip_x_mm", "tip_y_mm", "tip_z_mm")
+# Columns that every machine has: at ports with one value per link, at ports of readings, and at all ports.
+OF_LINK: Mapping[str, str] = {
+    "scale_mm": "reading of the link's scale since machine zero, mm",
+    "link_mm": "length of the link, mm",
+    "direction": "1 or -1 as the link last moved, 0 where that is not known",
+    "velocity_mm_per_s": "speed of the link, mm/s",
+    "axial_force_N": "axial force in the link, N, tension positive; needs the force on the tip",
+    "temperature_link": "temperature of the link, degC; any other quantity `NAME_link_<i>_UNIT` likewise as "
+    "`NAME_link_UNIT`",
+}
+OF_READING: Mapping[str, str] = {"reading_mm": "the comparator's or the scale's own reading since machine zero, mm"}
+ANYWHERE: Mapping[str, str] = {
+    "time_s": "time, s",
+    "tip_x_mm": "x of the tip in {M}, mm",
+    "tip_y_mm": "y of the tip in {M}, mm",
+    "tip_z_mm": "z of the tip in {M}, mm",
+}
+READING_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
 _PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
 _QUANTITY = re.compile(r"^[a-z][a-z0-9_]*_[A-Za-z0-9]+$")
 
@@ -39,10 +54,12 @@ class FormulaParameter(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    unit: str
-    plausible: tuple[Finite, Finite]
-    source: str
-    per: Literal["machine", "link"] = "machine"
+    unit: str = Field(description="its unit, for people; the formula's numbers are not converted")
+    plausible: tuple[Finite, Finite] = Field(description="lowest and highest value that is plausible")
+    source: str = Field(description="where that range comes from")
+    per: Literal["machine", "link"] = Field(
+        default="machine", description="one value for the machine, or one for each link"
+    )
 
 
 class FormulaDeclaration(BaseModel):
@@ -50,17 +67,24 @@ class FormulaDeclaration(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    id: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-    port: Literal["scale", "joint", "frame", "link", "base_joint", "platform_joint", "plate", "tool", "reference"]
-    formula: str
-    gives: Literal["um", "mm"] = "um"
-    axis: Literal["x", "y", "z"] | None = None
+    id: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")] = Field(description="name of the effect")
+    port: Literal["scale", "joint", "frame", "link", "base_joint", "platform_joint", "plate", "tool", "reference"] = (
+        Field(description="where it acts")
+    )
+    formula: str = Field(description=f"what it adds there, in columns and parameters; at most {LONGEST} characters")
+    gives: Literal["um", "mm"] = Field(default="um", description="unit of the formula's value")
+    axis: Literal["x", "y", "z"] | None = Field(
+        default=None, description=f"along which axis; needed at the ports {', '.join(VECTORS)}, and only there"
+    )
     parameters: Annotated[
         dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaParameter], Field(min_length=1)
-    ]
-    physics: str = "Written as a formula."
-    mistaken_for: tuple[str, ...] = ()
-    separated_by: str = "rows in which the formula's columns change on their own"
+    ] = Field(description="the parameters that the formula names; each term holds one that is fitted")
+    physics: str = Field(default="Written as a formula.", description="what happens, in a sentence")
+    mistaken_for: tuple[str, ...] = Field(default=(), description="ids of effects that look alike")
+    separated_by: str = Field(
+        default="rows in which the formula's columns change on their own",
+        description="measurements that tell it from others",
+    )
 
 
 def formula_effect(source: Mapping[str, Any], where: str) -> Effect:
@@ -141,7 +165,7 @@ def _parameter_problems(declaration: FormulaDeclaration, formula: Formula, where
                     allowed="[low, high], low < high",
                 )
             )
-        if name in (*OF_LINK, *ANYWHERE, "pi", "reading_mm"):
+        if name in (*OF_LINK, *OF_READING, *ANYWHERE, "pi"):
             problems.append(
                 Problem(
                     where=place, what="this name is a column's", value=name, next_step="call the parameter otherwise"
@@ -174,7 +198,7 @@ def _needs_of_column(name: str, port: Port) -> list[str] | Problem:
     """What has to be measured for a column of a formula."""
     if name in ANYWHERE:
         return ["time"] if name == "time_s" else []
-    if name == "reading_mm" and port in ("scale", "joint", "frame"):
+    if name in OF_READING and port in READING_PORTS:
         return []
     per_link = name in OF_LINK or _PER_LINK_COLUMN.match(name) is not None
     if per_link and port not in PER_LINK:

@@ -6,23 +6,36 @@ import ast
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.model.memory import State, lag
 
-FUNCTIONS: Mapping[str, tuple[int, Callable[..., FloatArray]]] = {
-    "sin": (1, np.sin),
-    "cos": (1, np.cos),
-    "exp": (1, np.exp),
-    "log": (1, np.log),
-    "sqrt": (1, np.sqrt),
-    "abs": (1, np.abs),
-    "sign": (1, np.sign),
-    "minimum": (2, np.minimum),
-    "maximum": (2, np.maximum),
+
+class Function(NamedTuple):
+    """A function of a formula. call : as people write it; meaning : for the reference."""
+
+    arguments: int
+    apply: Callable[..., FloatArray]
+    call: str
+    meaning: str
+
+
+FUNCTIONS: Mapping[str, Function] = {
+    "sin": Function(1, np.sin, "sin(x)", "sine of x in radians"),
+    "cos": Function(1, np.cos, "cos(x)", "cosine of x in radians"),
+    "exp": Function(1, np.exp, "exp(x)", "e to the power of x"),
+    "log": Function(1, np.log, "log(x)", "natural logarithm"),
+    "sqrt": Function(1, np.sqrt, "sqrt(x)", "square root"),
+    "abs": Function(1, np.abs, "abs(x)", "absolute value"),
+    "sign": Function(1, np.sign, "sign(x)", "-1, 0 or 1"),
+    "minimum": Function(2, np.minimum, "minimum(x, y)", "the smaller of two values"),
+    "maximum": Function(2, np.maximum, "maximum(x, y)", "the larger of two values"),
 }
+# Not one of FUNCTIONS, because it remembers: its call and meaning, for the reference.
+LAG = ("lag(x, tau)", "x as it arrives after a first-order lag with the time constant tau, s; x itself at the start")
 OPERATORS: Mapping[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
@@ -109,7 +122,7 @@ class _Evaluation:
             case ast.Call(func=ast.Name(id="lag"), args=[value, tau]):
                 return {None: self._apply_lag(self.terms(value)[None], float(self.terms(tau)[None][0, 0]))}
             case ast.Call(func=ast.Name(id=name), args=arguments):
-                return {None: FUNCTIONS[name][1](*(self.terms(argument)[None] for argument in arguments))}
+                return {None: FUNCTIONS[name].apply(*(self.terms(argument)[None] for argument in arguments))}
         raise AssertionError("`parse` refuses every other node")
 
     def _value_of_name(self, name: str) -> Terms:

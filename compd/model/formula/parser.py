@@ -134,7 +134,7 @@ class _Checker:
             return
         if name not in FUNCTIONS:
             raise self._error(node, f"there is no function {name!r}", ALLOWED)
-        count = FUNCTIONS[name][0]
+        count = FUNCTIONS[name].arguments
         if len(arguments) != count:
             raise self._error(node, f"{name} has {len(arguments)} arguments", f"{count}")
         for argument in arguments:

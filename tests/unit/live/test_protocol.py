@@ -14,8 +14,8 @@ from compd.clock import MonotonicClock
 from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError, Problem, StateError
 from compd.live.loop.commands import Commands
-from compd.live.loop.setpoint import Mode, Setpoint, SetpointValues
-from compd.live.loop.states import State
+from compd.live.loop.setpoint import Setpoint, SetpointValues
+from compd.live.loop.states import Mode, State
 from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.publisher import Publisher
 from compd.live.service.requests import REQUESTS, Asker, Requests, TargetKeys

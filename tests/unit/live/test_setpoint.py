@@ -10,8 +10,9 @@ import zlib
 import numpy as np
 import pytest
 
-from compd.live.loop.setpoint import PACKET_SIZE, Mode, Setpoint, SetpointValues
-from compd.live.loop.states import State
+from compd.live.loop.packet_layout import PACKET_SIZE
+from compd.live.loop.setpoint import Setpoint, SetpointValues
+from compd.live.loop.states import Mode, State
 
 HASH = bytes.fromhex("0123456789abcdef")
 

@@ -1,0 +1,108 @@
+"""The page of the configuration: every key of a machine's YAML file, from the models that check it."""
+
+from __future__ import annotations
+
+from pydantic import TypeAdapter
+
+from compd.configuration.machine_configuration import SECTIONS
+from compd.gauge import GaugeOptions
+from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term
+from docs.generate.schema import Key, ModelSchema, default_text, key_unit
+
+INTRODUCTION = f"""\
+A machine is described by one YAML file. `compd check FILE` reports every error in it at once, each with file, line,
+key, value, what is allowed, and what to do. `compd check --schema > compd.schema.json` writes the JSON Schema, with
+which an editor completes and checks keys while you type.
+
+Lengths are in mm, angles in radians, times in seconds; a quantity's key ends in its unit. Before the unit stands the
+coordinate frame of a vector: `M` is the surface plate, `B` the base platform, `B0` the base platform at
+{term("machine zero")}, `P` the moving platform. A rotation is a rotation vector: the direction of its axis times the
+angle. Links, joints and {term("comparator", "comparators")} count from 1. A key with the default "-" may be left
+out. A key that is not listed here is an error.
+
+[Describe a machine](../how-to/describe-a-machine.md) goes through the sections in order.
+"""
+GAUGES = """\
+The gauges, by name. Every other key belongs to the gauge's driver: see [gauges and drivers](gauges.md).
+"""
+
+
+def page() -> str:
+    """Markdown, from `SECTIONS`."""
+    sections = [*SECTIONS, "gauges"]
+    return join(
+        "# Configuration of a machine",
+        INTRODUCTION,
+        table(
+            ["section", "what it describes"],
+            [[link(code(name), target("configuration", name)), escape(_meaning(name))] for name in sections],
+        ),
+        *(_section(name) for name in SECTIONS),
+        heading(2, "`gauges`", target("configuration", "gauges")),
+        GAUGES,
+        keys_table(ModelSchema(GaugeOptions).keys()),
+        "## Example",
+        "The tripod that compd ships with, `config/tripod-cmm.yaml`:",
+        "```{literalinclude} ../../config/tripod-cmm.yaml\n:language: yaml\n```\n",
+    )
+
+
+def keys_table(keys: list[Key]) -> str:
+    """Keys that a person writes: name, type with its unit, default, meaning."""
+    return table(["key", "value", "default", "meaning"], [_row(key) for key in keys])
+
+
+def _row(key: Key) -> list[str]:
+    unit = key_unit(key.name)
+    return [code(key.name), key.type_text + (f"; {unit}" if unit else ""), default_text(key), key.meaning]
+
+
+def _meaning(name: str) -> str:
+    if name == "gauges":
+        return GAUGES.partition(".")[0] + "."
+    schema = TypeAdapter(SECTIONS[name]).json_schema()
+    return sentence(str(schema["description"]).partition("\n")[0])
+
+
+def _section(name: str) -> str:
+    """One section with all that is nested in it, each under its path in the file."""
+    paths = _paths(name)
+    schema = ModelSchema(SECTIONS[name], lambda model: link(code(paths[model]), target("configuration", paths[model])))
+    blocks = [
+        heading(2, code(name), target("configuration", name)),
+        escape(sentence(schema.description(schema.schema))),
+    ]
+    if "properties" in schema.schema:
+        blocks.append(keys_table(schema.keys()))
+    else:
+        blocks.append(f"Value: {schema.type_text(schema.schema)}.")
+    for model, path in paths.items():
+        blocks += [
+            heading(3, code(path), target("configuration", path)),
+            escape(schema.description(schema.definitions[model])),
+            keys_table(schema.keys(model)),
+        ]
+    return join(*blocks)
+
+
+def _paths(section: str) -> dict[str, str]:
+    """The models nested in a section, in the order of the file, and where each stands: base -> `geometry.base`."""
+    schema = ModelSchema(SECTIONS[section])
+    paths: dict[str, str] = {}
+
+    def walk(properties: dict[str, dict[str, object]], path: str) -> None:
+        for key, part in properties.items():
+            models = schema.models(part)
+            for model in models:
+                definition = schema.definitions[model]
+                nested = f"{path}.{key}" if key else path
+                paths.setdefault(model, nested if len(models) == 1 else f"{nested} ({_choice(definition)})")
+                walk(definition["properties"], nested)
+
+    walk(dict(schema.schema.get("properties", {"": schema.schema})), section)
+    return paths
+
+
+def _choice(definition: dict[str, dict[str, dict[str, str]]]) -> str:
+    """What tells the models of a union apart: `kind: serial`."""
+    return next(f"{key}: {part['const']}" for key, part in definition["properties"].items() if "const" in part)

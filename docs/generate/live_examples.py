@@ -1,0 +1,144 @@
+"""Messages as they went over the socket of a daemon on the simulated tripod. This module is no page."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from io import BufferedReader
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from compd.configuration import load
+from compd.configuration.shipped import shipped_configuration
+from compd.demo.processes import Command, run_commands
+
+TIMEOUT_S = 30.0
+# Messages are long; of a list or mapping of likes so many are shown.
+MOST_ENTRIES = 2
+LONGEST_TEXT = 60
+Message = dict[str, Any]
+
+
+class Exchange(NamedTuple):
+    """What a client sent, None where it sent nothing, and what the daemon said then."""
+
+    sent: Message | None
+    received: tuple[Message, ...]
+
+
+class Connection:
+    """A connection to the daemon's Unix socket; it shows every message, and interprets none."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        self._lines: BufferedReader = connection.makefile("rb")
+
+    def ask(self, message: Message, *answers: str) -> Exchange:
+        """Send a message and collect the first of each of these classes, in this order."""
+        self._connection.sendall(json.dumps(message).encode() + b"\n")
+        return Exchange(message, tuple(self.next(name) for name in answers))
+
+    def next(self, name: str) -> Message:
+        """The next message of this class; what comes before it is passed over."""
+        return next(message for message in self._messages() if message["class"] in (name, "ERROR"))
+
+    def next_setpoint(self, *states: str) -> Message:
+        """The next setpoint in one of these states."""
+        return next(message for message in self._messages() if message.get("state") in states)
+
+    def _messages(self) -> Iterator[Message]:
+        for line in self._lines:
+            yield json.loads(line)
+
+
+@cache
+def exchanges() -> Mapping[str, Exchange]:
+    """One exchange for every request, by its class, and one each for VERSION unasked, SETPOINT and ERROR."""
+    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
+        directory = Path(temporary)
+        tripod = shipped_configuration("tripod-cmm.yaml")
+        address = str(directory / "compd.sock")
+        simulate = ["simulate", str(tripod), "--directory", temporary, "--zero-hold", "600"]
+        commands = [
+            Command(simulate, ready=directory / "control.sock"),
+            Command(["run", str(directory / tripod.name)], ready=Path(address)),
+        ]
+        with run_commands(commands, directory / "log.txt"), contextlib.ExitStack() as stack:
+            assert load(directory / tripod.name).sockets.unix.path == address
+            client, other = (Connection(stack.enter_context(_connected(address))) for _ in range(2))
+            return _talk(client, other)
+
+
+def _connected(address: str) -> socket.socket:
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(TIMEOUT_S)
+    connection.connect(address)
+    return connection
+
+
+def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
+    greeting = client.next("VERSION")
+    client.ask({"class": "WATCH"})
+    client.next_setpoint("no_zero")  # every gauge has been read
+    zero = client.ask({"class": "ZERO"}, "ZERO")
+    setpoint = client.next_setpoint("ok")
+    client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
+    target = client.ask({"class": "TARGET", "tip_B0_mm": [round(number, 1) + 0.0 for number in setpoint["tip_B0_mm"]]})
+    refused = other.ask({"class": "TARGET", "tip_B0_mm": [0.0, 0.0, -500.0]}, "ERROR")
+    watch = client.ask({"class": "WATCH", "rate_hz": 10}, "WATCH")
+    driven = client.next_setpoint("ok", "slewing")
+    client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
+    return {
+        "greeting": Exchange(None, (greeting,)),
+        "WATCH": watch,
+        "SETPOINT": Exchange(None, (setpoint,)),
+        "TARGET": Exchange(target.sent, (driven,)),
+        "ERROR": refused,
+        "RELEASE": client.ask({"class": "RELEASE"}, "RELEASE"),
+        "ZERO": zero,
+        "STATUS": client.ask({"class": "STATUS"}, "STATUS"),
+        "VERSION": client.ask({"class": "VERSION"}, "VERSION"),
+        "MODEL": client.ask({"class": "MODEL"}, "MODEL"),
+        "READINGS": client.ask({"class": "WATCH", "what": "readings", "rate_hz": 1}, "WATCH", "READINGS"),
+    }
+
+
+def shown(message: Message, left_out: Sequence[str] = ()) -> str:
+    """A message as JSON over several lines, long lists and texts cut short: the daemon sends one line.
+
+    left_out : keys of which only the number of keys in them is shown.
+    """
+    short = {key: {"...": f"{len(part)} keys"} if key in left_out else part for key, part in message.items()}
+    return _lines(_shortened(short), "")
+
+
+def _shortened(value: Any) -> Any:
+    if isinstance(value, dict):
+        short = {key: _shortened(part) for key, part in value.items()}
+        if len(short) > MOST_ENTRIES + 1 and len({type(part) for part in value.values()}) == 1 and "class" not in value:
+            return {**dict(list(short.items())[:MOST_ENTRIES]), "...": f"{len(short) - MOST_ENTRIES} more"}
+        return short
+    if isinstance(value, list):
+        short_list = [_shortened(part) for part in value]
+        if len(short_list) > MOST_ENTRIES + 3:
+            return [*short_list[:MOST_ENTRIES], f"... {len(short_list) - MOST_ENTRIES} more"]
+        return short_list
+    return value[:LONGEST_TEXT] + "..." if isinstance(value, str) and len(value) > LONGEST_TEXT else value
+
+
+def _lines(value: Any, indent: str) -> str:
+    """JSON with a line for every key, and whatever is short on one line."""
+    flat = json.dumps(value, ensure_ascii=False)
+    if len(flat) + len(indent) <= 100 and (not isinstance(value, dict) or "class" not in value or len(value) < 4):
+        return flat
+    if isinstance(value, dict):
+        inside = [f"{indent}  {json.dumps(key)}: {_lines(part, indent + '  ')}" for key, part in value.items()]
+        return "{\n" + ",\n".join(inside) + f"\n{indent}}}"
+    if isinstance(value, list):
+        inside = [f"{indent}  {_lines(part, indent + '  ')}" for part in value]
+        return "[\n" + ",\n".join(inside) + f"\n{indent}]"
+    return flat

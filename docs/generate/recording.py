@@ -1,0 +1,105 @@
+"""The page of the recording's format: columns, sidecar, rules, ball plate, plan file."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+from compd.live.record.recording_part import CYCLES_SUFFIX
+from compd.recording import ball_plate, checks, plan_file
+from compd.recording.columns import COLUMN_KINDS, DECIMALS
+from compd.recording.sidecar import EXTERNAL, SECTIONS, Exclusion, Reference, sidecar_contents, sidecar_text
+from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, term
+from docs.generate.schema import ModelSchema
+
+INTRODUCTION = f"""\
+A {term("recording")} is what a machine's gauges showed, row by row, with or without a {term("reference")} instrument
+beside it. It is two files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both;
+`compd record` writes them from the running daemon, and `compd join` adds an instrument's export. `compd recording check
+NAME.csv` reports every mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and [record and
+replay](../how-to/record-and-replay.md).
+"""
+TABLE_RULES = """\
+The CSV file has one header row, `,` between cells, `.` as the decimal mark, and is UTF-8. An empty cell is a missing
+value. A column's name ends in its unit.
+"""
+EXTERNAL_MODEL = f"""\
+With `machine: {EXTERNAL}` in the sidecar a column `model_...` stands beside every column `reference_...`: the
+prediction of your own model. Neither gauges nor a configuration are needed then.
+
+Anything else that was measured is a column `<name>_<unit>` in lower case, such as `flow_coolant_l_per_min`; a number
+without unit ends in `_1`. `compd diagnose` tries every such column as an explanation of the error.
+"""
+CYCLES = f"""\
+`compd record` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then for every
+row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed
+from, so `compd replay` computes the same setpoint again, bit for bit. Model files that were in use are copied beside
+it.
+"""
+
+
+def page() -> str:
+    """Markdown, from the tables by which recordings are checked."""
+    return join(
+        "# Recording",
+        INTRODUCTION,
+        heading(2, "Columns", "recording-columns"),
+        TABLE_RULES,
+        table(
+            ["column", "unit", "meaning"],
+            [[codes(kind.names.split(", ")), kind.unit or "-", escape(kind.meaning)] for kind in COLUMN_KINDS],
+        ),
+        EXTERNAL_MODEL,
+        "compd writes "
+        + ", ".join(f"{unit} with {count} decimals" for unit, count in DECIMALS.items())
+        + ", other units in full.",
+        heading(2, "Sidecar", "recording-sidecar"),
+        table(["key", "value", "meaning"], [_section_row(name, kind) for name, kind in SECTIONS.items()]),
+        heading(3, "`reference`", "recording-sidecar-reference"),
+        _keys(Reference),
+        heading(3, "`excluded_rows`", "recording-sidecar-excluded"),
+        _keys(Exclusion),
+        "For example:",
+        fence(sidecar_text(_example()), "yaml"),
+        heading(2, "Rules and limits", "recording-rules"),
+        prose((inspect.getdoc(checks) or "").partition("\n")[2]),
+        table(
+            ["columns", "plausible", "meaning"],
+            [[_names(limit.names), f"{limit.low:g} to {limit.high:g}", escape(limit.why)] for limit in checks.LIMITS],
+        ),
+        heading(2, "Ball plate", "recording-ball-plate"),
+        prose(inspect.getdoc(ball_plate) or ""),
+        table(["column", "meaning"], [[code(name), escape(meaning)] for name, meaning in ball_plate.COLUMNS.items()]),
+        heading(2, "Cycles for a replay", "recording-cycles"),
+        CYCLES,
+        heading(2, "Plan file", "recording-plan"),
+        prose(inspect.getdoc(plan_file) or ""),
+    )
+
+
+def _names(names: str) -> str:
+    return names if " " in names.replace(", ", "") else codes(names.split(", "))
+
+
+def _section_row(name: str, kind: Any) -> list[str]:
+    refer = {
+        "Reference": link("`reference`", "recording-sidecar-reference"),
+        "Exclusion": link("exclusions", "recording-sidecar-excluded"),
+    }
+    schema = ModelSchema(kind, refer.__getitem__)
+    return [code(name), schema.type_text(schema.schema), escape(str(schema.schema["description"]))]
+
+
+def _keys(kind: Any) -> str:
+    keys = ModelSchema(kind).keys()
+    return table(["key", "value", "meaning"], [[code(key.name), key.type_text, key.meaning] for key in keys])
+
+
+def _example() -> dict[str, Any]:
+    reference = Reference.model_validate({"quantity": "tool_position", "frame": "machine", "sigma_um": 0.15})
+    return sidecar_contents(
+        "tripod-cmm",
+        {**reference.model_dump(include={"quantity", "frame"}), "sigma_um": reference.sigma_um[0]},
+        {17: "the tracker's beam was cut"},
+        notes="after the new air bearing",
+    )
