@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Columns: TypeAlias = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 # More rows than this are not shown in a notebook; the data frame has all.
-MOST_ROWS = 20
+MOST_ROWS = 12
 # Lines in a grey that is seen on white and on black: notebooks have both.
 _LINE = "border-bottom:1px solid rgba(128,128,128,.4)"
 _CELL = f"padding:.2em .8em .2em 0;{_LINE};vertical-align:top"
@@ -80,4 +80,6 @@ def _text(value: Any) -> str:
     """A cell: four digits of a number, a dash where nothing is known."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "\N{EN DASH}"
-    return f"{float(value):.4g}" if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
