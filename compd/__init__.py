@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 # Name -> the module that has it, in the order of the reference page.
 _MODULES = {
     "load_machine": "compd.configuration.shipped",
+    "simulate_campaign": "compd.simulation.campaign.simulate_campaign",
     "open_recording": "compd.comparison.open",
-    "open_model": "compd.api",
     "compare": "compd.api",
     "diagnose": "compd.api",
     "add_effect": "compd.api",
+    "open_model": "compd.api",
     "plan_measurement": "compd.api",
-    "simulate_campaign": "compd.simulation.campaign.simulate_campaign",
     "connect": "compd.client",
     "Effect": "compd.model.effect",
     "Parameter": "compd.model.effect",

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import yaml
@@ -59,10 +59,14 @@ class ModelStep:
         What was added or removed; ``""`` for a fit of all effects.
     date : str
         UTC, ISO 8601.
-    recording, sha256 : str
-        Name and hash of the recording that it was fitted on.
-    rms_before_um, rms_after_um : float
-        Residual of that recording, root mean square per coordinate, um.
+    recording : str
+        Name of the recording that it was fitted on.
+    sha256 : str
+        Hash of that recording.
+    rms_before_um : float
+        Residual of that recording before the step, root mean square per coordinate, um.
+    rms_after_um : float
+        The same after it.
     noise_floor_um : float
         Noise floor of that recording, um per coordinate.
     replaced : dict
@@ -86,8 +90,29 @@ class ModelStep:
     __pydantic_config__ = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
 
 
-class EffectNumber(NamedTuple):
-    """One number of an effect, in the unit that people read."""
+@dataclass(frozen=True)
+class EffectNumber:
+    """One number of an effect, in the unit that people read.
+
+    Attributes
+    ----------
+    effect : str
+        Id of the effect.
+    parameter : str
+        Name of the parameter; with ``_1``, ``_x`` where there is one per link or axis.
+    value : float
+        Its value, in `unit`.
+    standard_error : float
+        In `unit`; nan where it is not known.
+    unit : str
+        For instance ``"ppm/K"``.
+    plausible_low : float
+        Lower end of the plausible range, in `unit`.
+    plausible_high : float
+        Upper end of the plausible range, in `unit`.
+    searched : bool
+        A nonlinear constant, which was searched and has no standard error.
+    """
 
     effect: str
     parameter: str
@@ -222,8 +247,8 @@ class ModelFile:
         return numbers
 
     def _columns(self) -> Columns:
-        numbers = [number._asdict() for number in self.numbers()]
-        return {name: [number[name] for number in numbers] for name in EffectNumber._fields}
+        numbers = self.numbers()
+        return {name: [getattr(number, name) for number in numbers] for name in EffectNumber.__dataclass_fields__}
 
 
 def _square(rows: list[list[float]]) -> list[list[float]]:

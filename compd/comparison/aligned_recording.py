@@ -156,7 +156,7 @@ class AlignedRecording:
 
     @property
     def label_names(self) -> tuple[str, ...]:
-        """(m,) the measured coordinates as parts of column names: "x", "link_1"."""
+        """The m measured coordinates as parts of column names, such as "x" and "link_1"."""
         return tuple(label.replace(" ", "_") for label in self.labels)
 
     def _repr_html_(self) -> str:

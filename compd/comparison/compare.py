@@ -111,14 +111,14 @@ class Comparison:
 
     @property
     def floor_ratio(self) -> float:
-        """(rms / floor)^2, which is the reduced chi-squared: 1 at the noise floor; inf where the floor is 0."""
+        """(rms / floor)^2, which is the reduced chi-squared; 1 at the noise floor, inf where the floor is 0."""
         return (self.rms_um / self.floor.um) ** 2 if self.floor.um > 0 else math.inf
 
     @property
     def at_floor(self) -> bool:
         """Whether noise alone could have made the floor ratio as large as it is.
 
-        F test: a ratio of two variances with as many degrees of freedom as measured values and as the floor rests on.
+        By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor rests on.
         """
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)

@@ -51,10 +51,9 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
     Examples
     --------
     >>> import compd
-    >>> compd.simulate_campaign("tripod-cmm", "monday.csv", seed=3)
     >>> recording = compd.open_recording("monday.csv")
-    >>> recording.labels
-    ('x', 'y', 'z')
+    >>> recording.labels, recording.measured_mm.shape
+    (('x', 'y', 'z'), (608, 3))
     """
     return align_recording(*read_with_machine(Path(path), machine))
 

@@ -59,8 +59,14 @@ class Configuration:
         Driver class of each gauge, by name.
     wiring : Wiring
         Which gauge measures which quantity of the machine.
-    loop, limits, sockets, state
-        How the daemon runs.
+    loop : LoopSettings
+        Rate of the daemon's loop, and what it does when a reading is stale.
+    limits : LimitSettings
+        Largest corrections.
+    sockets : SocketSettings
+        Where clients connect.
+    state : StateSettings
+        What the daemon keeps across restarts.
     warnings : tuple of Problem
         What can be used but is probably a mistake.
     """
@@ -136,17 +142,17 @@ class Configuration:
 
     @property
     def config_hash(self) -> str:
-        """Hash of everything in the file: equal for two daemons with the same configuration."""
+        """Hash of everything in the file, equal for two daemons with the same configuration."""
         return _hash(self, ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"))
 
     @property
     def geometry_hash(self) -> str:
-        """Hash of what a model is fitted on: the geometry without the limits of the links' length."""
+        """Hash of what a model is fitted on, the geometry without the limits of the links' length."""
         return _hash(self, ("geometry",), without=("link_length_mm",))
 
     @property
     def zero_hash(self) -> str:
-        """Hash of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
+        """Hash of what machine zero depends on, geometry, gauges and wiring, but no port, rate, limit or noise."""
         return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))
 
 

@@ -27,8 +27,10 @@ class ParameterEstimate:
     ----------
     name : str
         As the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
-    value, std : float
-        The fitted value and its standard error, both in `unit`.
+    value : float
+        The fitted value, in `unit`.
+    std : float
+        Its standard error, in `unit`.
     unit : str
         For instance ``"ppm/K"``.
     plausible : bool
@@ -183,8 +185,14 @@ class CandidateResult:
         ``"explains"``, ``"partial"``, ``"no_gain"`` or ``"not_testable"``.
     why : str
         The reason for the status, in words.
-    heldout_rms_um, explained_fraction, p_value, parameters
-        As in DiagnosisStep.
+    heldout_rms_um : float
+        Error on rows that were left out, with the effect alone, um per coordinate.
+    explained_fraction : float
+        Share of what is above the noise floor that it explains alone, 0 to 1.
+    p_value : float
+        Probability of so high a score by noise alone, corrected for all effects that were tried.
+    parameters : tuple of ParameterEstimate
+        Its numbers with standard errors.
     """
 
     effect: str
@@ -219,8 +227,10 @@ class Diagnosis:
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
         ``"unexplained"``: the library has no such cause; `depends_on` says what the error follows.
         ``"not_testable"``: the recording varies nothing by which an effect could be tested.
-    before, after : Comparison
-        The recording against the model as it was, and with the effects of `steps`.
+    before : Comparison
+        The recording against the model as it was.
+    after : Comparison
+        The same against the model with the effects of `steps`.
     steps : tuple of DiagnosisStep
         The effects that were found, in the order in which they were taken.
     candidates : tuple of CandidateResult

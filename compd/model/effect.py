@@ -105,8 +105,10 @@ class Constant:
 
     Attributes
     ----------
-    name, unit : str
-        As the effect's equation names it, and its unit.
+    name : str
+        As the effect's equation names it.
+    unit : str
+        For instance ``"s"``.
     low, high : float
         Plausible range, in `unit`.
     source : str
@@ -152,10 +154,12 @@ class Effect:
         ``"revolute_axis"``, ``"plate"``, ``"tool"``, ``"reference"``.
     physics : str
         What happens, in a sentence.
-    equation, source : str
-        As a paper would give them.
+    equation : str
+        As a paper would give it.
     symbols : dict
         Meaning and unit of each symbol of the equation.
+    source : str
+        Where the equation is from.
     needs : tuple of str
         Quantities by name (``{link}`` stands for each link), or ``"force"``, ``"direction"``, ``"motion"``,
         ``"time"``, ``"order"`` (of the rows), ``"revolute_axes"``, ``"plate_thickness_mm"``.

@@ -18,7 +18,15 @@ from compd.diagnosis.verdict import (
     ParameterEstimate,
     Rival,
 )
-from compd.errors import Problem
+from compd.errors import (
+    ConfigurationError,
+    DaemonError,
+    KinematicsError,
+    PluginError,
+    Problem,
+    RecordingError,
+    StateError,
+)
 from compd.model.effect import FittedEffect
 from compd.model_file import EffectNumber, ModelFile, ModelStep
 from compd.simulation.campaign.simulate_campaign import CampaignFiles
@@ -41,7 +49,28 @@ RESULTS: tuple[type, ...] = (
     MeasurementPlan,
     CampaignFiles,
     Client,
+)
+# What is behind a CompdError.
+ERRORS: tuple[type, ...] = (
+    ConfigurationError,
+    RecordingError,
+    StateError,
+    KinematicsError,
+    PluginError,
+    DaemonError,
     Problem,
+)
+# Public for the rooms of compd, of no use in a notebook.
+INTERNAL = (
+    "attitude_residual_urad",
+    "columns",
+    "gauge_objects",
+    "predicted_mm",
+    "registration_columns",
+    "sensitivity",
+    "state",
+    "usable",
+    "write_to",
 )
 HEAD = """# Python interface
 
@@ -64,15 +93,21 @@ def page() -> str:
     public = {name: getattr(compd, name) for name in compd.__all__}
     functions = [f"compd.{name}" for name, value in public.items() if inspect.isfunction(value)]
     classes = [f"compd.{name}" for name, value in public.items() if inspect.isclass(value)]
-    results = [f"{kind.__module__}.{kind.__qualname__}" for kind in RESULTS]
+    effects = [name for name in classes if not issubclass(getattr(compd, name.removeprefix("compd.")), Exception)]
+    errors = [name for name in classes if name not in effects]
     sections = {
         "Functions": [_directive("autofunction", name) for name in functions],
-        "Effects and errors": [_directive("autoclass", name) for name in classes],
-        "Results": [_directive("autoclass", name) for name in results],
+        "Results": [_directive("autoclass", f"{_path(kind)}()") for kind in RESULTS],
+        "Effects": [_directive("autoclass", name) for name in effects],
+        "Errors": [_directive("autoclass", name) for name in [*errors, *map(_path, ERRORS)]],
     }
     return "\n".join([HEAD, *(line for title, parts in sections.items() for line in (f"## {title}", "", *parts))])
 
 
+def _path(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
 def _directive(kind: str, name: str) -> str:
-    options = "   :members:\n" if kind == "autoclass" else ""
+    options = f"   :members:\n   :exclude-members: {', '.join(INTERNAL)}\n" if kind == "autoclass" else ""
     return f"```{{eval-rst}}\n.. {kind}:: {name}\n{options}```\n"

@@ -28,8 +28,10 @@ class CampaignFiles:
         NAME.csv, with its sidecar NAME.yaml beside it.
     answer : Path
         NAME.answer.json: what was hidden, and how strong. Leave it shut if you want to find out by a diagnosis.
-    rows, columns : int
-        Size of the recording.
+    rows : int
+        Rows of the recording.
+    columns : int
+        Columns of the recording.
     measured : int
         Rows in which the reference measured; in the others only the gauges were read.
     planned : int
@@ -99,8 +101,8 @@ def simulate_campaign(
     --------
     >>> import compd
     >>> files = compd.simulate_campaign("tripod-cmm", "monday.csv", seed=5, hidden=125)
-    >>> files.rows
-    608
+    >>> files.rows, files.measured
+    (608, 608)
     """
     path = Path(out)
     path = path if path.suffix == ".csv" else path.with_name(f"{path.name}.csv")
