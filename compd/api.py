@@ -61,8 +61,9 @@ def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
     --------
     >>> import compd
     >>> model = compd.open_model("tripod.model.yaml")
-    >>> [(number.parameter, round(number.value, 2), number.unit) for number in model.numbers()]
-    [('a', 1.11, 'ppm/K')]
+    >>> for number in model.numbers():
+    ...     print(number.parameter, round(number.value, 2), number.unit)
+    a 1.11 ppm/K
     """
     path = Path(path)
     if machine is None:
@@ -102,8 +103,10 @@ def compare(recording: Recorded, model: Model = None) -> Comparison:
     --------
     >>> import compd
     >>> comparison = compd.compare("monday.csv")
-    >>> round(comparison.rms_um, 2), round(comparison.floor.um, 2)  # error per coordinate, and noise alone
-    (0.82, 0.16)
+    >>> round(comparison.rms_um, 2)  # error, um per coordinate
+    0.82
+    >>> round(comparison.floor.um, 2)  # what noise alone would be
+    0.16
     """
     aligned = _opened(recording)
     file = _opened_model(model, aligned)
@@ -257,10 +260,12 @@ def plan_measurement(
     Examples
     --------
     >>> import compd
-    >>> files = compd.simulate_campaign("tripod-cmm", "loads.csv", seed=5, effects=["link_elasticity=60"])
-    >>> plan = compd.plan_measurement("loads.csv", ("link_elasticity", "joint_contact"), rows=20, force_N=100.0)
-    >>> round(plan.before, 1), round(plan.separation, 1)  # in standard deviations of the noise
-    (1.7, 17.2)
+    >>> elastic = ["link_elasticity=60"]  # N/um
+    >>> files = compd.simulate_campaign("tripod-cmm", "loads.csv", seed=5, effects=elastic)
+    >>> rivals = ("link_elasticity", "joint_contact")
+    >>> plan = compd.plan_measurement("loads.csv", rivals, rows=20, force_N=100.0)
+    >>> plan.summary
+    'link_elasticity and joint_contact differ by 1.7 times the noise ...'
     >>> plan.write("next.csv")
     """
     if len(rivals) != 2 or rivals[0] == rivals[1]:

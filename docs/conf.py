@@ -21,6 +21,7 @@ autodoc_typehints_description_target = "documented_params"
 autodoc_type_aliases = dict.fromkeys(("FloatArray", "BoolArray", "IntArray", "TextArray"), "numpy.ndarray")
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
+napoleon_use_ivar = True
 # `name` in a docstring: a link where it is a documented name, code elsewhere
 default_role = "py:obj"
 

@@ -118,7 +118,8 @@ class Comparison:
     def at_floor(self) -> bool:
         """Whether noise alone could have made the floor ratio as large as it is.
 
-        By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor rests on.
+        By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor
+        rests on.
         """
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)

@@ -282,7 +282,9 @@ def memoryless_basis(columns: Callable[[Observations, ConstantValues], FloatArra
     Examples
     --------
     >>> import compd
-    >>> basis = compd.memoryless_basis(lambda rows, constants: (1e-6 * rows.link_mm)[:, :, None])
+    >>> def longer(rows, constants):  # each link by 1 ppm of its length
+    ...     return (1e-6 * rows.link_mm)[:, :, None]
+    >>> basis = compd.memoryless_basis(longer)
     """
 
     def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:

@@ -100,7 +100,8 @@ def simulate_campaign(
     Examples
     --------
     >>> import compd
-    >>> files = compd.simulate_campaign("tripod-cmm", "monday.csv", seed=5, hidden=125)
+    >>> where = "monday.csv"
+    >>> files = compd.simulate_campaign("tripod-cmm", where, seed=5, hidden=125)
     >>> files.rows, files.measured
     (608, 608)
     """
