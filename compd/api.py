@@ -18,7 +18,7 @@ from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.next_measurement import MeasurementPlan
+from compd.diagnosis.next_measurement import MeasurementPlan, require_kinematics
 from compd.diagnosis.next_measurement import plan_measurement as plan_fitted_rivals
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
@@ -264,8 +264,8 @@ def plan_measurement(
     >>> files = compd.simulate_campaign("tripod-cmm", "loads.csv", seed=5, effects=elastic)
     >>> rivals = ("link_elasticity", "joint_contact")
     >>> plan = compd.plan_measurement("loads.csv", rivals, rows=20, force_N=100.0)
-    >>> plan.summary
-    'link_elasticity and joint_contact differ by 1.7 times the noise ...'
+    >>> print(f"{plan.before:.0f} -> {plan.separation:.0f}")  # standard deviations of the noise
+    30 -> 36
     >>> plan.write("next.csv")
     """
     if len(rivals) != 2 or rivals[0] == rivals[1]:
@@ -280,6 +280,7 @@ def plan_measurement(
         )
     effects = [find_effect(name, "rivals") for name in rivals]
     aligned = _opened(recording)
+    require_kinematics(aligned)
     file = _opened_model(model, aligned)
     present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in rivals]
     if present:

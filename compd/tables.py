@@ -26,8 +26,7 @@ Columns: TypeAlias = Mapping[str, Sequence[Any] | NDArray[Any]]
 # More rows than this are not shown in a notebook; the data frame has all.
 MOST_ROWS = 12
 # Lines in a grey that is seen on white and on black: notebooks have both.
-_LINE = "border-bottom:1px solid rgba(128,128,128,.4)"
-_CELL = f"padding:.2em .8em .2em 0;{_LINE};vertical-align:top"
+_ROW = '<tr style="border-bottom:1px solid rgba(128,128,128,.4);vertical-align:top">'
 
 
 def data_frame(columns: Columns) -> pd.DataFrame:
@@ -50,13 +49,16 @@ def html_table(verdict: str, columns: Columns, remarks: Iterable[str] = ()) -> s
     rows = list(zip(*columns.values(), strict=True))
     head = "".join(_cell("th", name, numeric=_is_numeric(values)) for name, values in columns.items())
     body = "".join(
-        "<tr>" + "".join(_cell("td", _text(value), numeric=_is_number(value)) for value in row) + "</tr>"
+        _ROW + "".join(_cell("td", _text(value), numeric=_is_number(value)) for value in row) + "</tr>"
         for row in rows[:MOST_ROWS]
     )
-    table = f'<table style="border-collapse:collapse"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+    table = (
+        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums">'
+        f"<thead>{_ROW}{head}</tr></thead><tbody>{body}</tbody></table>"
+    )
     more = [f"{len(rows) - MOST_ROWS} more rows; to_dataframe() has all of them"] if len(rows) > MOST_ROWS else []
     return (
-        f'<div><p style="max-width:50em"><strong>{escape(verdict)}</strong></p>'
+        f'<div style="overflow-x:auto"><p style="max-width:50em"><strong>{escape(verdict)}</strong></p>'
         + (table if rows else "")
         + "".join(f'<p style="max-width:50em;margin:.3em 0">{escape(remark)}</p>' for remark in [*more, *remarks])
         + "</div>"
@@ -64,8 +66,8 @@ def html_table(verdict: str, columns: Columns, remarks: Iterable[str] = ()) -> s
 
 
 def _cell(tag: str, text: str, *, numeric: bool) -> str:
-    style = f"{_CELL};text-align:{'right' if numeric else 'left'};font-variant-numeric:tabular-nums"
-    return f'<{tag} style="{style}">{escape(text)}</{tag}>'
+    side = "right" if numeric else "left"
+    return f'<{tag} style="padding:.2em .8em .2em 0;text-align:{side}">{escape(text)}</{tag}>'
 
 
 def _is_number(value: Any) -> bool:

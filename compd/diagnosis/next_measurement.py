@@ -17,6 +17,7 @@ from compd.diagnosis.measurement_programmes import Programme, ProgrammeLimits, o
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
+from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file
@@ -181,19 +182,12 @@ def plan_measurement(
         plan = plan_measurement(aligned, (), (spring, contact), sigma_um, recorded_limits(aligned), rows=30)
         plan.before, plan.separation  # by how many standard deviations the two differ, before and after
     """
-    if aligned.model is None:
-        raise RecordingError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="of an external model's machine no measurement can be planned",
-                next_step="write a machine configuration",
-            )
-        )
+    model_of_machine = require_kinematics(aligned)
     names = list(
         dict.fromkeys(name for effect in pair for name in needed_quantities(effect.effect, aligned.rows.links))
     )
     possible = [programme for programme in programmes(aligned, limits, names) if len(programme) <= rows]
-    observations = observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
+    observations = observe_programmes(model_of_machine, aligned.rows.constants, possible, aligned)
     lengths = np.array([len(programme) for programme in possible])
     ends = np.cumsum([0, *lengths])
     refits, sums = _rival_refits(aligned, model, pair, sigma_um, observations, ends)
@@ -211,6 +205,19 @@ def plan_measurement(
         separation=float(np.sqrt(max(discrepancy, 0.0))),
         before=float(before),
     )
+
+
+def require_kinematics(aligned: AlignedRecording) -> MachineModel:
+    """The machine's model. Raises RecordingError for an external one, in which no place can be reached."""
+    if aligned.model is None:
+        raise RecordingError(
+            Problem(
+                where=str(aligned.recording.path),
+                what="of an external model's machine no measurement can be planned",
+                next_step="write a machine configuration",
+            )
+        )
+    return aligned.model
 
 
 def _rival_refits(

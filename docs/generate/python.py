@@ -80,8 +80,8 @@ notebooks](../how-to/use-python.md).
 
 Paths may be texts or `pathlib.Path`. N is the number of rows of a recording, m of its measured coordinates, n of
 links, P of fitted numbers. {M} is the frame of the surface plate, {P} that of the moving platform; every length says
-its unit in its name. A number that is not known is nan, never 0. Every error that compd raises on purpose is a `CompdError`
-whose problems say where, what, which value, what is allowed and what to do.
+its unit in its name. A number that is not known is nan, never 0. Every error that compd raises on purpose is a
+`CompdError` whose problems say where, what, which value, what is allowed and what to do.
 
 Results show themselves as tables in a notebook. Those with `to_dataframe()` need pandas for it, which
 `pip install "compd[notebook]"` installs along.

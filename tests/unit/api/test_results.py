@@ -91,7 +91,7 @@ def test_paths_are_text_or_path_and_files_may_be_open_or_not(
     opened = compd.open_model(tmp_path / "model.yaml")
     assert opened.steps == model.steps
     assert opened.numbers() == model.numbers()
-    assert compd.open_model(str(tmp_path / "model.yaml"), machine="tripod-cmm").fitted == opened.fitted or True
+    assert compd.open_model(str(tmp_path / "model.yaml"), machine="tripod-cmm").numbers() == model.numbers()
 
 
 def test_the_error_falls_to_the_floor_and_the_ledger_says_so(recording: AlignedRecording, model: ModelFile) -> None:
@@ -229,7 +229,7 @@ def test_the_comparison_says_for_each_row_why_it_is_not_used(comparison: Compari
     assert table.loc[21, "residual_x_um"] > 1e5
     counts = {text: int(count) for text, count in why[why != ""].value_counts().items()}
     assert counts.pop("beyond all noise") == int(comparison.outlier.sum())
-    assert counts == comparison.left_out | {} or counts == {k: v for k, v in comparison.left_out.items() if v}
+    assert counts == {text: count for text, count in comparison.left_out.items() if count}
 
 
 def test_residuals_are_measured_less_predicted(recording: AlignedRecording, comparison: Comparison) -> None:
@@ -266,13 +266,15 @@ def test_without_pandas_the_next_step_is_said(monkeypatch: pytest.MonkeyPatch) -
 def test_every_result_shows_its_verdict_first_and_names_itself_in_a_line(
     recording: AlignedRecording, comparison: Comparison, diagnosis: Diagnosis, model: ModelFile, plan: MeasurementPlan
 ) -> None:
-    firsts = {
-        compd.load_machine("tripod-cmm"): "tripod-cmm",
-        recording: "run.csv",
-        comparison: "tripod-cmm: measured and modelled differ",
-        diagnosis: "identified: What is missing is link_expansion",
-    }
-    for thing, begin in [*firsts.items(), (model, "Model of tripod-cmm"), (plan, "link_elasticity and joint_contact")]:
+    firsts = [
+        (compd.load_machine("tripod-cmm"), "tripod-cmm"),
+        (recording, "run.csv"),
+        (comparison, "tripod-cmm: measured and modelled differ"),
+        (diagnosis, "identified: What is missing is link_expansion"),
+        (model, "Model of tripod-cmm"),
+        (plan, "link_elasticity and joint_contact"),
+    ]
+    for thing, begin in firsts:
         text = thing._repr_html_()
         assert text.split("<strong>")[1].startswith(begin)
         assert "<table" in text
@@ -305,7 +307,7 @@ def test_html_of_results_escapes_what_people_wrote(path: Path, tmp_path: Path) -
 
 def test_long_tables_are_cut_in_a_notebook_and_say_so() -> None:
     text = html_table("", {"row": list(range(MOST_ROWS + 3))})
-    assert text.count("<tr>") == MOST_ROWS + 1
+    assert text.count("<tr ") == MOST_ROWS + 1
     assert "3 more rows" in text
 
 
