@@ -1,5 +1,60 @@
-"""compd: live error compensation for parallel kinematic machines, after T. Oiwa."""
+"""compd: live error compensation for parallel kinematic machines, after T. Oiwa.
 
-from importlib.metadata import version
+What a program or a notebook needs is here: open a recording, compare it with the model, learn which effect is
+missing, add it, and plan the next measurement. Every name is imported from its module when it is first used, so that
+`import compd` takes milliseconds.
+"""
 
-__version__ = version("compd")
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from compd.api import add_effect as add_effect
+    from compd.api import compare as compare
+    from compd.api import diagnose as diagnose
+    from compd.api import open_model as open_model
+    from compd.api import plan_measurement as plan_measurement
+    from compd.client import connect as connect
+    from compd.comparison.open import open_recording as open_recording
+    from compd.configuration.shipped import load_machine as load_machine
+    from compd.errors import CompdError as CompdError
+    from compd.model.effect import Constant as Constant
+    from compd.model.effect import Effect as Effect
+    from compd.model.effect import Parameter as Parameter
+    from compd.model.effect import memoryless_basis as memoryless_basis
+    from compd.release import __version__ as __version__
+    from compd.simulation.campaign.simulate_campaign import simulate_campaign as simulate_campaign
+
+# Name -> the module that has it, in the order of the reference page.
+_MODULES = {
+    "load_machine": "compd.configuration.shipped",
+    "simulate_campaign": "compd.simulation.campaign.simulate_campaign",
+    "open_recording": "compd.comparison.open",
+    "compare": "compd.api",
+    "diagnose": "compd.api",
+    "add_effect": "compd.api",
+    "open_model": "compd.api",
+    "plan_measurement": "compd.api",
+    "connect": "compd.client",
+    "Effect": "compd.model.effect",
+    "Parameter": "compd.model.effect",
+    "Constant": "compd.model.effect",
+    "memoryless_basis": "compd.model.effect",
+    "CompdError": "compd.errors",
+}
+__all__ = list(_MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _MODULES and name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_MODULES.get(name, "compd.release")), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_MODULES, "__version__"])

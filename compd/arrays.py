@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+# Texts of any length: elements are str.
+TextArray: TypeAlias = NDArray[np.object_]
 
 
 def rms(values: ArrayLike) -> float:

@@ -49,21 +49,33 @@ Message = dict[str, Any]
 
 
 def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Client:
-    """Connect to the daemon.
+    """Connect to the running daemon.
 
     Parameters
     ----------
-    address : "host:port", or the path of the daemon's Unix socket. What reads or writes files of the daemon's computer
+    address : str or Path
+        ``"host:port"``, or the path of the daemon's Unix socket. What reads or writes files of the daemon's computer
         (`Client.readings`, `Client.zero`, `Client.model`) is allowed over the Unix socket alone.
-    timeout_s : for connecting, and for each answer and each setpoint.
+    timeout_s : float
+        For connecting, and for each answer and each setpoint, s.
 
     Returns
     -------
-    Client : a context manager that closes the connection.
+    Client
+        A context manager that closes the connection.
 
     Raises
     ------
-    DaemonError : the address is none, or no daemon answers there, or it has too many clients.
+    DaemonError
+        Where the address is none, no daemon answers there, or it has too many clients.
+
+    Examples
+    --------
+    Watch the tip ten times a second::
+
+        with compd.connect("127.0.0.1:7750") as daemon:
+            for setpoint in daemon.watch(rate_hz=10):
+                print(setpoint["tip_M_mm"] if setpoint["valid"] else setpoint["reason"])
     """
     text = str(address)
     try:
@@ -98,11 +110,14 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
 class Client:
     """A connection to the daemon, made by `connect`. Each method is named after the message that it is about.
 
-    A client is used by one thread. Setpoints that arrive while it waits for another answer are kept for `watch`.
+    Messages are dictionaries with the keys of the protocol; lengths are in mm, angles in rad, times in s of the
+    daemon's monotonic clock. A client is used by one thread. Setpoints that arrive while it waits for another answer
+    are kept for `watch`.
 
     Attributes
     ----------
-    version : the daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
+    version : dict
+        The daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
     """
 
     def __init__(self, connection: socket.socket, address: str) -> None:
@@ -121,11 +136,18 @@ class Client:
 
         Parameters
         ----------
-        rate_hz : setpoints per second; None for the setpoint of every cycle.
+        rate_hz : float, optional
+            Setpoints per second; None for the setpoint of every cycle.
+
+        Yields
+        ------
+        dict
+            The message. A key whose value is not known is absent.
 
         Raises
         ------
-        DaemonError : the daemon has gone, or sent nothing within the timeout; or it refused a message that was sent
+        DaemonError
+            Where the daemon has gone, or sent nothing within the timeout; or it refused a message that was sent
             meanwhile.
         """
         self._ask({"class": "WATCH"} if rate_hz is None else {"class": "WATCH", "rate_hz": rate_hz}, "WATCH")
@@ -143,11 +165,18 @@ class Client:
 
         Parameters
         ----------
-        rate_hz : messages per second; None for one of every cycle.
+        rate_hz : float, optional
+            Messages per second; None for one of every cycle.
+
+        Yields
+        ------
+        bytes, dict
+            The line, and the message in it.
 
         Raises
         ------
-        DaemonError : the daemon refuses, or has gone, or sent nothing within the timeout.
+        DaemonError
+            Where the daemon refuses, has gone, or sent nothing within the timeout.
         """
         request: Message = {"class": "WATCH", "what": "readings"}
         self._send(request if rate_hz is None else request | {"rate_hz": rate_hz})
@@ -167,9 +196,17 @@ class Client:
 
         Parameters
         ----------
-        tip_B0_mm : the tip in {B0}, the base platform's frame at machine zero, mm: three numbers.
-        rotation_B0_rad : for a hexapod, the rotation vector of {P} in {B0}, rad; None for the attitude at machine zero.
-        tip_P_mm : with the tool on the surface plate, instead of tip_B0_mm: the touched place in {P}, mm.
+        tip_B0_mm : three floats, optional
+            The tip in {B0}, the base platform's frame at machine zero, mm.
+        rotation_B0_rad : three floats, optional
+            For a hexapod, the rotation vector of {P} in {B0}, rad; None for the attitude at machine zero.
+        tip_P_mm : three floats, optional
+            With the tool on the surface plate, instead of `tip_B0_mm`: the touched place in {P}, mm.
+
+        Raises
+        ------
+        DaemonError
+            Where the daemon has gone.
         """
         keys = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
         self._send({"class": "TARGET", **{key: list(value) for key, value in keys.items() if value is not None}})
@@ -179,12 +216,24 @@ class Client:
 
         Raises
         ------
-        DaemonError : this client is not the controller.
+        DaemonError
+            Where this client is not the controller.
         """
         self._ask({"class": "RELEASE"}, "RELEASE")
 
     def status(self) -> Message:
-        """Ask for STATUS: the state of the loop, its timing, every line and every gauge."""
+        """Ask for STATUS.
+
+        Returns
+        -------
+        dict
+            The state of the loop, its timing, every line and every gauge.
+
+        Raises
+        ------
+        DaemonError
+            Where the daemon has gone, or sent nothing within the timeout.
+        """
         return self._ask({"class": "STATUS"}, "STATUS")
 
     def zero(self) -> Message:
@@ -192,11 +241,13 @@ class Client:
 
         Returns
         -------
-        Message : ZERO with `taken_at`, `path` of the file, and `readings_mm` by channel.
+        dict
+            ZERO with `taken_at`, `path` of the file, and `readings_mm` by channel.
 
         Raises
         ------
-        DaemonError : a gauge cannot be read, the machine moves, or the file cannot be written.
+        DaemonError
+            Where a gauge cannot be read, the machine moves, or the file cannot be written.
         """
         return self._ask({"class": "ZERO"}, "ZERO")
 
@@ -205,18 +256,22 @@ class Client:
 
         Parameters
         ----------
-        file : absolute path of a model file on the daemon's computer; "" for the machine without effects, or for no
+        file : str, optional
+            Absolute path of a model file on the daemon's computer; ``""`` for the machine without effects, or for no
             shadow; None to change nothing.
-        shadow : compute the correction of this model beside the applied one, and do not apply it.
+        shadow : bool
+            Compute the correction of this model beside the applied one, and do not apply it.
 
         Returns
         -------
-        Message : MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `model` (the file's hash)
-            and `file`.
+        dict
+            MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `model` (the file's hash) and
+            `file`.
 
         Raises
         ------
-        DaemonError : the daemon cannot use the file; the models are as before.
+        DaemonError
+            Where the daemon cannot use the file; the models are as before.
         """
         keys = {} if file is None else {"file": file, "shadow": shadow}
         return self._ask({"class": "MODEL", **keys}, "MODEL")

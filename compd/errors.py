@@ -12,11 +12,16 @@ class Problem:
 
     Attributes
     ----------
-    where : file, line and key, or device and channel: the place to go to.
-    what : what is wrong there, in one clause.
-    value : the offending value as the person wrote it, or "" where there is none.
-    allowed : what would be right.
-    next_step : what to do now.
+    where : str
+        File, line and key, or device and channel: the place to go to.
+    what : str
+        What is wrong there, in one clause.
+    value : str
+        The offending value as the person wrote it, or ``""`` where there is none.
+    allowed : str
+        What would be right.
+    next_step : str
+        What to do now.
     """
 
     where: str
@@ -37,7 +42,13 @@ class Problem:
 
 
 class CompdError(Exception):
-    """Base of every error that compd raises on purpose; carries all its problems at once."""
+    """Base of every error that compd raises on purpose; it carries all its problems at once.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+        Each with the place, what is wrong there, the value, what is allowed and what to do.
+    """
 
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)

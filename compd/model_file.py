@@ -20,19 +20,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd import __version__
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
 from compd.files import write_files
 from compd.model.effect import FittedEffect
 from compd.model.library import find_effect
+from compd.release import __version__
+from compd.tables import Columns, data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMAT = 2
 Kind = Literal["add", "remove", "fit", "undo"]
@@ -45,7 +49,7 @@ NOTHING: State = {"effects": [], "covariance": []}
 
 @dataclass(frozen=True)
 class ModelStep:
-    """One command that changed the model."""
+    """One change of the model, as its ledger keeps it and as the model file has it."""
 
     kind: Annotated[Kind, Field(description="what was done")]
     effect: Annotated[str, Field(description='the effect that was added or removed; "" for a fit of all')]
@@ -63,6 +67,45 @@ class ModelStep:
 
 
 @dataclass(frozen=True)
+class EffectNumber:
+    """One number of an effect, in the unit that people read.
+
+    Attributes
+    ----------
+    effect : str
+        Id of the effect.
+    parameter : str
+        Name of the parameter; with ``_1``, ``_x`` where there is one per link or axis.
+    value : float
+        Its value, in `unit`.
+    standard_error : float
+        In `unit`; nan where it is not known.
+    unit : str
+        For instance ``"ppm/K"``.
+    plausible_low : float
+        Lower end of the plausible range, in `unit`.
+    plausible_high : float
+        Upper end of the plausible range, in `unit`.
+    searched : bool
+        A nonlinear constant, which was searched and has no standard error.
+    """
+
+    effect: str
+    parameter: str
+    value: float
+    standard_error: float
+    unit: str
+    plausible_low: float
+    plausible_high: float
+    searched: bool
+
+    @property
+    def plausible(self) -> bool:
+        """Whether it lies in the plausible range."""
+        return self.plausible_low <= self.value <= self.plausible_high
+
+
+@dataclass(frozen=True)
 class StoredModel:
     """A model file as plain data: what can be shown and undone without the machine."""
 
@@ -72,33 +115,116 @@ class StoredModel:
     geometry: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModelFile:
-    """machine : the name of its configuration, or "external".
+    """The effects that a machine's model has, with their fitted numbers, and the ledger of how they came to be.
 
-    declared : each effect as the person named it.  fitted : with numbers and their own covariance.
-    covariance : (P, P) of all fitted numbers jointly, in the order of `fitted`.
-    geometry : hash of the geometry that it was fitted on; "" where that is not known.
+    `open_model` reads one, `add_effect` begins one or adds to it, `write` keeps it. It is never changed in place.
+
+    Attributes
+    ----------
+    machine : str
+        Name of the machine's configuration, or ``"external"``.
+    links : int
+        Number of the machine's links; 0 for ``"external"``.
+    declared : tuple of str or dict
+        Each effect as it was named: an id, ``/absolute/file.py:NAME``, or a formula written out.
+    fitted : tuple of FittedEffect
+        The same effects with their P fitted numbers.
+    covariance : (P, P) array
+        Of all fitted numbers jointly, in the order of `fitted`.
+    steps : tuple of ModelStep
+        The ledger: every change, with the recording it was fitted on and the error before and after.
+    geometry : str
+        Hash of the geometry that it was fitted on; ``""`` where that is not known.
     """
 
     machine: str
+    links: int
     declared: tuple[Declaration, ...] = ()
     fitted: tuple[FittedEffect, ...] = ()
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     steps: tuple[ModelStep, ...] = ()
     geometry: str = ""
 
-    def state(self, links: int) -> State:
+    def write(self, path: str | Path) -> None:
+        """Write the model file (YAML), whole or not at all; an existing file is replaced.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to. `compd adopt` takes the file into the running daemon.
+
+        Raises
+        ------
+        StateError
+            Where the disk refuses.
+        """
+        write_stored(Path(path), StoredModel(self.machine, self.state(), self.steps, self.geometry))
+
+    def state(self) -> State:
         """The effects as plain data, for the file."""
         effects = [
             {
                 "effect": declared if isinstance(declared, str) else dict(declared),
                 "shape": {name: float(value) for name, value in fitted.constants.items()},
-                "parameters": _estimates(fitted, links),
+                "parameters": _estimates(fitted, self.links),
             }
             for declared, fitted in zip(self.declared, _with_own_covariance(self.fitted, self.covariance), strict=True)
         ]
         return {"effects": effects, "covariance": self.covariance.tolist()}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per number of each effect, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns `effect`, `parameter`; `value`, `standard_error`, `plausible_low` and `plausible_high`, all in
+            `unit`; and `searched`, true for a nonlinear constant, which has no standard error: nan.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        return data_frame(self._columns())
+
+    def _repr_html_(self) -> str:
+        remarks = [
+            f"{step.kind} {step.effect} on {step.recording}: {step.rms_before_um:.3g} um to {step.rms_after_um:.3g} um"
+            + (" (undone)" if step.undone else "")
+            for step in self.steps
+        ]
+        return html_table(str(self), self._columns(), remarks)
+
+    def __str__(self) -> str:
+        names = ", ".join(fitted.effect.id for fitted in self.fitted) or "no effects"
+        return f"Model of {self.machine}: {names}"
+
+    def __repr__(self) -> str:
+        return f"<{self}>"
+
+    def numbers(self) -> list[EffectNumber]:
+        """Every number of every effect: its parameters, then its searched nonlinear constants."""
+        numbers: list[EffectNumber] = []
+        for fitted in _with_own_covariance(self.fitted, self.covariance):
+            effect = fitted.effect
+            for column, estimate in zip(effect.columns(self.links), _estimates(fitted, self.links), strict=True):
+                name, value, std, unit = estimate.values()
+                numbers.append(
+                    EffectNumber(effect.id, name, value, std, unit, column.parameter.low, column.parameter.high, False)
+                )
+            for constant in effect.constants:
+                value, unit = float(fitted.constants[constant.name]), constant.unit
+                numbers.append(
+                    EffectNumber(effect.id, constant.name, value, np.nan, unit, constant.low, constant.high, True)
+                )
+        return numbers
+
+    def _columns(self) -> Columns:
+        numbers = self.numbers()
+        return {name: [getattr(number, name) for number in numbers] for name in EffectNumber.__dataclass_fields__}
 
 
 def _square(rows: list[list[float]]) -> list[list[float]]:
@@ -217,6 +343,7 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
         raise StateError(problems)
     return ModelFile(
         stored.machine,
+        links,
         tuple(entry.effect for entry in document.effects),
         _with_own_covariance(fitted, covariance),
         covariance,
@@ -295,13 +422,8 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
     )
 
 
-def write_model_file(path: Path, file: ModelFile, links: int) -> None:
-    """Write a model whole or not at all. Raises StateError where the disk refuses."""
-    write_stored(path, StoredModel(file.machine, file.state(links), file.steps, file.geometry))
-
-
 def write_stored(path: Path, stored: StoredModel) -> None:
-    """As `write_model_file`, from plain data."""
+    """Write a model whole or not at all. Raises StateError where the disk refuses."""
     data = {
         "format": FORMAT,
         "machine": stored.machine,

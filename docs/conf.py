@@ -19,9 +19,14 @@ myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 
 autodoc_typehints = "description"
+# results are made by functions: their constructors' parameters are nobody's business
+autodoc_typehints_description_target = "documented_params"
+autodoc_type_aliases = dict.fromkeys(("FloatArray", "BoolArray", "IntArray", "TextArray"), "numpy.ndarray")
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
-napoleon_use_rtype = False
+napoleon_use_ivar = True
+# `name` in a docstring: a link where it is a documented name, code elsewhere
+default_role = "py:obj"
 
 # `--option` and "" are to be read as they are typed.
 smartquotes = False

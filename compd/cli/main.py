@@ -12,8 +12,8 @@ from importlib import import_module
 
 import typer
 
-from compd import __version__
 from compd.cli import live, measurements, simulated, start
+from compd.release import __version__
 
 # In the order in which `compd --help` shows them.
 PANELS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,20 +27,36 @@ from compd.model.observe import observe, observe_tip
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
-from compd.recording.recording import Recording
+from compd.recording.recording import Recording, UsableRows
+from compd.tables import Columns, data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlignedRecording:
-    """N rows with m measured coordinates each: x, y, z of the tip, or lengths of links.
+    """A recording with its machine: N rows with m measured coordinates each, x, y, z of the tip or lengths of links.
 
-    model : None for `machine: external`.
-    rows : the observations of all N rows, also of those that are not used: effects with memory need their history.
-    labels : (m,) "x", "y", "z" or "link 1" ...
-    axes : (m,) 0, 1, 2 = x, y, z; or the links, from 0.
-    measured_mm : (N, m) in {M}, or changes of link lengths.
-    registration : how measured_mm came into {M}; None where it was measured there.
-    geometry_hash : of the configuration that the model was built from, "" for `machine: external`.
+    Attributes
+    ----------
+    recording : Recording
+        The columns of the file by name, and what the sidecar says.
+    model : MachineModel or None
+        Kinematics and frame of the machine; None for ``machine: external``.
+    rows : Observations
+        What effects are computed from, for all N rows, also those that are not used: effects with memory need their
+        history.
+    labels : tuple of str
+        The m coordinates: ``"x"``, ``"y"``, ``"z"``, or ``"link 1"`` ...
+    axes : tuple of int
+        The same as numbers: 0, 1, 2 for x, y, z; or the links, from 0.
+    measured_mm : (N, m) array
+        The reference in {M}, or changes of link lengths, mm; nan where nothing was measured.
+    registration : Registration or None
+        How `measured_mm` came from the instrument's frame into {M}; None where it was measured there.
+    geometry_hash : str
+        Of the configuration that the model was built from; ``""`` for ``machine: external``.
     """
 
     recording: Recording
@@ -100,17 +117,70 @@ class AlignedRecording:
         return registration_columns(self.rows.tip_M_mm, self.axes)
 
     @cached_property
-    def usable(self) -> tuple[BoolArray, Mapping[str, int]]:
-        """(N,) rows with every gauge and reference value and a pose; and reason -> rows left out."""
+    def usable(self) -> UsableRows:
+        """Rows with every gauge and reference value and a pose; why the others are left out."""
         recording = self.recording
         # a link's length needs neither the frame nor the other links' references
         needed = [*recording.gauge_columns, *recording.reference_columns, *recording.model_columns]
-        mask, left = recording.usable(needed)
+        mask, left, reason = recording.usable(needed)
         left_out = {**recording.left_out, **left}
         nowhere = mask & ~np.isfinite(self.predicted_mm({})).all(axis=1)
         if nowhere.any():
-            left_out[self._why_no_pose(nowhere)] = int(nowhere.sum())
-        return mask & ~nowhere, left_out
+            why = self._why_no_pose(nowhere)
+            left_out[why] = int(nowhere.sum())
+            reason[nowhere] = why
+        return UsableRows(mask & ~nowhere, left_out, reason)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The rows, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            N rows: `row`, the row as a spreadsheet shows it; every column of the file under its own name, in its own
+            unit; then for each measured coordinate `measured_x_mm` and `predicted_x_mm` in {M} (or
+            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect. nan where a cell is
+            empty and where there is no pose.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        predicted_mm = self.predicted_mm({})
+        columns: dict[str, Any] = {"row": self.recording.row, **self.recording.columns}
+        for k, name in enumerate(self.label_names):
+            columns[f"measured_{name}_mm"] = self.measured_mm[:, k]
+            columns[f"predicted_{name}_mm"] = predicted_mm[:, k]
+        return data_frame(columns)
+
+    @property
+    def label_names(self) -> tuple[str, ...]:
+        """The m measured coordinates as parts of column names, such as "x" and "link_1"."""
+        return tuple(label.replace(" ", "_") for label in self.labels)
+
+    def _repr_html_(self) -> str:
+        columns = {name: values for name, values in self.recording.columns.items() if np.isfinite(values).any()}
+        table: Columns = {
+            "column": list(columns),
+            "values": [int(np.isfinite(values).sum()) for values in columns.values()],
+            "smallest": [float(np.nanmin(values)) for values in columns.values()],
+            "largest": [float(np.nanmax(values)) for values in columns.values()],
+        }
+        return html_table(
+            str(self), table, [f"{count} rows left out: {why}" for why, count in self.usable.left_out.items()]
+        )
+
+    def __str__(self) -> str:
+        recording = self.recording
+        hours = (recording.time_s[-1] - recording.time_s[0]) / 3600.0
+        return (
+            f"{recording.path.name}: {recording.machine}, {recording.rows} rows over {hours:.3g} h, "
+            f"{int(self.usable.mask.sum())} of them with a prediction and a measured {', '.join(self.labels)}"
+        )
+
+    def __repr__(self) -> str:
+        return f"<AlignedRecording {self}>"
 
     def attitude_residual_urad(self, added: Deltas) -> FloatArray | None:
         """(N, 3) rotation vector from the modelled to the measured attitude, in {M}; None where none was measured."""

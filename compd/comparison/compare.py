@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.stats import f as f_distribution
 
-from compd.arrays import BoolArray, FloatArray, rms
+from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.criteria import ComparisonCriteria
@@ -26,24 +26,55 @@ from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import link_residuals
 from compd.model.uncertainty import GaugeNoise
+from compd.tables import data_frame, html_table
 from compd.units import UM_PER_MM
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Outliers bend the fitted frame a little, and the frame decides which rows are outliers: two rounds settle it.
 FRAME_ROUNDS = 3
+# Why a row does not count, beside the reasons of the recording itself.
+NO_QUANTITY = "a quantity that an effect needs is empty"
+OUTLIER = "beyond all noise"
+# Trends that a notebook shows.
+MOST_TRENDS = 4
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """One recording of N rows with m measured coordinates against one model.
 
-    aligned : the recording on its machine.  fitted : the model's effects.
-    residual_um : (N, m) measured - modelled, nan where a row cannot be used.
-    used : (N,) the rows that count.  outlier : (N,) rows whose residual no noise explains, not used.
-    left_out : reason -> number of rows that cannot be used.
-    floor : the noise floor.  uncertainty : of the prediction.  gauges : the gauges' noise, None for an external model.
-    contributions : by source.  trends : what the residual follows.
-    link_residual_um : (N, n) the residual as errors of link lengths, None where no link length can be inferred.
-    attitude_residual_urad : (N, 3), None where no attitude was measured.  criteria : thresholds.
+    Attributes
+    ----------
+    aligned : AlignedRecording
+        The recording with its machine.
+    fitted : tuple of FittedEffect
+        The effects of the model.
+    residual_um : (N, m) array
+        Measured minus modelled, um; nan where a row cannot be used.
+    used : (N,) array of bool
+        The rows that count.
+    outlier : (N,) array of bool
+        Rows whose residual no noise explains; they are not used.
+    left_out : dict
+        Reason, and the number of rows that cannot be used for it.
+    floor : NoiseFloor
+        What noise alone makes of the residual: `floor.um` per coordinate, `floor.how` says where it is from.
+    uncertainty : Uncertainty
+        Standard uncertainty of the prediction, um, by gauges and by fitted parameters.
+    gauges : GaugeNoise or None
+        Noise of the gauges; None for an external model.
+    contributions : dict
+        What each source contributes: joints, frame, each effect.
+    trends : tuple of Trend
+        What the residual follows, the strongest first; `trend.text` says it in a sentence.
+    link_residual_um : (N, n) array or None
+        The residual as errors of link lengths, um; None where none can be inferred.
+    attitude_residual_urad : (N, 3) array or None
+        Rotation vector from the modelled to the measured attitude in {M}, urad; None where none was measured.
+    criteria : ComparisonCriteria
+        The thresholds on which it rests, each with unit, meaning and reason.
     """
 
     aligned: AlignedRecording
@@ -80,14 +111,15 @@ class Comparison:
 
     @property
     def floor_ratio(self) -> float:
-        """(rms / floor)^2, which is the reduced chi-squared: 1 at the noise floor; inf where the floor is 0."""
+        """(rms / floor)^2, which is the reduced chi-squared; 1 at the noise floor, inf where the floor is 0."""
         return (self.rms_um / self.floor.um) ** 2 if self.floor.um > 0 else math.inf
 
     @property
     def at_floor(self) -> bool:
         """Whether noise alone could have made the floor ratio as large as it is.
 
-        F test: a ratio of two variances with as many degrees of freedom as measured values and as the floor rests on.
+        By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor
+        rests on.
         """
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
@@ -108,8 +140,62 @@ class Comparison:
             "that the model does not have."
         )
 
+    @property
+    def why_left_out(self) -> TextArray:
+        """(N,) why each row is not used, in words; "" for a row that is used."""
+        reason = self.aligned.usable.reason.copy()
+        reason[(reason == "") & ~np.isfinite(self.residual_um).all(axis=1)] = NO_QUANTITY
+        reason[self.outlier] = OUTLIER
+        return reason
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per row of the recording, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            N rows: `row`, the row as a spreadsheet shows it; `time_s`; for each measured coordinate `residual_x_um`
+            (or `residual_link_1_um`), measured minus modelled, nan where a row cannot be used; `used` and `outlier`,
+            true or false; `why_left_out`, the reason in words or an empty text.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        names = self.aligned.label_names
+        return data_frame(
+            {
+                "row": self.aligned.recording.row,
+                "time_s": self.aligned.recording.time_s,
+                **{f"residual_{name}_um": self.residual_um[:, k] for k, name in enumerate(names)},
+                "used": self.used,
+                "outlier": self.outlier,
+                "why_left_out": self.why_left_out,
+            }
+        )
+
+    def _repr_html_(self) -> str:
+        size_um = np.abs(self.residual_um[self.used])
+        table = {
+            "coordinate": self.aligned.labels,
+            "rms_um": self.rms_by_axis_um.tolist(),
+            "noise_floor_um": self.floor.by_axis_um.tolist(),
+            "95_percent_um": np.quantile(size_um, 0.95, axis=0).tolist(),
+            "largest_um": size_um.max(axis=0).tolist(),
+        }
+        remarks = [
+            f"{int(self.used.sum())} rows used, {len(self.used) - int(self.used.sum())} not. "
+            f"Noise floor: {self.floor.how}.",
+            *(trend.text for trend in self.trends[:MOST_TRENDS]),
+        ]
+        return html_table(self.verdict, table, remarks)
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self.verdict}>"
+
     def as_json(self) -> dict[str, Any]:
-        """What `compd compare --json` prints; nan and inf are null."""
+        """What `compd compare --json` prints, as plain data; nan and inf are None."""
         recording = self.aligned.recording
         size = np.abs(self.residual_um[self.used])
         distance = self.distance_um[self.used]
@@ -163,7 +249,7 @@ class Comparison:
 
     def _outlier_count(self) -> dict[str, int]:
         count = int(self.outlier.sum())
-        return {"beyond all noise": count} if count else {}
+        return {OUTLIER: count} if count else {}
 
     def _registration(self) -> dict[str, Any]:
         registration = self.aligned.registration
@@ -230,11 +316,11 @@ def _known_rows(
     aligned: AlignedRecording, predicted_mm: FloatArray, criteria: ComparisonCriteria
 ) -> tuple[BoolArray, dict[str, int]]:
     """(N,) rows with a measured and a predicted value; and reason -> number of the other rows."""
-    usable, left_out = aligned.usable
+    usable = aligned.usable.mask
     known = usable & np.isfinite(predicted_mm).all(axis=1)
-    left_out = dict(left_out)
+    left_out = dict(aligned.usable.left_out)
     if (usable & ~known).any():
-        left_out["a quantity that an effect needs is empty"] = int((usable & ~known).sum())
+        left_out[NO_QUANTITY] = int((usable & ~known).sum())
     if known.sum() < criteria.fewest_rows:
         raise RecordingError(
             Problem(

@@ -95,7 +95,7 @@ def fit(
     are parameters.
     """
     sigma_um = np.ones(len(aligned.labels)) if weight_sigma_um is None else weight_sigma_um
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     initial = tuple(effects)
     effect_deltas(initial, aligned.rows)  # raises where an effect needs what the recording has not
     columns_um = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM for effect in initial]

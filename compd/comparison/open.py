@@ -1,47 +1,65 @@
-"""Opening a recording with its machine, and a model file with the effects fitted so far.
+"""Opening a recording with its machine.
 
 Example::
 
     from compd.comparison.compare import compare
-    from compd.comparison.open import open_model, open_recording
+    from compd.comparison.open import open_recording
 
-    aligned = open_recording(Path("run.csv"))               # the machine's configuration is found by its name
-    model = open_model(Path("tripod.model.yaml"), aligned)  # None: no effect acts yet
-    print(compare(aligned, model.fitted, model.covariance).verdict)
+    aligned = open_recording("run.csv")  # the machine's configuration is found by its name in the sidecar
+    print(compare(aligned).verdict)
 """
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
-from compd.configuration import Configuration, load
-from compd.configuration.shipped import shipped_configuration
-from compd.errors import CompdError, Problem, RecordingError
-from compd.model_file import ModelFile, read_model_file
+from compd.configuration import Configuration
+from compd.configuration.shipped import Machine, load_machine, shipped_names
+from compd.errors import Problem, RecordingError
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from compd.recording.sidecar import EXTERNAL, read_sidecar
 
 
-def open_recording(path: Path, machine: Path | None = None) -> AlignedRecording:
-    """The recording NAME.csv (with NAME.yaml beside it), aligned with the model of its machine.
+def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedRecording:
+    """Open a recording with its machine, and compute what the machine's kinematics predicts in each of its rows.
 
-    machine : the machine's configuration; None takes the one that comes with compd under the name in the sidecar.
-    Raises RecordingError with every problem of the recording, its sidecar and the machine's name together.
+    Parameters
+    ----------
+    path : str or Path
+        The recording NAME.csv; its sidecar NAME.yaml lies beside it. The sidecar says which machine it is, and what
+        the reference instrument measured.
+    machine : str, Path or Configuration, optional
+        The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
+        the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is
+        read from the columns ``model_x_mm`` ...
+
+    Returns
+    -------
+    AlignedRecording
+        N rows with m measured coordinates each: x, y, z of the tip, or changes of link lengths.
+
+    Raises
+    ------
+    RecordingError
+        With every problem of the recording, its sidecar and the machine's name together: file, row, column, value,
+        what is allowed and what to do.
+    ConfigurationError
+        Where the configuration `machine` cannot be used.
+
+    Examples
+    --------
+    >>> import compd
+    >>> recording = compd.open_recording("monday.csv")
+    >>> recording.labels, recording.measured_mm.shape
+    (('x', 'y', 'z'), (608, 3))
     """
-    return align_recording(*read_with_machine(path, machine))
-
-
-def open_model(path: Path | None, aligned: AlignedRecording) -> ModelFile:
-    """The model file of the recording's machine; where None is named, a model without effects. Raises StateError."""
-    machine = aligned.recording.machine
-    return ModelFile(machine) if path is None else read_model_file(path, machine, aligned.rows.links)
+    return align_recording(*read_with_machine(Path(path), machine))
 
 
 def read_with_machine(
-    path: Path, machine: Path | None = None, needs_reference: bool = True
+    path: Path, machine: Machine | None = None, needs_reference: bool = True
 ) -> tuple[Recording, Configuration | None]:
     """The recording and the configuration of its machine, which is None for an external model.
 
@@ -49,7 +67,7 @@ def read_with_machine(
     Raises RecordingError as `open_recording` does, CompdError where the file `machine` cannot be used.
     """
     problems: list[Problem] = []
-    configuration = _shipped(path.with_suffix(".yaml"), problems) if machine is None else load(machine)
+    configuration = _shipped(path.with_suffix(".yaml"), problems) if machine is None else load_machine(machine)
     try:
         recording = read_recording(path, configuration, needs_reference)
     except RecordingError as error:
@@ -65,18 +83,16 @@ def _shipped(sidecar_path: Path, problems: list[Problem]) -> Configuration | Non
     sidecar = read_sidecar(sidecar_path, reported_by_the_reader)
     if sidecar is None or sidecar.machine in ("", EXTERNAL):
         return None
-    # a name, not a path: `..` or `/` would leave the place where configurations are
-    name = sidecar.machine if re.fullmatch(r"[\w-]+", sidecar.machine) else "-"
-    try:
-        shipped = shipped_configuration(f"{name}.yaml")
-    except CompdError:
+    if sidecar.machine not in shipped_names():
         problems.append(
             Problem(
                 where=str(sidecar_path),
                 what="no configuration of this machine comes with compd",
                 value=repr(sidecar.machine),
-                next_step="give it with --machine PATH, or mend `machine:` in the sidecar",
+                allowed=", ".join([*shipped_names(), EXTERNAL]),
+                next_step="give the machine's configuration (--machine PATH, in Python machine=PATH), or mend "
+                "`machine:` in the sidecar",
             )
         )
         return None
-    return load(shipped)
+    return load_machine(sidecar.machine)

@@ -45,7 +45,7 @@ def gauge_noise(
     from_repeats : False where the machine moves within a visit, so that the gauges' scatter is no noise.
     """
     recording, rows = aligned.recording, aligned.rows
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     noise_mm: dict[str, FloatArray] = {}
     repeated = False
     for port in GAUGE_PORTS:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field, ValidationError
 
@@ -21,6 +22,10 @@ from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
+from compd.tables import Columns, data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SECTIONS: Mapping[str, Any] = {
     "machine": Annotated[str, Field(description="the machine's name, which recordings and model files repeat")],
@@ -36,12 +41,36 @@ SECTIONS: Mapping[str, Any] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Configuration:
-    """A whole machine, checked.
+    """A whole machine, checked: what `load_machine` returns.
 
-    gauges : each gauge's options, of its driver's own model. drivers : the gauges' driver classes, by name.
-    warnings : what can be used but is probably a mistake.
+    Attributes
+    ----------
+    path : Path
+        The file (YAML).
+    machine : str
+        Name of the machine.
+    geometry : Geometry
+        Joints, tool and plate; lengths in mm, angles in rad, the frame in every name.
+    lines : dict
+        Settings of each line (serial port, Modbus), by name.
+    gauges : dict
+        Options of each gauge, of its driver's own model, by name.
+    drivers : dict
+        Driver class of each gauge, by name.
+    wiring : Wiring
+        Which gauge measures which quantity of the machine.
+    loop : LoopSettings
+        Rate of the daemon's loop, and what it does when a reading is stale.
+    limits : LimitSettings
+        Largest corrections.
+    sockets : SocketSettings
+        Where clients connect.
+    state : StateSettings
+        What the daemon keeps across restarts.
+    warnings : tuple of Problem
+        What can be used but is probably a mistake.
     """
 
     path: Path
@@ -61,19 +90,71 @@ class Configuration:
         """A fresh driver object for every gauge."""
         return {name: self.drivers[name](options) for name, options in self.gauges.items()}
 
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per channel that is wired, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            `column`, as a recording names the channel, with its unit; `gauge`, with the channel after a dot where
+            the gauge has several; `driver` and `line` of the gauge; `link`, nan where it belongs to none; `sign`,
+            +1 or -1; `noise_um`, standard deviation of one reading of a length, nan where it is not stated.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        return data_frame(self._columns())
+
+    def _repr_html_(self) -> str:
+        return html_table(str(self), self._columns(), [str(warning) for warning in self.warnings])
+
+    def __str__(self) -> str:
+        return (
+            f"{self.machine}: {self.geometry.kinematics}, {self.geometry.links} links, {len(self.gauges)} gauges "
+            f"on {len(self.lines)} lines"
+        )
+
+    def __repr__(self) -> str:
+        return f"<Configuration {self}>"
+
+    def _columns(self) -> Columns:
+        wiring = self.wiring
+        wires: list[tuple[str, str, float, int]] = [
+            *((f"scale_{wire.link}_mm", wire.gauge, wire.link, wire.sign) for wire in wiring.scale),
+            *((f"joint_{k}_um", wire.gauge, wire.link, wire.sign) for k, wire in enumerate(wiring.joint, start=1)),
+            *((f"frame_{wire.distance}_um", wire.gauge, math.nan, wire.sign) for wire in wiring.frame),
+            *((wire.name, wire.gauge, math.nan, 1) for wire in wiring.quantities),
+        ]
+        options = [self.gauges[gauge.split(".")[0]] for _, gauge, _, _ in wires]
+        lengths = [column.endswith(("_mm", "_um")) for column, _, _, _ in wires]
+        return {
+            "column": [column for column, _, _, _ in wires],
+            "gauge": [gauge for _, gauge, _, _ in wires],
+            "driver": [option.driver for option in options],
+            "line": [option.line for option in options],
+            "link": [link for _, _, link, _ in wires],
+            "sign": [sign for _, _, _, sign in wires],
+            "noise_um": [
+                option.noise_um if length and option.noise_um is not None else math.nan
+                for option, length in zip(options, lengths, strict=True)
+            ],
+        }
+
     @property
     def config_hash(self) -> str:
-        """Hash of everything in the file: equal for two daemons with the same configuration."""
+        """Hash of everything in the file, equal for two daemons with the same configuration."""
         return _hash(self, ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"))
 
     @property
     def geometry_hash(self) -> str:
-        """Hash of what a model is fitted on: the geometry without the limits of the links' length."""
+        """Hash of what a model is fitted on, the geometry without the limits of the links' length."""
         return _hash(self, ("geometry",), without=("link_length_mm",))
 
     @property
     def zero_hash(self) -> str:
-        """Hash of what machine zero depends on: geometry, gauges and wiring, but no port, rate, limit or noise."""
+        """Hash of what machine zero depends on, geometry, gauges and wiring, but no port, rate, limit or noise."""
         return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))
 
 

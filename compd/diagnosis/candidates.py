@@ -67,7 +67,7 @@ def library_pool(
     """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
     candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     for effect in effects:
         if effect.id in present:
             continue

@@ -154,7 +154,7 @@ class EmpiricalTerm:
 
 def empirical_terms(aligned: AlignedRecording, criteria: Criteria) -> Iterator[EmpiricalTerm]:
     """Every term that can be tried on a recording."""
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     time_s = aligned.rows.time_s[usable]
     ports = list(_ports(aligned))
     for name, values in _machine_covariates(aligned):

@@ -73,7 +73,7 @@ class Programme:
 
 def recorded_limits(aligned: AlignedRecording) -> ProgrammeLimits:
     """Limits within which a recording stayed: what was reached there can be reached again."""
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     tip = aligned.rows.tip_M_mm[usable]
     quantities = aligned.recording.quantities
     forces = [np.abs(quantities[f"force_{axis}_N"][usable]) for axis in "xyz" if f"force_{axis}_N" in quantities]

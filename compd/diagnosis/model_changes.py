@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -19,22 +20,13 @@ from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 
-@dataclass(frozen=True)
-class Change:
-    """A model after a step, and the recording compared with the model before and after it."""
-
-    file: ModelFile
-    before: Comparison
-    after: Comparison
-
-
-def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording, date: str) -> Change:
+def add(model: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording) -> ModelFile:
     """Add an effect and fit all effects together; its nonlinear constants are searched.
 
-    declared : how the file declares the effect.  date : of the step, as it is to be written.
+    declared : how the file declares the effect.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
     """
-    if effect.id in [fitted.effect.id for fitted in file.fitted]:
+    if effect.id in [fitted.effect.id for fitted in model.fitted]:
         raise StateError(
             Problem(
                 where=f"effect {effect.id}",
@@ -42,15 +34,15 @@ def add(file: ModelFile, declared: Declaration, effect: Effect, aligned: Aligned
                 next_step="`compd effect fit` fits it again",
             )
         )
-    before = compare(aligned, file.fitted, file.covariance)
-    result = search_constants(aligned, file.fitted, effect, before.floor.by_axis_um)
-    extended = replace(file, declared=(*file.declared, declared))
-    return _change(extended, file, result, before, "add", effect.id, date)
+    before = compare(aligned, model.fitted, model.covariance)
+    result = search_constants(aligned, model.fitted, effect, before.floor.by_axis_um)
+    extended = replace(model, declared=(*model.declared, declared))
+    return _changed(extended, model, result, before, "add", effect.id)
 
 
-def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str) -> Change:
+def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording) -> ModelFile:
     """Take an effect out and fit the others again. Raises StateError where the model has no such effect."""
-    ids = [fitted.effect.id for fitted in file.fitted]
+    ids = [fitted.effect.id for fitted in model.fitted]
     if effect_id not in ids:
         raise StateError(
             Problem(
@@ -60,23 +52,23 @@ def remove(file: ModelFile, effect_id: str, aligned: AlignedRecording, date: str
             )
         )
     k = ids.index(effect_id)
-    before = compare(aligned, file.fitted, file.covariance)
-    result = fit(aligned, file.fitted[:k] + file.fitted[k + 1 :], before.floor.by_axis_um)
-    reduced = replace(file, declared=file.declared[:k] + file.declared[k + 1 :])
-    return _change(reduced, file, result, before, "remove", effect_id, date)
+    before = compare(aligned, model.fitted, model.covariance)
+    result = fit(aligned, model.fitted[:k] + model.fitted[k + 1 :], before.floor.by_axis_um)
+    reduced = replace(model, declared=model.declared[:k] + model.declared[k + 1 :])
+    return _changed(reduced, model, result, before, "remove", effect_id)
 
 
-def refit(file: ModelFile, aligned: AlignedRecording, date: str) -> Change:
+def refit(model: ModelFile, aligned: AlignedRecording) -> ModelFile:
     """Fit all effects again from zero, nonlinear constants as they are. Raises StateError where there are none."""
-    if not file.fitted:
+    if not model.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
-    before = compare(aligned, file.fitted, file.covariance)
-    unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in file.fitted]
+    before = compare(aligned, model.fitted, model.covariance)
+    unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in model.fitted]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
-    return _change(file, file, result, before, "fit", "", date)
+    return _changed(model, model, result, before, "fit", "")
 
 
-def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
+def undo(stored: StoredModel, where: str) -> StoredModel:
     """The model before its last step that is not undone yet; the file keeps the step and its undoing.
 
     where : the file, for messages. Raises StateError where there is no step to undo.
@@ -90,7 +82,7 @@ def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
     undoing = ModelStep(
         kind="undo",
         effect=last.effect,
-        date=date,
+        date=_now(),
         recording=last.recording,
         sha256=last.sha256,
         rms_before_um=last.rms_after_um,
@@ -101,12 +93,12 @@ def undo(stored: StoredModel, date: str, where: str) -> StoredModel:
     return StoredModel(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
 
 
-def _change(
-    file: ModelFile, old: ModelFile, result: FitResult, before: Comparison, kind: Kind, effect_id: str, date: str
-) -> Change:
-    """Write the result of a fit and the step that led to it into the file, standard errors with disturbances.
+def _changed(
+    model: ModelFile, old: ModelFile, result: FitResult, before: Comparison, kind: Kind, effect_id: str
+) -> ModelFile:
+    """The model with the result of a fit and the step that led to it, standard errors with disturbances.
 
-    file : with its declarations after the step.  old : the file before it.
+    model : with its declarations after the step.  old : before it.
     """
     aligned = before.aligned
     criteria = Criteria()
@@ -117,13 +109,22 @@ def _change(
     step = ModelStep(
         kind=kind,
         effect=effect_id,
-        date=date,
+        date=_now(),
         recording=aligned.recording.path.name,
         sha256=aligned.recording.sha256,
         rms_before_um=before.rms_um,
         rms_after_um=after.rms_um,
         noise_floor_um=after.floor.um,
-        replaced=old.state(aligned.rows.links),
+        replaced=old.state(),
     )
-    changed = replace(file, fitted=result.fitted, covariance=np.asarray(result.covariance), steps=(*old.steps, step))
-    return Change(changed, before, after)
+    return replace(
+        model,
+        fitted=result.fitted,
+        covariance=np.asarray(result.covariance),
+        steps=(*old.steps, step),
+        geometry=aligned.geometry_hash,  # all numbers were fitted on it
+    )
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

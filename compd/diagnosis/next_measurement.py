@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import numpy as np
 
@@ -17,22 +17,37 @@ from compd.diagnosis.measurement_programmes import Programme, ProgrammeLimits, o
 from compd.errors import Problem, RecordingError
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
+from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 from compd.model.sensitivity import effect_sensitivity, sensitivities
 from compd.recording.plan_file import plan_row, plan_text, write_plan_file
+from compd.tables import Columns, data_frame, html_table
 from compd.units import UM_PER_MM
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
 RIDGE = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MeasurementPlan:
-    """Rows to measure.
+    """Rows to measure, which tell two rival effects apart.
 
-    rivals : ids of the two effects.  rows : each column name -> value, in the columns of a recording.
-    separation : by how much the nearer rival will differ from the other on the recording and these rows together, in
-    standard deviations of the noise (root of the sum over all rows).  before : the same on the recording alone.
+    Attributes
+    ----------
+    rivals : (str, str)
+        Ids of the two effects.
+    rows : tuple of dict
+        One per row: each column of the plan's file and its value. `row`, `purpose`, `time_s`, the tip's place
+        in {M} `tip_x_mm` ..., the directions in which the links come `approach_1` ..., `speed_mm_per_s`, and what is
+        held: loads in N, temperatures in degC.
+    separation : float
+        By how much the nearer rival will differ from the other on the recording and these rows together, in standard
+        deviations of the noise (root of the sum of squares over all rows).
+    before : float
+        The same on the recording alone.
     """
 
     rivals: tuple[str, str]
@@ -40,13 +55,57 @@ class MeasurementPlan:
     separation: float
     before: float
 
+    @property
+    def summary(self) -> str:
+        """What the rows are good for, in a sentence."""
+        return (
+            f"{self.rivals[0]} and {self.rivals[1]} differ by {self.before:.2g} times the noise on what was measured, "
+            f"by {self.separation:.2g} times with these {len(self.rows)} rows."
+        )
+
     def write_to(self, stream: TextIO) -> None:
         """Write the rows as CSV."""
         stream.write(plan_text(self.rows))
 
-    def write(self, path: Path) -> None:
-        """Write the rows as CSV. Raises RecordingError where the file cannot be written."""
-        write_plan_file(path, self.rows)
+    def write(self, path: str | Path) -> None:
+        """Write the rows as CSV, for a person at the machine or for `compd simulate --plan`.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to; an existing file is replaced.
+
+        Raises
+        ------
+        RecordingError
+            Where the file cannot be written.
+        """
+        write_plan_file(Path(path), self.rows)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The rows, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per row to measure, with the columns of the file; nan where nothing is to be set.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        return data_frame(self._columns())
+
+    def _repr_html_(self) -> str:
+        return html_table(self.summary, self._columns())
+
+    def __repr__(self) -> str:
+        return f"<MeasurementPlan: {self.summary}>"
+
+    def _columns(self) -> Columns:
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        return {name: [row.get(name, np.nan) for row in self.rows] for name in names}
 
 
 class _ProgrammeSums(NamedTuple):
@@ -123,19 +182,12 @@ def plan_measurement(
         plan = plan_measurement(aligned, (), (spring, contact), sigma_um, recorded_limits(aligned), rows=30)
         plan.before, plan.separation  # by how many standard deviations the two differ, before and after
     """
-    if aligned.model is None:
-        raise RecordingError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="of an external model's machine no measurement can be planned",
-                next_step="write a machine configuration",
-            )
-        )
+    model_of_machine = require_kinematics(aligned)
     names = list(
         dict.fromkeys(name for effect in pair for name in needed_quantities(effect.effect, aligned.rows.links))
     )
     possible = [programme for programme in programmes(aligned, limits, names) if len(programme) <= rows]
-    observations = observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
+    observations = observe_programmes(model_of_machine, aligned.rows.constants, possible, aligned)
     lengths = np.array([len(programme) for programme in possible])
     ends = np.cumsum([0, *lengths])
     refits, sums = _rival_refits(aligned, model, pair, sigma_um, observations, ends)
@@ -155,6 +207,19 @@ def plan_measurement(
     )
 
 
+def require_kinematics(aligned: AlignedRecording) -> MachineModel:
+    """The machine's model. Raises RecordingError for an external one, in which no place can be reached."""
+    if aligned.model is None:
+        raise RecordingError(
+            Problem(
+                where=str(aligned.recording.path),
+                what="of an external model's machine no measurement can be planned",
+                next_step="write a machine configuration",
+            )
+        )
+    return aligned.model
+
+
 def _rival_refits(
     aligned: AlignedRecording,
     model: Sequence[FittedEffect],
@@ -169,7 +234,7 @@ def _rival_refits(
     """
     effects = (*model, *pair)
     recorded = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM / sigma_um[:, None] for effect in effects]
-    usable, _ = aligned.usable
+    usable = aligned.usable.mask
     known = usable & np.all([np.isfinite(values).all(axis=(1, 2)) for values in recorded], axis=0)
     new = _columns_on(aligned, observations, effects, sigma_um)
     refits, sums = [], []

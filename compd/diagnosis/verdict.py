@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from compd.comparison.compare import Comparison
 from compd.json_text import nan_to_null
 from compd.model.effect import Effect, FittedEffect
+from compd.tables import Columns, data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Verdict = Literal["adequate", "identified", "ambiguous", "unexplained", "not_testable"]
 Status = Literal["explains", "partial", "no_gain", "not_testable"]
@@ -17,7 +21,21 @@ Status = Literal["explains", "partial", "no_gain", "not_testable"]
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A fitted parameter in the unit that people read, with its standard error."""
+    """A fitted parameter in the unit that people read.
+
+    Attributes
+    ----------
+    name : str
+        As the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
+    value : float
+        The fitted value, in `unit`.
+    std : float
+        Its standard error, in `unit`.
+    unit : str
+        For instance ``"ppm/K"``.
+    plausible : bool
+        Whether the value lies in the range that the effect declares as plausible.
+    """
 
     name: str
     value: float
@@ -34,8 +52,18 @@ class ParameterEstimate:
 class Rival:
     """An effect that explains the recording as well as one that was found, in its place.
 
-    member : its place among the candidates.  cosine : with the found effect on these rows, 0 to 1.
-    excess : by how much more it leaves, in squares of the noise floor.  std : standard error of that.
+    Attributes
+    ----------
+    member : int
+        Its place among the candidates.
+    name : str
+        Id of the effect.
+    cosine : float
+        Similarity with the found effect on these rows, 0 to 1.
+    excess : float
+        By how much more it leaves, in squares of the noise floor.
+    std : float
+        Standard error of the excess.
     """
 
     member: int
@@ -49,12 +77,26 @@ class Rival:
 class EmpiricalFinding:
     """One covariate that the residual follows without a known cause.
 
-    form, port : of the term that describes it best.
-    explained_fraction : of what is above the noise, on rows that were left out.
-    heldout_rms_um : error on rows that were left out, with the term.
-    formula_effects : the term as declarations for `compd effect add`, the largest direction first.
-    parameters : fitted values by name, one mapping for each of formula_effects.
-    beside : other covariates that are needed along with it.
+    Attributes
+    ----------
+    covariate : str
+        What the residual follows: the column of a quantity, ``"time"``, a link's length ...
+    form : str
+        Of the term that describes it best, for instance ``"linear"``.
+    port : str
+        Where in the machine the term acts.
+    p_value : float
+        Probability of so strong a term by noise alone, corrected for all that were tried.
+    explained_fraction : float
+        Share of what is above the noise that it explains on rows that were left out, 0 to 1.
+    heldout_rms_um : float
+        Error on rows that were left out with the term, um per coordinate.
+    formula_effects : tuple of dict
+        The term as formulas that `add_effect` and `compd effect add` take, the largest direction first.
+    parameters : tuple of dict
+        Fitted values by name, one mapping for each of `formula_effects`.
+    beside : tuple of str
+        Other covariates that are needed along with it.
     """
 
     covariate: str
@@ -88,10 +130,20 @@ class EmpiricalFinding:
 class DiagnosisStep:
     """One effect that was found.
 
-    fitted : the effect with its parameters and searched constants.  rivals : effects that explain as much, best first.
-    heldout_rms_um : error on rows that were left out, with it and those before it.
-    explained_fraction : of what those before it left above the noise floor.
-    p_value : probability of so high a score by noise alone, corrected for all effects that were tried.
+    Attributes
+    ----------
+    fitted : FittedEffect
+        The effect with its fitted numbers and searched constants.
+    rivals : tuple of Rival
+        Effects that explain as much, best first; empty where the recording tells it from all others.
+    heldout_rms_um : float
+        Error on rows that were left out, with it and those before it, um per coordinate.
+    explained_fraction : float
+        Share of what those before it left above the noise floor, 0 to 1.
+    p_value : float
+        Probability of so high a score by noise alone, corrected for all effects that were tried.
+    parameters : tuple of ParameterEstimate
+        Its numbers with standard errors.
     """
 
     fitted: FittedEffect
@@ -125,7 +177,22 @@ class DiagnosisStep:
 class CandidateResult:
     """One effect of the library, tried alone; nan where it could not be tried.
 
-    effect : its id.  why : the reason for its status, in words.  The rest as in DiagnosisStep.
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    status : str
+        ``"explains"``, ``"partial"``, ``"no_gain"`` or ``"not_testable"``.
+    why : str
+        The reason for the status, in words.
+    heldout_rms_um : float
+        Error on rows that were left out, with the effect alone, um per coordinate.
+    explained_fraction : float
+        Share of what is above the noise floor that it explains alone, 0 to 1.
+    p_value : float
+        Probability of so high a score by noise alone, corrected for all effects that were tried.
+    parameters : tuple of ParameterEstimate
+        Its numbers with standard errors.
     """
 
     effect: str
@@ -149,13 +216,29 @@ class CandidateResult:
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
-    """The result of `diagnose`.
+    """Which effects a model lacks, with the evidence.
 
-    before, after : the recording against the model as it was, and with the effects of `steps`.
-    depends_on : what the rest follows, the strongest first.
-    next_measurement : rows of a plan where rivals are to be told apart; else what to vary, in words.
+    Attributes
+    ----------
+    verdict : str
+        ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
+        ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
+        ``"unexplained"``: the library has no such cause; `depends_on` says what the error follows.
+        ``"not_testable"``: the recording varies nothing by which an effect could be tested.
+    before : Comparison
+        The recording against the model as it was.
+    after : Comparison
+        The same against the model with the effects of `steps`.
+    steps : tuple of DiagnosisStep
+        The effects that were found, in the order in which they were taken.
+    candidates : tuple of CandidateResult
+        Every effect of the library with its status and the reason for it.
+    depends_on : tuple of EmpiricalFinding
+        What the rest follows, the strongest first: a description, not a cause.
+    next_measurement : sequence of dict
+        Rows of a plan where rivals are to be told apart; else what to vary, in words.
     """
 
     verdict: Verdict
@@ -166,8 +249,57 @@ class Diagnosis:
     depends_on: tuple[EmpiricalFinding, ...]
     next_measurement: Sequence[Mapping[str, Any]] = field(default_factory=tuple)
 
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per effect of the library, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            `effect`, its id; `found`, true where the diagnosis names it; `status`; `explained_fraction`, 0 to 1, and
+            `heldout_rms_um`, um per coordinate, on rows that were left out, with the effect alone; `p_value`; `why`,
+            the reason for the status in words. nan where an effect could not be tried.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        return data_frame(self._columns(self.candidates))
+
+    def _repr_html_(self) -> str:
+        tried = [candidate for candidate in self.candidates if candidate.status in ("explains", "partial")]
+        remarks = [
+            f"{step.effect.id}: "
+            + ", ".join(
+                f"{number.name} = {number.value:.4g} ± {number.std:.2g} {number.unit}" for number in step.parameters
+            )
+            for step in self.steps
+        ]
+        remarks += [
+            f"the rest follows {finding.covariate}: {finding.heldout_rms_um:.3g} um are left with it"
+            for finding in self.depends_on[:1]
+        ]
+        others = len(self.candidates) - len(tried)
+        remarks += [f"{others} effects without gain or not testable; to_dataframe() has them with the reason"]
+        return html_table(f"{self.verdict}: {self.summary}", self._columns(tried), remarks)
+
+    def __repr__(self) -> str:
+        return f"<Diagnosis, {self.verdict}: {self.summary}>"
+
+    def _columns(self, candidates: Sequence[CandidateResult]) -> Columns:
+        found = {step.effect.id for step in self.steps}
+        return {
+            "effect": [candidate.effect for candidate in candidates],
+            "found": [candidate.effect in found for candidate in candidates],
+            "status": [candidate.status for candidate in candidates],
+            "explained_fraction": [candidate.explained_fraction for candidate in candidates],
+            "heldout_rms_um": [candidate.heldout_rms_um for candidate in candidates],
+            "p_value": [candidate.p_value for candidate in candidates],
+            "why": [candidate.why for candidate in candidates],
+        }
+
     def as_json(self) -> dict[str, Any]:
-        """What `compd diagnose --json` prints; nan and inf are null."""
+        """What `compd diagnose --json` prints, as plain data; nan and inf are None."""
         recording = self.before.aligned.recording
         data: dict[str, Any] = {
             "verdict": self.verdict,

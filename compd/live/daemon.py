@@ -9,7 +9,6 @@ from typing import Any
 
 import structlog
 
-from compd import __version__
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
@@ -31,6 +30,7 @@ from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
 from compd.live.systemd import Notifier
+from compd.release import __version__
 
 # How often the daemon looks whether one of its threads has ended.
 _CHECK_EVERY_S = 0.5

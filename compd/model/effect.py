@@ -3,18 +3,6 @@
 An effect adds basis(rows) @ theta at its ports: it is linear in its fitted parameters theta. What it is not linear in
 (a time constant, a period) is a nonlinear constant, taken from the machine's description or searched. The machine model
 propagates from the port to the tip; an effect never computes a tip error itself.
-
-Example: a link that grows with temperature, delta_i = a l_i dT_i, in a file of its own, used as `/path/mine.py:MINE`:
-
-    def _expansion(rows, constants):                 # (N, n, 1): n links, one parameter
-        return (1e-6 * rows.link_mm * rows.link_warming_K)[:, :, None]
-
-    MINE = Effect(
-        id="my_expansion", ports=("link",), physics="The links grow with temperature.",
-        equation="delta_i = a l_i dT_i", symbols={"a": "expansion coefficient, ppm/K"}, source="Oiwa, section 2.2",
-        needs=("temperature_link_{link}_degC",), parameters=(Parameter("a", "ppm/K", 0, 23, "steel 12"),),
-        mistaken_for=("link_zero",), separated_by="two temperatures", basis=memoryless_basis(_expansion),
-    )
 """
 
 from __future__ import annotations
@@ -59,8 +47,20 @@ Basis: TypeAlias = Callable[[Observations, ConstantValues, Memory], tuple[FloatA
 class Parameter:
     """One kind of fitted parameter, in the unit that people read.
 
-    low, high : plausible range in `unit`.  source : where that range comes from.
-    reciprocal : the fit is linear in 1/value: a compliance is fitted, a stiffness shown.
+    Attributes
+    ----------
+    name : str
+        As the effect's equation names it.
+    unit : str
+        For instance ``"ppm/K"``.
+    low, high : float
+        Plausible range, in `unit`.
+    source : str
+        Where that range comes from.
+    per : str
+        What there is one value for: ``"machine"``, ``"link"``, ``"axis"`` or ``"link_axis"``.
+    reciprocal : bool
+        The fit is linear in 1/value: a compliance is fitted, a stiffness shown.
     """
 
     name: str
@@ -101,11 +101,22 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Constant:
-    """A nonlinear constant: what the effect is not linear in.
+    """A nonlinear constant of an effect: a time constant, a period, an exponent.
 
-    low, high : plausible range in `unit`.  source : where that range comes from.
-    grid : the values that a search tries, in `unit`; two of them are a choice, with nothing between them.
-    setting : name of the machine's setting that gives the value, which is then not searched.
+    Attributes
+    ----------
+    name : str
+        As the effect's equation names it.
+    unit : str
+        For instance ``"s"``.
+    low, high : float
+        Plausible range, in `unit`.
+    source : str
+        Where that range comes from.
+    grid : tuple of float
+        The values that a search tries, in `unit`; two of them are a choice, with nothing between them.
+    setting : str
+        Name of the machine's setting that gives the value, which is then not searched; ``""`` for none.
     """
 
     name: str
@@ -132,18 +143,60 @@ class Column:
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical cause.
+    """One physical cause: where in the machine it acts, and what it adds there.
 
-    ports : where it acts.
-    physics : what happens, in a sentence.  equation, symbols, source : as a paper would give them.
-    needs : quantities by name (`{link}` stands for each link), or "force", "direction", "motion", "time",
-        "order" (of the rows), "revolute_axes", "plate_thickness_mm".
-    mistaken_for : ids of effects that look alike.  separated_by : measurements that tell them apart.
-    basis : gives (N, size, P) with the ports' sizes one after the other on axis 1 and P fitted numbers, in mm (rad for
-        directions) per unit of each number.
-    remembers : a row's value depends on earlier rows; memory goes in and comes out.
-    follows_reading : what it adds depends on its comparators' own readings.
-    registration : a rigid motion of the reference's whole frame, as laying two frames over one another takes away.
+    Attributes
+    ----------
+    id : str
+        Its name in model files and reports.
+    ports : tuple of str
+        Where it acts: ``"scale"``, ``"joint"``, ``"frame"``, ``"link"``, ``"base_joint"``, ``"platform_joint"``,
+        ``"revolute_axis"``, ``"plate"``, ``"tool"``, ``"reference"``.
+    physics : str
+        What happens, in a sentence.
+    equation : str
+        As a paper would give it.
+    symbols : dict
+        Meaning and unit of each symbol of the equation.
+    source : str
+        Where the equation is from.
+    needs : tuple of str
+        Quantities by name (``{link}`` stands for each link), or ``"force"``, ``"direction"``, ``"motion"``,
+        ``"time"``, ``"order"`` (of the rows), ``"revolute_axes"``, ``"plate_thickness_mm"``.
+    parameters : tuple of Parameter
+        What is fitted.
+    mistaken_for : tuple of str
+        Ids of effects that look alike.
+    separated_by : str
+        Measurements that tell them apart.
+    basis : callable
+        From N rows, constants and memory to the array (N, size, P) and the memory after: the ports' sizes one after
+        the other on axis 1, P fitted numbers on axis 2; mm (rad for directions) per unit of each number.
+    constants : tuple of Constant
+        What the effect is not linear in.
+    remembers : bool
+        A row's value depends on earlier rows; memory goes in and comes out.
+    follows_reading : bool
+        What it adds depends on its comparators' own readings.
+    registration : bool
+        A rigid motion of the reference's whole frame, as laying two frames over one another takes away.
+
+    Examples
+    --------
+    A link that grows with temperature, delta_i = a l_i dT_i, in a file of its own, which `add_effect` takes as
+    ``"/path/mine.py:MINE"``::
+
+        from compd import Effect, Parameter, memoryless_basis
+
+        def _expansion(rows, constants):  # (N, n, 1): N rows, n links, one parameter; mm per ppm/K
+            return (1e-6 * rows.link_mm * rows.link_warming_K)[:, :, None]
+
+        MINE = Effect(
+            id="my_expansion", ports=("link",), physics="The links grow with temperature.",
+            equation="delta_i = a l_i dT_i", symbols={"a": "expansion coefficient, ppm/K"}, source="Oiwa, section 2.2",
+            needs=("temperature_link_{link}_degC",), parameters=(Parameter("a", "ppm/K", 0, 23, "steel 12"),),
+            mistaken_for=("link_zero",), separated_by="two temperatures", basis=memoryless_basis(_expansion),
+        )
     """
 
     id: str
@@ -194,8 +247,16 @@ class Effect:
 class FittedEffect:
     """An effect with its numbers: what a machine model carries.
 
-    theta : (P,), in the order of `effect.columns`.  constants : values of its nonlinear constants.
-    covariance : (P, P), nan where it is not known.
+    Attributes
+    ----------
+    effect : Effect
+        The cause.
+    theta : (P,) array
+        The fitted numbers, in the order of `effect.columns`.
+    constants : dict
+        Values of its nonlinear constants.
+    covariance : (P, P) array
+        Of the fitted numbers; nan where it is not known.
     """
 
     effect: Effect
@@ -205,7 +266,26 @@ class FittedEffect:
 
 
 def memoryless_basis(columns: Callable[[Observations, ConstantValues], FloatArray]) -> Basis:
-    """The basis of an effect without memory, from a function of rows and constants."""
+    """The basis of an effect whose value in a row depends on that row alone.
+
+    Parameters
+    ----------
+    columns : callable
+        From N rows (Observations) and the values of the nonlinear constants by name to the array (N, size, P); see
+        `Effect`.
+
+    Returns
+    -------
+    callable
+        For `Effect.basis`.
+
+    Examples
+    --------
+    >>> import compd
+    >>> def longer(rows, constants):  # each link by 1 ppm of its length
+    ...     return (1e-6 * rows.link_mm)[:, :, None]
+    >>> basis = compd.memoryless_basis(longer)
+    """
 
     def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
         return columns(rows, constants), memory

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
@@ -26,10 +26,12 @@ class UsableRows(NamedTuple):
 
     mask : (N,) bool.
     left_out : reason -> rows; each row counts once, under the first reason that applies.
+    reason : (N,) text: why the row is left out, "" for one that is not.
     """
 
     mask: BoolArray
     left_out: Mapping[str, int]
+    reason: TextArray
 
 
 @dataclass(frozen=True)
@@ -145,15 +147,15 @@ class Recording:
         Raises KeyError for a column that the recording does not have.
         """
         left_out: dict[str, int] = {}
-        mask = ~self.excluded
-        if self.excluded.any():
-            left_out["excluded by a person"] = int(self.excluded.sum())
-        for name in needed:
-            empty = mask & np.isnan(self.columns[name])
-            if empty.any():
-                left_out[f"{name} is empty"] = int(empty.sum())
-                mask &= ~empty
-        return UsableRows(mask, left_out)
+        reason = np.full(self.rows, "", dtype=object)
+        lacking = {"excluded by a person": self.excluded}
+        lacking |= {f"{name} is empty": np.isnan(self.columns[name]) for name in needed}
+        for text, rows in lacking.items():
+            new = rows & (reason == "")
+            if new.any():
+                left_out[text] = int(new.sum())
+                reason[new] = text
+        return UsableRows(reason == "", left_out, reason)
 
     @cached_property
     def fold(self) -> IntArray:

@@ -11,7 +11,7 @@ from plotly.graph_objects import Figure
 from compd.arrays import rms
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import covariates
-from compd.model_file import ModelFile, parameter_estimates
+from compd.model_file import parameter_estimates
 from compd.report.figures import (
     plot_contributions,
     plot_histogram,
@@ -63,9 +63,7 @@ def no_trend_text(comparison: Comparison) -> str:
     return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
 
 
-def write_comparison_page(
-    path: Path, comparisons: Sequence[Comparison], model: ModelFile | None, shared_script: bool = False
-) -> None:
+def write_comparison_page(path: Path, comparisons: Sequence[Comparison], shared_script: bool = False) -> None:
     """Write the page for one recording or more; shared_script as in `write_page`."""
     machine = comparisons[0].aligned.recording.machine
     effects = ", ".join(effect.effect.id for effect in comparisons[0].fitted) or "none"
@@ -76,8 +74,8 @@ def write_comparison_page(
     panels = [
         Panel("In numbers", "A rms is per coordinate: root of the mean over rows and axes.", summary(comparisons))
     ]
-    if model is not None and model.fitted:
-        numbers = _effects(model, comparisons[0])
+    if comparisons[0].fitted:
+        numbers = _effects(comparisons[0])
         panels.append(Panel("The model's effects", "Fitted numbers with their standard errors.", numbers))
     for comparison in comparisons:
         panels += _panels(comparison, f"{name_of(comparison)}: " if len(comparisons) > 1 else "")
@@ -160,10 +158,10 @@ def _excluded(comparison: Comparison) -> PageTable:
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 
-def _effects(model: ModelFile, comparison: Comparison) -> PageTable:
+def _effects(comparison: Comparison) -> PageTable:
     rows = [
         [effect, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"]]
-        for effect, number in parameter_estimates(model.fitted, comparison.aligned.rows.links)
+        for effect, number in parameter_estimates(comparison.fitted, comparison.aligned.rows.links)
     ]
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 

@@ -59,7 +59,7 @@ def run_case(case: Case, directory: Path) -> Result:
         learn, other = open_recording(Path("learn.csv")), open_recording(Path("other.csv"))
         diagnosis = diagnose(learn, [], open_model(None, learn).covariance, [*load_library().values()])
         holdout = evaluate_holdout(diagnosis, other)
-        write_comparison_page(directory / f"{case.name}-comparison.html", [diagnosis.before], None, shared_script=True)
+        write_comparison_page(directory / f"{case.name}-comparison.html", [diagnosis.before], shared_script=True)
         write_diagnosis_page(directory / f"{case.name}-diagnosis.html", diagnosis, [holdout], shared_script=True)
         formulas = _formulas(diagnosis)
         after_um = _rms_with(formulas) if formulas else holdout.after.rms_um

@@ -12,7 +12,6 @@ from compd.cli.options import MachineOption
 
 if TYPE_CHECKING:
     from compd.comparison.compare import Comparison
-    from compd.model_file import ModelFile
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -33,18 +32,15 @@ def compare(
     ] = None,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
-    from compd.comparison.compare import compare as compared
-    from compd.comparison.open import open_model, open_recording
+    from compd.api import compare as compare_recording
+    from compd.comparison.open import open_recording
     from compd.errors import CompdError, Problem
 
     problems: list[Problem] = []
     comparisons: list[Comparison] = []
-    file: ModelFile | None = None
     for path in recordings:
         try:
-            aligned = open_recording(path, machine)
-            file = open_model(model, aligned)
-            comparisons.append(compared(aligned, file.fitted, file.covariance))
+            comparisons.append(compare_recording(open_recording(path, machine), model))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -54,7 +50,7 @@ def compare(
         from compd.report.page import check_page_path
 
         check_page_path(html)
-        write_comparison_page(html, comparisons, file)
+        write_comparison_page(html, comparisons)
     if as_json:
         results = [comparison.as_json() for comparison in comparisons]
         typer.echo(json.dumps(results[0] if len(results) == 1 else {"recordings": results}, indent=1, allow_nan=False))

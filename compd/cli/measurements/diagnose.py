@@ -39,11 +39,10 @@ def diagnose(
     """Learn which physical effect is missing: the verdict, then the evidence, then what to measure next."""
     from rich.console import Console
 
+    from compd.api import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
-    from compd.comparison.open import open_model, open_recording
-    from compd.diagnosis.diagnose import diagnose as diagnose_recording
+    from compd.comparison.open import open_recording
     from compd.diagnosis.holdout import evaluate_holdout
-    from compd.model.library import load_library
 
     if html is not None:
         from compd.report.page import check_page_path
@@ -51,10 +50,8 @@ def diagnose(
         check_page_path(html)
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
-    file = open_model(model, aligned)
-    effects = [*load_library().values()]
     with steps_shown(quiet=as_json) as progress:
-        diagnosis = diagnose_recording(aligned, file.fitted, file.covariance, effects, progress)
+        diagnosis = diagnose_recording(aligned, model, progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis_page

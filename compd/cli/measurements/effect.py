@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +14,6 @@ if TYPE_CHECKING:
 
     from compd.comparison.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
-    from compd.diagnosis.model_changes import Change
     from compd.model.effect import Effect
     from compd.model_file import Declaration, ModelFile
 
@@ -58,12 +55,11 @@ def show(
     """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
     from rich.console import Console
 
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
+    from compd.configuration.shipped import load_machine
     from compd.model.library import find_effect
 
     shown = find_effect(name, "compd effect show")
-    configuration = load(machine or shipped_configuration("tripod-cmm.yaml"))
+    configuration = load_machine(machine or "tripod-cmm")
     Console().print(_card(shown, configuration))
     if html is not None:
         from compd.report.effect_page import write_effect_page
@@ -81,14 +77,13 @@ def add(
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
+    from compd.api import add_effect
     from compd.comparison.open import open_recording
-    from compd.diagnosis.model_changes import add as add_effect
 
-    declared, declared_effect = _declaration(name)
     aligned = open_recording(recording, machine)
-    file = _read_model(model, aligned) if model.exists() else _new_model(aligned)
-    change = add_effect(file, declared, declared_effect, aligned, _now())
-    _finish(model, change, f"added {declared_effect.id}", dry_run)
+    before = _read_model(model, aligned) if model.exists() else None
+    changed = add_effect(before, name, aligned)
+    _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
 
 
 @effect.command()
@@ -104,7 +99,8 @@ def remove(
     from compd.diagnosis.model_changes import remove as remove_effect
 
     aligned = open_recording(recording, machine)
-    _finish(model, remove_effect(_read_model(model, aligned), name, aligned, _now()), f"removed {name}", dry_run)
+    before = _read_model(model, aligned)
+    _finish(model, before, remove_effect(before, name, aligned), aligned, f"removed {name}", dry_run)
 
 
 @effect.command()
@@ -116,7 +112,8 @@ def fit(
     from compd.diagnosis.model_changes import refit
 
     aligned = open_recording(recording, machine)
-    _finish(model, refit(_read_model(model, aligned), aligned, _now()), "fitted again", dry_run)
+    before = _read_model(model, aligned)
+    _finish(model, before, refit(before, aligned), aligned, "fitted again", dry_run)
 
 
 @effect.command()
@@ -125,7 +122,7 @@ def undo(model: ModelOption) -> None:
     from compd.diagnosis.model_changes import undo as undo_step
     from compd.model_file import read_stored, write_stored
 
-    after = undo_step(read_stored(model), _now(), str(model))
+    after = undo_step(read_stored(model), str(model))
     write_stored(model, after)
     names = ", ".join(_declared_id(entry["effect"]) for entry in after.state["effects"]) or "none"
     typer.echo(f"{model}: one step taken back; effects now: {names}")
@@ -135,70 +132,42 @@ def _declared_id(declared: Declaration) -> str:
     return declared if isinstance(declared, str) else str(declared["id"])
 
 
-def _declaration(text: str) -> tuple[Declaration, Effect]:
-    """What the person named, and the effect it stands for. Raises CompdError with every problem."""
-    from compd.configuration.document import read_document
-    from compd.model.library import find_effect
-
-    if Path(text).suffix in (".yaml", ".yml"):
-        declared = read_document(Path(text)).data
-        return declared, find_effect(declared, text)
-    return text, find_effect(text, "compd effect add")
-
-
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
-    """All its numbers are about to be fitted again, on this geometry."""
     from compd.model_file import read_model_file
 
-    file = read_model_file(path, aligned.recording.machine, aligned.rows.links)
-    return replace(file, geometry=aligned.geometry_hash)
+    return read_model_file(path, aligned.recording.machine, aligned.rows.links)
 
 
-def _new_model(aligned: AlignedRecording) -> ModelFile:
-    from compd.model_file import ModelFile
-
-    return ModelFile(aligned.recording.machine, geometry=aligned.geometry_hash)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def _finish(path: Path, change: Change, done: str, dry_run: bool) -> None:
-    """Write the file, unless it is a dry run, then say what the step did."""
+def _finish(
+    path: Path, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str, dry_run: bool
+) -> None:
+    """Write the file, unless it is a dry run, then say what the step did. model : before it, None for a new one."""
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model_file import parameter_estimates, write_model_file
+    from compd.api import compare
 
-    links = change.after.aligned.rows.links
     if dry_run:
         done = f"not written: would have {done}"
     else:
-        write_model_file(path, change.file, links)
-    before, after = change.before, change.after
+        changed.write(path)
+    before, after = compare(aligned, model), compare(aligned, changed)
     console = Console(highlight=False)
     console.print(
         f"{path}: {done}; residual {before.rms_um:.3g} um -> {after.rms_um:.3g} um, floor ratio "
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )
-    ranges = {
-        (fitted.effect.id, column.name): column.parameter
-        for fitted in change.file.fitted
-        for column in fitted.effect.columns(links)
-    }
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
-    for effect_id, number in parameter_estimates(change.file.fitted, links):
-        parameter = ranges[effect_id, number["name"]]
-        inside = parameter.low <= number["value"] <= parameter.high
-        plausible = f"{parameter.low:g} to {parameter.high:g}" + ("" if inside else ": [red]outside[/]")
+    for number in changed.numbers():
+        plausible = f"{number.plausible_low:g} to {number.plausible_high:g}"
         table.add_row(
-            effect_id, number["name"], f"{number['value']:.5g}", f"{number['std']:.2g}", number["unit"], plausible
+            number.effect,
+            number.parameter,
+            f"{number.value:.5g}",
+            "searched" if number.searched else f"{number.standard_error:.2g}",
+            number.unit,
+            "" if number.searched else plausible + ("" if number.plausible else ": [red]outside[/]"),
         )
-    for fitted in change.file.fitted:
-        for name, value in fitted.constants.items():
-            unit = next(constant.unit for constant in fitted.effect.constants if constant.name == name)
-            table.add_row(fitted.effect.id, name, f"{value:.5g}", "searched", unit, "")
     console.print(table)
     typer.echo(after.verdict)
 

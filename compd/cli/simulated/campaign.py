@@ -42,49 +42,25 @@ def campaign(
     Two disturbances of a fifth of the noise are always in it. What was hidden, and how strong, is written to
     NAME.answer.json; who wants to diagnose leaves that file shut.
     """
-    import math
-
     from rich.console import Console
 
-    from compd.configuration import load
-    from compd.errors import CompdError, Problem
-    from compd.recording.ball_plate import write_plate
-    from compd.recording.writer import write_recording
-    from compd.simulation.campaign.plan_reader import read_plan
-    from compd.simulation.campaign.simulated_recording import simulate_recording
-    from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, write_answer
-    from compd.simulation.truth.mechanism import Mechanism
+    from compd.simulation.campaign.simulate_campaign import simulate_campaign
 
-    configuration = load(config)
-    path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
-    mechanism = Mechanism(configuration.geometry)
-    if plan is not None and reference is ReferenceKind.ball_plate:
-        raise CompdError(
-            Problem(
-                where="--reference",
-                what="a ball plate's balls are not where the plan goes",
-                value=reference.value,
-                allowed="tracker, interferometer",
-                next_step="leave --plan or --reference out",
-            )
-        )
-    planned = () if plan is None else read_plan(plan, mechanism)
-    hidden_causes = parse_hidden(effect or [])
-    if hidden is not None:
-        hidden_causes.append(draw_hidden(hidden, mechanism))
-    plate = path.with_name(f"{path.stem}.plate.csv")
-    recorded = simulate_recording(configuration, seed, hidden_causes, reference.value, plate.name, other_days, planned)
-    write_recording(path, recorded.columns, recorded.sidecar, overwrite)
-    if recorded.balls_M is not None:
-        write_plate(plate, recorded.balls_M)
-    answer = path.with_name(f"{path.stem}.answer.json")
-    write_answer(answer, recorded.hidden, recorded.weak, seed)
-    rows = len(recorded.columns["time_s"])
-    summary = f"{rows} rows, {len(recorded.columns)} columns"
-    if planned:
-        measured = rows - sum(map(math.isnan, recorded.columns[min(recorded.reference_columns)]))
+    written = simulate_campaign(
+        config,
+        out,
+        seed=seed,
+        effects=effect or [],
+        hidden=hidden,
+        reference=reference.value,
+        other_days=other_days,
+        plan=plan,
+        overwrite=overwrite,
+    )
+    summary = f"{written.rows} rows, {written.columns} columns"
+    if written.planned:
         summary = (
-            f"the plan's {len(planned)} rows, {measured} with repeats, and {rows - measured} between them that only "
-            "the gauges saw"
+            f"the plan's {written.planned} rows, {written.measured} with repeats, and "
+            f"{written.rows - written.measured} between them that only the gauges saw"
         )
-    Console().print(f"{path}: {summary}; under seal: {answer}", soft_wrap=True)
+    Console().print(f"{written.recording}: {summary}; under seal: {written.answer}", soft_wrap=True)

@@ -25,7 +25,7 @@ from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.model.effect import FittedEffect
 from compd.model.library import find_effect
-from compd.model_file import ModelFile, write_model_file
+from compd.model_file import ModelFile
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, Machine, machine
 from tests.unit.live.test_daemon import StillGauges, configuration, first, running
 
@@ -43,7 +43,7 @@ def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Pat
         shape = {constant.name: constant.grid[0] for constant in effect.constants}
         fitted.append(FittedEffect(effect, numbers, shape))
     count = sum(len(effect.theta) for effect in fitted)
-    write_model_file(path, ModelFile(name, tuple(declared), tuple(fitted), np.eye(count) * 1e-2), links)
+    ModelFile(name, links, tuple(declared), tuple(fitted), np.eye(count) * 1e-2).write(path)
     return path
 
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from compd.errors import StateError
-from compd.model_file import ModelFile, ModelStep, read_model_file, read_stored, write_model_file
+from compd.model_file import ModelFile, ModelStep, read_model_file, read_stored
 from tests.support.measured import hidden
 
 FORMULA = {
@@ -35,12 +35,12 @@ def example() -> ModelFile:
         0.15,
         {"effects": [], "covariance": []},
     )
-    return ModelFile("tripod-cmm", ("link_elasticity", "link_expansion_lag"), fitted, covariance, (step,))
+    return ModelFile("tripod-cmm", 3, ("link_elasticity", "link_expansion_lag"), fitted, covariance, (step,))
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     found = read_model_file(path, "tripod-cmm", 3)
     assert found.declared == example().declared
     assert found.steps == example().steps
@@ -52,7 +52,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 
 def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     (number,) = yaml.safe_load(path.read_text())["effects"][0]["parameters"]
     assert number["unit"] == "N/um"
     assert number["value"] == pytest.approx(28.0)
@@ -61,8 +61,8 @@ def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:
 
 def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    file = ModelFile("tripod-cmm", ("link_expansion",), (hidden("link_expansion", 1.1),), np.full((1, 1), np.nan))
-    write_model_file(path, file, 3)
+    file = ModelFile("tripod-cmm", 3, ("link_expansion",), (hidden("link_expansion", 1.1),), np.full((1, 1), np.nan))
+    file.write(path)
     assert np.isnan(read_model_file(path, "tripod-cmm", 3).covariance).all()
 
 
@@ -72,8 +72,8 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
 
     path = tmp_path / "m.yaml"
     effect = find_effect(FORMULA, "here")
-    file = ModelFile("tripod-cmm", (FORMULA,), (FittedEffect(effect, np.array([0.1])),), np.full((1, 1), 1e-4))
-    write_model_file(path, file, 3)
+    file = ModelFile("tripod-cmm", 3, (FORMULA,), (FittedEffect(effect, np.array([0.1])),), np.full((1, 1), 1e-4))
+    file.write(path)
     found = read_model_file(path, "tripod-cmm", 3)
     assert found.declared == (FORMULA,)
     assert found.fitted[0].effect.equation == effect.equation
@@ -100,7 +100,7 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
 )
 def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: str) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     data = yaml.safe_load(path.read_text())
     edit(data)  # type: ignore[operator]
     path.write_text(yaml.safe_dump(data))
@@ -111,7 +111,7 @@ def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: st
 @pytest.mark.parametrize("format_", [1, None])
 def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     data = yaml.safe_load(path.read_text())
     assert data.pop("format") == 2
     path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
@@ -120,7 +120,7 @@ def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) ->
 
 def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     data = yaml.safe_load(path.read_text())
     data["covariance"] = [[1.0, 2.0], [3.0]]
     data["effects"][0].pop("parameters")
@@ -135,7 +135,7 @@ def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> Non
 
 def test_every_problem_is_in_one_message(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     data = yaml.safe_load(path.read_text())
     data["effects"][0]["effect"] = "nothing"
     data["effects"][1]["shape"] = {}
@@ -160,7 +160,7 @@ def test_no_file(tmp_path: Path) -> None:
 
 def test_a_disk_that_refuses_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "m.yaml"
-    write_model_file(path, example(), 3)
+    example().write(path)
     before = path.read_bytes()
 
     def full(descriptor: int) -> None:
@@ -168,6 +168,6 @@ def test_a_disk_that_refuses_leaves_the_old_file(tmp_path: Path, monkeypatch: py
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(StateError, match="No space left"):
-        write_model_file(path, ModelFile("tripod-cmm"), 3)
+        ModelFile("tripod-cmm", 3).write(path)
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["m.yaml"]
