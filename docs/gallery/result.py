@@ -9,20 +9,15 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import compd
 from compd.cli.main import app
-from compd.comparison.compare import compare
-from compd.comparison.open import open_model, open_recording
 from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.holdout import evaluate_holdout
-from compd.diagnosis.model_changes import add
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.library import find_effect, load_library
 from compd.report.comparison_page import write_comparison_page
 from compd.report.diagnosis_page import write_diagnosis_page
 from docs.gallery.cases import Case
@@ -56,8 +51,8 @@ def run_case(case: Case, directory: Path) -> Result:
     with _working_directory(case.name):
         _compd(case.campaign_command)
         _compd(case.other_days_command)
-        learn, other = open_recording(Path("learn.csv")), open_recording(Path("other.csv"))
-        diagnosis = diagnose(learn, [], open_model(None, learn).covariance, [*load_library().values()])
+        learn, other = compd.open_recording("learn.csv"), compd.open_recording("other.csv")
+        diagnosis = compd.diagnose(learn)
         holdout = evaluate_holdout(diagnosis, other)
         write_comparison_page(directory / f"{case.name}-comparison.html", [diagnosis.before], shared_script=True)
         write_diagnosis_page(directory / f"{case.name}-diagnosis.html", diagnosis, [holdout], shared_script=True)
@@ -105,9 +100,8 @@ def _formulas(diagnosis: Diagnosis) -> Sequence[dict[str, Any]]:
 
 
 def _rms_with(formulas: Sequence[dict[str, Any]]) -> float:
-    """Error on other days with the formulas, fitted on the rows to learn from, as `compd effect add` does."""
-    learn, other = open_recording(Path("learn.csv")), open_recording(Path("other.csv"))
-    file = open_model(None, learn)
+    """Error on other days with the formulas, fitted on the rows to learn from."""
+    model = None
     for formula in formulas:
-        file = add(file, formula, find_effect(formula, formula["id"]), learn, datetime.now(UTC).isoformat()).file
-    return compare(other, file.fitted, file.covariance).rms_um
+        model = compd.add_effect(model, formula, "learn.csv")
+    return compd.compare("other.csv", model).rms_um
