@@ -23,7 +23,7 @@ from compd.model.formula.declaration import (
 from compd.model.formula.evaluator import FUNCTIONS, LAG
 from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
 from compd.model.library import find_effect
-from compd.model_file import EffectEntry, ModelDocument, ModelFile, ModelStep, ParameterEntry, write_model_file
+from compd.model_file import EffectEntry, ModelDocument, ModelFile, ModelStep, ParameterEntry
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, table, term
 from docs.generate.schema import ModelSchema, default_text
 
@@ -96,10 +96,10 @@ def page() -> str:
 def _example_file() -> str:
     """A file with one effect, as it is written."""
     sag = FittedEffect(find_effect("link_sag", "the reference's example"), np.array([1.2]), {"n": 3.0})
-    file = ModelFile("tripod-cmm", ("link_sag",), (sag,), np.array([[0.01]]), geometry="9f3a61c0b2d4e875")
+    file = ModelFile("tripod-cmm", 3, ("link_sag",), (sag,), np.array([[0.01]]), geometry="9f3a61c0b2d4e875")
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "model.yaml"
-        write_model_file(path, file, links=3)
+        file.write(path)
         return path.read_text(encoding="utf-8")
 
 

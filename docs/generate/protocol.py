@@ -33,7 +33,7 @@ INTRODUCTION = f"""\
 The daemon listens on TCP ({TcpSocket().host}:{TcpSocket().port} unless [configured](#configuration-sockets) otherwise)
 and on a Unix socket (`sockets.unix.path`). Both speak the same protocol, version {PROTOCOL}: one JSON object per line,
 UTF-8, ended by `\\n`. Every message has its name under the key `class`. Any language that opens a socket and reads JSON
-will do; in Python, `compd.client` does it for you.
+will do; in Python, [`compd.client`](python.md) does it for you.
 [Connect a controller](../how-to/connect-a-controller.md) goes from the first line to the corrected drive command.
 
 Lengths are in mm, angles in radians, times in seconds on the daemon's monotonic clock (`CLOCK_MONOTONIC`, in Python
