@@ -69,12 +69,13 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory, in which `config` is the checkout's, and the processes that run beside the others."""
+    """One directory, in which `config` and `drivers` are the checkout's, and the processes that run beside the others."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
-        (directory / "config").symlink_to(ROOT / "config")
+        for name in ("config", "drivers"):
+            (directory / name).symlink_to(ROOT / name)
 
     def run(self, console: str) -> None:
         """Run a console fence."""
