@@ -70,7 +70,7 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory, in which `config` and `drivers` are the checkout's, and the processes that run beside the others."""
+    """One directory with the checkout's `config` and `drivers`, and the processes that run beside the others."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
