@@ -25,6 +25,7 @@ TIMEOUT_S = 200.0
 POLL_EVERY_S = 0.05
 # Sockets that exist once these commands are ready for the next one.
 READY = {"simulate": "control.sock", "run": "compd.sock"}
+KILL = re.compile(r"kill %(\d+)")
 EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
 
 
@@ -69,12 +70,13 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory, in which `config` is the checkout's, and the processes that run beside the others."""
+    """One directory with the checkout's `config` and `drivers`, and the processes that run beside the others."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
-        (directory / "config").symlink_to(ROOT / "config")
+        for name in ("config", "drivers"):
+            (directory / name).symlink_to(ROOT / name)
 
     def run(self, console: str) -> None:
         """Run a console fence."""
@@ -86,6 +88,8 @@ class Terminal:
                 assert f"\n{shown.command.partition('#')[0].strip()}\n" in (ROOT / ".ci" / "run").read_text()
             elif shown.beside:
                 self._start(command)
+            elif job := KILL.fullmatch(command.partition("#")[0].strip()):
+                self._stop(int(job[1]))
             else:
                 self._run(command, shown)
 
@@ -120,6 +124,14 @@ class Terminal:
             running = process.poll() is None and time.monotonic() < end_s
             assert running, f"{command} did not start\n{self._log()}"
             time.sleep(POLL_EVERY_S)
+
+    def _stop(self, job: int) -> None:
+        """End what was started last beside the others; the shell gives the number of that job to the next one."""
+        assert job == len(self._beside), f"kill %{job}: the job that was started last is %{len(self._beside)}"
+        command, process, _ = self._beside.pop()
+        process.terminate()
+        code = process.wait(TIMEOUT_S)
+        assert code in (0, -signal.SIGTERM), f"{command}: exit code {code}\n{self._log()}"
 
     def _ready_socket(self, words: list[str]) -> Path | None:
         """The socket that a command which serves others makes; None for one that ends by itself."""

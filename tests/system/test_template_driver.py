@@ -74,8 +74,9 @@ def test_by_path_without_any_package(tmp_path: Path) -> None:
 
 
 def test_the_guide_is_right() -> None:
-    """Every gauge in the guide's YAML is one that its driver accepts, and what the guide names exists."""
-    guide = (ROOT / "README.md").read_text()
+    """Every gauge in the guides' YAML is one that its driver accepts, and what the guides name exists."""
+    pages = ("add-a-gauge", "describe-a-gauge", "write-a-driver")
+    guide = "\n".join((ROOT / "docs" / "how-to" / f"{page}.md").read_text() for page in pages)
     blocks = [yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", guide, re.DOTALL)]
     gauges = {name: options for block in blocks for name, options in block.get("gauges", {}).items()}
     assert len(gauges) >= 3

@@ -39,7 +39,7 @@ def list_gauges() -> None:
         options = ", ".join(entry.needed_options)
         table.add_row(entry.name, entry.line_kind, entry.title, options, "yes" if entry.simulated else "no")
     Console().print(table)
-    typer.echo('An unknown gauge: `compd gauge learn`. README.md, "Add a gauge", says the rest.')
+    typer.echo("An unknown gauge: `compd gauge learn`; docs/how-to/describe-a-gauge.md says the rest.")
 
 
 @gauge.command()
