@@ -59,14 +59,23 @@ def without_numbers(line: str) -> str:
     return " ".join(re.sub("([━─])+", r"\1", line).split())
 
 
-def check_printed(shown: Shown, output: str) -> None:
-    """Every line of the page is there, in its order; `...` stands for anything, alone for any lines."""
+def missing_line(shown: Shown, output: str) -> str | None:
+    """The first line of the page that is not there in its order; `...` stands for anything, alone for any lines."""
     printed = iter([without_numbers(line) for line in output.splitlines()])
     for line in shown.prints:
         wanted = re.compile(".*".join(map(re.escape, without_numbers(line).split("..."))))
-        assert line == "..." or any(wanted.fullmatch(text) for text in printed), (
-            f"$ {shown.command}\n{line!r} is not in\n{output}"
-        )
+        if line != "..." and not any(wanted.fullmatch(text) for text in printed):
+            return line
+    return None
+
+
+def is_printed(shown: Shown, output: str) -> bool:
+    return missing_line(shown, output) is None
+
+
+def check_printed(shown: Shown, output: str) -> None:
+    line = missing_line(shown, output)
+    assert line is None, f"$ {shown.command}\n{line!r} is not in\n{output}"
 
 
 class Terminal:
@@ -75,8 +84,8 @@ class Terminal:
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
-        for name in ("config", "drivers"):
-            (directory / name).symlink_to(ROOT / name)
+        self._logs: list[Path] = []
+        (directory / "config").symlink_to(ROOT / "config")
 
     def run(self, console: str) -> None:
         """Run a console fence."""
@@ -87,9 +96,7 @@ class Terminal:
                 # minutes each: .ci/run runs them
                 assert f"\n{shown.command.partition('#')[0].strip()}\n" in (ROOT / ".ci" / "run").read_text()
             elif shown.beside:
-                self._start(command)
-            elif job := KILL.fullmatch(command.partition("#")[0].strip()):
-                self._stop(int(job[1]))
+                self._start(command, shown)
             else:
                 self._run(command, shown)
 
@@ -113,16 +120,21 @@ class Terminal:
                 process.kill()
         assert not failed, f"failed beside the others: {failed}\n{self._log()}"
 
-    def _start(self, command: str) -> None:
+    def _start(self, command: str, shown: Shown) -> None:
+        """Start a command that runs beside the rest; return when it is ready and has printed what the page shows."""
         words = shlex.split(command, comments=True)
         socket = self._ready_socket(words)
-        with (self.directory / "beside.log").open("ab") as log:
-            process = self._popen(f"exec {command}", log.fileno())
+        log = self.directory / f"beside-{len(self._logs) + 1}.log"
+        self._logs.append(log)
+        with log.open("wb") as output:
+            process = self._popen(f"exec {command}", output.fileno())
         self._beside.append((command, process, socket is not None))
         end_s = time.monotonic() + TIMEOUT_S
-        while socket is not None and not socket.exists():
-            running = process.poll() is None and time.monotonic() < end_s
-            assert running, f"{command} did not start\n{self._log()}"
+        while not ((socket is None or socket.exists()) and is_printed(shown, log.read_text(errors="replace"))):
+            if process.poll() is not None or time.monotonic() > end_s:
+                check_printed(shown, log.read_text(errors="replace"))
+                assert socket is None, f"{command} did not start\n{self._log()}"
+                return
             time.sleep(POLL_EVERY_S)
 
     def _stop(self, job: int) -> None:
@@ -187,5 +199,4 @@ class Terminal:
         )
 
     def _log(self) -> str:
-        log = self.directory / "beside.log"
-        return log.read_text(errors="replace")[-4000:] if log.exists() else ""
+        return "\n".join(log.read_text(errors="replace")[-4000:] for log in self._logs)
