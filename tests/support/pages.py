@@ -18,6 +18,8 @@ from tests.support.terminal import Terminal
 # Fences that are run or read, and those that are shown only: nothing in these may be a command.
 RUN = {"console", "python", "yaml"}
 SHOWN = {"text", "json", "c", "ini"}
+# Pages whose commands install into the system.
+INSTALLS = {"docs/how-to/run-under-systemd.md"}
 # Written by a program, or run by a test of their own.
 GENERATED = ("docs/reference/", "docs/_build/", "docs/gallery/")
 
@@ -66,7 +68,7 @@ def run_page(name: str) -> None:
     with run_directory() as directory:
         before = Path.cwd()
         os.chdir(directory)
-        terminal = document.namespace["terminal"] = Terminal(directory)
+        terminal = document.namespace["terminal"] = Terminal(directory, name in INSTALLS)
         try:
             for example in document.examples():
                 print(f"--- {name}, line {example.line}")

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from compd.client import connect
 from compd.demo.session import wait_for_gauges
 from tests.support.paths import ROOT
+from tests.support.staging import make_stage, staged
 
 # What the pages write, and what it is while a test runs.
 MACHINE = "/tmp/machine"
@@ -84,8 +85,10 @@ def check_printed(shown: Shown, output: str) -> None:
 class Terminal:
     """One directory with the checkout's `config` and `drivers`, and the processes that run beside the others."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, installs: bool = False) -> None:
+        """installs : the page installs into the system; a stage stands in for it."""
         self.directory = directory
+        self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
         (directory / "config").symlink_to(ROOT / "config")
@@ -190,11 +193,23 @@ class Terminal:
         return output + process.stdout.read().decode()
 
     def _popen(self, command: str, output: int) -> subprocess.Popen[bytes]:
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
+        variables: dict[str, str] = {}
+        if self._stage is not None:
+            command = staged(command, self._stage)
+            paths.insert(0, str(self._stage / "bin"))
+            variables["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
         return subprocess.Popen(
             ["bash", "-c", command],
             cwd=self.directory,
-            env={**os.environ, "PATH": path, "COLUMNS": WIDTH, "NO_COLOR": "1", "PYTHONUNBUFFERED": "1"},
+            env={
+                **os.environ,
+                **variables,
+                "PATH": os.pathsep.join(paths),
+                "COLUMNS": WIDTH,
+                "NO_COLOR": "1",
+                "PYTHONUNBUFFERED": "1",
+            },
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
