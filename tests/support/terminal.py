@@ -91,7 +91,8 @@ class Terminal:
         self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
-        (directory / "config").symlink_to(ROOT / "config")
+        for name in ("config", "drivers"):
+            (directory / name).symlink_to(ROOT / name)
 
     def run(self, console: str) -> None:
         """Run a console fence."""
@@ -102,6 +103,8 @@ class Terminal:
                 assert f"\n{shown.command.partition('#')[0].strip()}\n" in (ROOT / ".ci" / "run").read_text()
             elif shown.beside:
                 self._start(shown)
+            elif job := KILL.fullmatch(shown.command.partition("#")[0].strip()):
+                self._stop(int(job[1]))
             else:
                 self._run(shown)
 
