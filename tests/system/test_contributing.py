@@ -19,8 +19,13 @@ REGISTRIES = (
     "tests/unit/library",
     "tests/unit/simulation/test_causes.py",
     "tests/unit/simulation/test_seeds.py",
-    "tests/unit/live",
-    "tests/unit/cli",
+    "tests/unit/live/test_client.py",
+    "tests/unit/live/test_cycle.py",
+    "tests/unit/live/test_daemon.py",
+    "tests/unit/live/test_message_keys.py",
+    "tests/unit/live/test_setpoint.py",
+    "tests/unit/live/test_states.py",
+    "tests/unit/cli/test_status_command.py",
     "tests/guard",
 )
 
