@@ -26,6 +26,7 @@ REGISTRIES = (
     "tests/unit/live/test_setpoint.py",
     "tests/unit/live/test_states.py",
     "tests/unit/cli/test_status_command.py",
+    "tests/unit/docs/test_reference.py",
     "tests/guard",
 )
 
