@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long hidden hidden-sample lint wheel bench bench-sample scoreboard nightly clean
+.PHONY: help docs demo test long walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -12,7 +12,8 @@ help:
 	@echo "make test    the tests; two hidden causes are found on wires among them (below 10 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
-	@echo "make wheel   build the wheel, install it in a clean environment, run it"
+	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
+	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (2 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; continues where it stopped)"
@@ -43,6 +44,10 @@ test: $(STAMP)
 long: $(STAMP)
 	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%)
 
+# The worked examples of CONTRIBUTING.md.
+walks: $(STAMP)
+	$(BIN)/pytest -m sample tests/system/test_contributing.py
+
 hidden: $(STAMP)
 	$(BIN)/pytest -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
@@ -56,9 +61,14 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# As git runs it before a commit, on all files.
+pre-commit: $(STAMP)
+	$(BIN)/pre-commit run --all-files --show-diff-on-failure
+
 wheel: $(STAMP) docs
 	rm -rf dist build/wheel-test
-	$(BIN)/python -m build --wheel --outdir dist .
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv build/wheel-test
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers

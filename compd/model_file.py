@@ -5,7 +5,7 @@ One YAML file, written whole or not at all. Each step keeps what it replaced, so
     format: 2               # 1 was written by release 0.1.0, with the same keys; a file without it counts as 1
     machine: tripod-cmm     # name of the configuration, or "external"
     geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
-    release: 0.1.0          # of compd, that wrote it
+    release: 0.2.0          # of compd, that wrote it
     effects:
     - effect: link_sag      # an id, /absolute/file.py:NAME, or a formula written out
       shape: {n: 3.0}       # values of its nonlinear constants

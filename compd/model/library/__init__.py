@@ -1,31 +1,28 @@
 """The library of effects: one file per port, one entry in its EFFECTS per physical cause.
 
-To add an effect, write its entry into the file of its port, a test of its physics (tests/unit/library/test_physics.py),
-and a hidden cause of the same id in compd/simulation/causes; nothing else names it. Effects of other people are found
-as drivers are: by entry point (`compd.effects`), by path, or written as a formula.
+To add an effect, write its entry into the file of its port (PORT.py, a new one where it has none yet), a test of its
+physics (tests/unit/library/test_physics.py), and a hidden cause of the same id in compd/simulation/causes; nothing else
+names it. Effects of other people are found as drivers are: by entry point (`compd.effects`), by path, or written as a
+formula.
 """
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 from compd.errors import PluginError, Problem
-from compd.model.effect import Effect
+from compd.model.effect import PORTS, Effect
 from compd.model.formula.declaration import formula_effect
-from compd.model.library import base_joint, frame, joint, link, platform_joint, reference, scale, tool
 from compd.plugins import EFFECTS, load, names
 
+_PORT_FILES = {module.name for module in pkgutil.iter_modules(__path__)}
+
 # In the order of the kinematics: readings, links, joints, tool, and what the reference instrument adds.
-BUNDLED: tuple[Effect, ...] = (
-    *scale.EFFECTS,
-    *joint.EFFECTS,
-    *frame.EFFECTS,
-    *link.EFFECTS,
-    *base_joint.EFFECTS,
-    *platform_joint.EFFECTS,
-    *tool.EFFECTS,
-    *reference.EFFECTS,
+BUNDLED: tuple[Effect, ...] = tuple(
+    effect for port in PORTS if port in _PORT_FILES for effect in import_module(f"{__name__}.{port}").EFFECTS
 )
 
 

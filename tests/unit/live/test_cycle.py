@@ -262,8 +262,7 @@ def test_a_target_out_of_reach_is_refused_by_name(tripod):
 def test_a_target_beyond_the_links_stroke_is_refused_with_link_and_length(tripod):
     tripod.commands.target = Target((0.0, 0.0, -250.0))
     setpoint = tripod.step()
-    assert not setpoint.valid
-    assert setpoint.state is State.REFUSED
+    assert (setpoint.state, setpoint.valid) == (State.REFUSED, False)
     assert "link 1: " in setpoint.reason
     assert "beyond its stroke, 330 to 660 mm" in setpoint.reason
 
