@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard nightly clean
+.PHONY: help docs demo test long pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
+	@echo "make pages   every command and piece of Python of README and docs, run (3 min)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (2 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
@@ -36,13 +37,19 @@ demo: $(STAMP)
 # third of a processor: four at a time leave two processors enough for everything to be in time.
 HIDDEN := tests/system/test_tutorial.py tests/system/test_hidden_effect.py
 SIDE_BY_SIDE ?= 4
+# Likewise the commands of the documentation's pages and the examples of CONTRIBUTING.md.
+DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
 test: $(STAMP)
 	$(BIN)/pytest $(HIDDEN:%=--ignore=%)
 	$(BIN)/pytest -n 2 $(HIDDEN)
 
 long: $(STAMP)
-	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%)
+	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%)
+
+# Every command and every piece of Python of README and docs/.
+pages: $(STAMP)
+	$(BIN)/pytest -m sample -n 2 --dist worksteal tests/system/test_pages.py
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
@@ -106,7 +113,7 @@ docs: $(STAMP) $(GALLERY)
 
 NIGHTLY_CASES ?= 200
 
-nightly: lint wheel demo test long hidden bench
+nightly: lint wheel demo test pages walks long hidden bench
 	$(MAKE) scoreboard OPTIONS="--most $(NIGHTLY_CASES)"
 
 clean:

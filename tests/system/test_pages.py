@@ -13,6 +13,9 @@ from tests.support.paths import ROOT
 TUTORIAL = "docs/tutorials/missing-effect.md"
 
 
+@pytest.mark.long
+@pytest.mark.sample
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", [name for name in page_names() if name != TUTORIAL])
 def test_everything_on_a_page_runs(name: str) -> None:
     run_page(name)
