@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.configuration import load
+from compd.live.service.requests import REQUESTS
 from compd.configuration.shipped import shipped_configuration
 from compd.demo.processes import Command, run_commands
 
@@ -92,7 +93,7 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
     watch = client.ask({"class": "WATCH", "rate_hz": 10}, "WATCH")
     driven = client.next_setpoint("ok", "slewing")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
-    return {
+    talk = {
         "greeting": Exchange(None, (greeting,)),
         "WATCH": watch,
         "SETPOINT": Exchange(None, (setpoint,)),
@@ -105,6 +106,9 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
         "MODEL": client.ask({"class": "MODEL"}, "MODEL"),
         "READINGS": client.ask({"class": "WATCH", "what": "readings", "rate_hz": 1}, "WATCH", "READINGS"),
     }
+    # a request with no part in this talk is asked as it is, without keys
+    answers = {name: kind.reply.wire_name for name, kind in REQUESTS.items() if kind.reply and name not in talk}
+    return talk | {name: other.ask({"class": name}, answer) for name, answer in answers.items()}
 
 
 def shown(message: Message, left_out: Sequence[str] = ()) -> str:
