@@ -12,10 +12,12 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from compd.client import connect
 from compd.configuration import load
-from compd.live.service.requests import REQUESTS
 from compd.configuration.shipped import shipped_configuration
 from compd.demo.processes import Command, run_commands
+from compd.demo.session import wait_for_gauges
+from compd.live.service.requests import REQUESTS
 
 TIMEOUT_S = 30.0
 # Messages are long; of a list or mapping of likes so many are shown.
@@ -70,6 +72,9 @@ def exchanges() -> Mapping[str, Exchange]:
         ]
         with run_commands(commands, directory / "log.txt"), contextlib.ExitStack() as stack:
             assert load(directory / tripod.name).sockets.unix.path == address
+            # machine zero is refused while a gauge has not been read
+            with connect(address) as observer, connect(address) as daemon:
+                wait_for_gauges(observer, daemon.watch(10.0))
             client, other = (Connection(stack.enter_context(_connected(address))) for _ in range(2))
             return _talk(client, other)
 
@@ -84,7 +89,6 @@ def _connected(address: str) -> socket.socket:
 def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
     greeting = client.next("VERSION")
     client.ask({"class": "WATCH"})
-    client.next_setpoint("no_zero")  # every gauge has been read
     zero = client.ask({"class": "ZERO"}, "ZERO")
     setpoint = client.next_setpoint("ok")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
