@@ -14,7 +14,7 @@ help:
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
 	@echo "make pages   every command and piece of Python of README and docs, run (3 min)"
-	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (2 min)"
+	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; continues where it stopped)"
