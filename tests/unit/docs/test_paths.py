@@ -79,7 +79,9 @@ def paths_in(text: str) -> list[str]:
 @pytest.mark.parametrize("page", pages(), ids=name_of)
 def test_every_path_that_a_page_names_is_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    assert [path for path in paths_in(text) if not exists(path)] == []
+    # the reader writes these, as in CONTRIBUTING
+    written = re.findall(r"^`([^`]+)`, a new file:$", text, flags=re.MULTILINE)
+    assert [path for path in paths_in(text) if path not in written and not exists(path)] == []
 
 
 @pytest.mark.parametrize("page", pages(), ids=name_of)
