@@ -24,7 +24,8 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import find_effect, load_library
-from compd.model_file import Declaration, ModelFile, read_model_file, read_stored
+from compd.model_document import Declaration, read_stored
+from compd.model_file import ModelFile, read_model_file
 from compd.recording.sidecar import EXTERNAL
 
 # An opened recording, or the path of one whose machine is found by its name.

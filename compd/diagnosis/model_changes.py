@@ -17,7 +17,8 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import load_library
-from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
+from compd.model_document import Declaration, Kind, ModelStep, StoredModel
+from compd.model_file import ModelFile
 
 
 def add(model: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording) -> ModelFile:

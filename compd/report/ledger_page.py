@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
-from compd.model_file import StoredModel
+from compd.model_document import StoredModel
 from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
 
 LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")

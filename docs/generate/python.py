@@ -28,7 +28,8 @@ from compd.errors import (
     StateError,
 )
 from compd.model.effect import FittedEffect
-from compd.model_file import EffectNumber, ModelFile, ModelStep
+from compd.model_document import ModelStep
+from compd.model_file import EffectNumber, ModelFile
 from compd.simulation.campaign.simulate_campaign import CampaignFiles
 
 # What the functions return, and what is in it.

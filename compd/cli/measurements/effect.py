@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from compd.comparison.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
     from compd.model.effect import Effect
-    from compd.model_file import Declaration, ModelFile
+    from compd.model_document import Declaration
+    from compd.model_file import ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
 RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
@@ -120,7 +121,7 @@ def fit(
 def undo(model: ModelOption) -> None:
     """Take back the last step; undo again for the step before it. The ledger keeps both."""
     from compd.diagnosis.model_changes import undo as undo_step
-    from compd.model_file import read_stored, write_stored
+    from compd.model_document import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
     write_stored(model, after)

@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from compd.errors import StateError
-from compd.model_file import ModelFile, ModelStep, read_model_file, read_stored
+from compd.model_document import ModelStep, read_stored
+from compd.model_file import ModelFile, read_model_file
 from tests.support.measured import hidden
 
 FORMULA = {
