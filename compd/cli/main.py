@@ -20,7 +20,7 @@ PANELS = {
     "Begin": start,
     "The live machine": live,
     "Learn from measurements": measurements,
-    "A machine that is not there": simulated,
+    "A simulated machine": simulated,
 }
 
 app = typer.Typer(

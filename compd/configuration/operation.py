@@ -79,8 +79,8 @@ class LoopSettings(Section):
     rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)] = Field(description="cycles per second")
     stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
     on_stale: Literal["hold", "fade", "stop"] = Field(
-        description="hold: keep the last correction for hold_s, then stop; fade: take it back to zero over hold_s, "
-        "then stop; stop: invalid at once"
+        description="hold: compute with the last good comparators for hold_s, then stop; fade: let them count less and "
+        "less over hold_s, then stop; stop: invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
     priority: Annotated[int, Field(ge=1, le=98)] = Field(

@@ -1,1 +1,1 @@
-"""A machine that is not there: the commands of this panel of `compd --help`, one module each."""
+"""The simulated machine: the commands of this panel of `compd --help`, one module each."""
