@@ -36,7 +36,7 @@ def write_effect_page(path: Path, effect: Effect, configuration: Configuration) 
     )
     driven = (
         f"Every thermometer shows {WARMING_K:g} K above 20 degC, the plate is {GRADIENT_K:g} K warmer on top, "
-        f"a force of {FORCE_N:g} N presses down, every link grows at {SPEED_MM_PER_S:g} mm/s."
+        f"a force of {FORCE_N:g} N presses down and another one along x, every link grows at {SPEED_MM_PER_S:g} mm/s."
     )
     panels = [
         Panel("Over the workspace", f"Arrows: the tip's error, drawn large. {driven}", _plot_arrows(result)),

@@ -50,6 +50,7 @@ class Drive:
     apart: bool = False
     warming_K: FloatArray = field(default_factory=lambda: np.array([WARMING_K]))
     gradient_K: FloatArray = field(default_factory=lambda: np.array([GRADIENT_K]))
+    force_x_N: FloatArray = field(default_factory=lambda: np.array([FORCE_N]))
     force_z_N: FloatArray = field(default_factory=lambda: np.array([-FORCE_N]))
     pressure_hPa: FloatArray = field(default_factory=lambda: np.array([PRESSURE_hPa]))
     speed_mm_per_s: FloatArray = field(default_factory=lambda: np.array([SPEED_MM_PER_S]))
@@ -172,7 +173,8 @@ def _value(name: str, drive: Drive) -> FloatArray:
         return np.array([20.0])
     if name.startswith("temperature_"):
         return 20.0 + drive.warming_K
-    return {"force_z_N": drive.force_z_N, "pressure_hPa": drive.pressure_hPa}.get(name, np.zeros(1))
+    values = {"force_x_N": drive.force_x_N, "force_z_N": drive.force_z_N, "pressure_hPa": drive.pressure_hPa}
+    return values.get(name, np.zeros(1))
 
 
 def _directions(scale_mm: FloatArray) -> FloatArray:
@@ -220,6 +222,7 @@ def _drives(effect: Effect, needed: Sequence[str]) -> list[tuple[str, FloatArray
     if "force" in effect.needs:
         force = spread(-100, 100)
         drives.append(("force along z, N", force, Drive(here, force_z_N=force)))
+        drives.append(("force along x, N", force, Drive(here, force_x_N=force)))
     if "motion" in effect.needs:
         speed = spread(-100, 100)
         drives.append(("speed of all links, mm/s", speed, Drive(here, speed_mm_per_s=speed)))

@@ -6,6 +6,7 @@ import contextlib
 import json
 import socket
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from io import BufferedReader
@@ -47,14 +48,21 @@ class Connection:
 
     def next(self, name: str) -> Message:
         """The next message of this class; what comes before it is passed over."""
-        return next(message for message in self._messages() if message["class"] in (name, "ERROR"))
+        message = next(message for message in self._messages() if message["class"] in (name, "ERROR"))
+        if message["class"] != name:
+            raise RuntimeError(f"the daemon refused to send {name}: {message['text']}")
+        return message
 
     def next_setpoint(self, *states: str) -> Message:
         """The next setpoint in one of these states."""
         return next(message for message in self._messages() if message.get("state") in states)
 
     def _messages(self) -> Iterator[Message]:
+        """Every message that comes; raises TimeoutError where what is waited for does not come in time."""
+        end_s = time.monotonic() + TIMEOUT_S
         for line in self._lines:
+            if time.monotonic() > end_s:
+                raise TimeoutError(f"only other messages came in {TIMEOUT_S:g} s, the last: {line!r}")
             yield json.loads(line)
 
 

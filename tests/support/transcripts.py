@@ -213,7 +213,8 @@ def replay(gauge: Gauge[Any], line: Any, polls: Sequence[Poll], begin: Callable[
             with pytest.raises(LineFault) as caught:
                 gauge.read(line)
             assert caught.value.quality == poll.fault, f"line {poll.line}: {caught.value}"
-            assert line.drain() == poll.drained, f"line {poll.line}"
+            drained = line.drain()
+            assert drained == poll.drained, f"line {poll.line}: {drained!r} is left on the line, not {poll.drained!r}"
             continue
         readings = gauge.read(line)
         assert len(readings) == len(poll.readings) == len(gauge.channels), f"line {poll.line}"
