@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shlex
@@ -144,7 +145,9 @@ class Terminal:
                 assert socket is None or socket.exists(), f"{command} did not start\n{self._log()}"
                 check_printed(shown, log.read_text(errors="replace"))
                 return
-            time.sleep(POLL_EVERY_S)
+            # until the process ends, or it is time to look again
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(POLL_EVERY_S)
 
     def _stop(self, job: int) -> None:
         """End what was started last beside the others; the shell gives the number of that job to the next one."""

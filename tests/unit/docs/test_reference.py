@@ -35,6 +35,7 @@ from docs.generate.commands import CommandEntry, entries
 from docs.generate.live_examples import Exchange
 from docs.generate.protocol import c_struct, packet_rows
 from docs.generate.schema import ModelSchema, key_unit
+from tests.support.paths import ROOT
 
 LARGEST_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
@@ -143,6 +144,10 @@ def test_the_packet_is_packed_without_padding() -> None:
 def test_the_structure_in_c_has_every_field_in_order() -> None:
     members = re.findall(r"(\w+)(?:\[\d+\])?;", c_struct())
     assert members == [field.name for field in PACKET_FIELDS]
+
+
+def test_the_guide_to_controllers_shows_this_structure() -> None:
+    assert c_struct() in (ROOT / "docs" / "how-to" / "connect-a-controller.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("section", SECTIONS)
