@@ -191,9 +191,7 @@ def _untested(problem: DiagnosisProblem) -> tuple[UntestedEffect, ...]:
     return tuple(UntestedEffect(name, why) for name, why in problem.pool.untestable.items())
 
 
-def _next_measurement(
-    problem: DiagnosisProblem, losses: SubsetLosses, diagnosis: Diagnosis
-) -> list[dict[str, object]]:
+def _next_measurement(problem: DiagnosisProblem, losses: SubsetLosses, diagnosis: Diagnosis) -> list[dict[str, object]]:
     """Rows that tell the first rivals apart; where nothing explains the residual, what to vary."""
     aligned, model = problem.aligned, problem.comparison.fitted
     for step in diagnosis.steps:

@@ -120,7 +120,9 @@ class _Remainder:
                 values = theta[index][of_axis]
                 parameters = dict(zip(names, values.tolist(), strict=True))
                 sizes = {
-                    parameter.name: max(abs(v) for name, v in parameters.items() if name.split("_")[0] == parameter.name)
+                    parameter.name: max(
+                        abs(v) for name, v in parameters.items() if name.split("_")[0] == parameter.name
+                    )
                     for parameter in fit.effect.parameters
                 }
                 squares = float(((fit.values[:, :, of_axis] @ values) ** 2).sum())

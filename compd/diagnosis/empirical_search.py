@@ -97,7 +97,9 @@ class EmpiricalSearch:
         residual = complement(self._problem.data.y)
         best: dict[EmpiricalTerm, tuple[float, EmpiricalFit]] = {}
         for fits in self._fits_by_size.values():
-            for fit, explained in zip(fits, explained_squares([fit.values for fit in fits], residual, complement).tolist(), strict=True):
+            for fit, explained in zip(
+                fits, explained_squares([fit.values for fit in fits], residual, complement).tolist(), strict=True
+            ):
                 if fit.term not in best or explained > best[fit.term][0]:
                     best[fit.term] = explained, fit
         taken: Counter[str] = Counter()

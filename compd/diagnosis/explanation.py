@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from compd.arrays import FloatArray
 from compd.diagnosis.candidates import Candidate
 from compd.diagnosis.changes import change_candidates, moments_s
 from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
@@ -113,7 +114,7 @@ def _search_library(problem: DiagnosisProblem) -> tuple[SubsetLosses, Subset]:
     return losses, best
 
 
-def _losses(problem: DiagnosisProblem, candidates: Sequence[Candidate], values: Sequence[object]) -> SubsetLosses:
+def _losses(problem: DiagnosisProblem, candidates: Sequence[Candidate], values: Sequence[FloatArray]) -> SubsetLosses:
     return SubsetLosses(problem.data, candidates, values, problem.criteria, 1.0 if problem.floor_known else 0.0)
 
 

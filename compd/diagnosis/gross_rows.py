@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.robust import LEAST_SIGMA, robust_regression, robust_sigma
+from compd.comparison.robust import LEAST_SIGMA, robust_regression, trimmed_scale
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
 
@@ -61,7 +61,7 @@ def weigh_rows(
     theta = robust_regression(G, residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
     left = np.full(residual.shape, np.nan)
     left[known] = residual[known] - G @ theta
-    scale = np.maximum(robust_sigma(left[known]), LEAST_SIGMA)
+    scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)
     distance = np.where(known[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)
     gross = far & ~_confirmed(left, known, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))

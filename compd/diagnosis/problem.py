@@ -11,7 +11,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import Comparison
-from compd.comparison.robust import LEAST_SIGMA, robust_sigma
+from compd.comparison.robust import LEAST_SIGMA, trimmed_scale
 from compd.diagnosis.candidates import Candidate, CandidatePool
 from compd.diagnosis.constant import constant_candidate, split_constants
 from compd.diagnosis.criteria import Criteria
@@ -113,9 +113,7 @@ def build_problem(
         _renumbered(neighbour_blocks(aligned.recording)[rows]),
         Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
     )
-    values = tuple(
-        candidate.columns_um[rows] / sigma_um[:, None] * root[:, None, None] for candidate in candidates
-    )
+    values = tuple(candidate.columns_um[rows] / sigma_um[:, None] * root[:, None, None] for candidate in candidates)
     return DiagnosisProblem(
         comparison, pool, candidates, same, criteria, sigma_um, known, weights.gross, rows, root, residual, nuisance,
         data, values,
@@ -126,7 +124,7 @@ def _unit_um(comparison: Comparison) -> FloatArray:
     """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all: a unit only."""
     if comparison.floor.known:
         return comparison.floor.by_axis_um
-    size_um = rms(robust_sigma(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)]))
+    size_um = rms(trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)]))
     return np.full(len(comparison.aligned.labels), max(size_um, LEAST_SIGMA))
 
 

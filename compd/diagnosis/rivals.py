@@ -68,7 +68,5 @@ def _substitutes(losses: SubsetLosses, rest: Collection[int], member: int) -> li
     """Effects of the library that are not in the set."""
     names = {losses.name(k) for k in (*rest, member)}
     return [
-        k
-        for k, candidate in enumerate(losses.candidates)
-        if candidate.name not in names and candidate.kind == "effect"
+        k for k, candidate in enumerate(losses.candidates) if candidate.name not in names and candidate.kind == "effect"
     ]
