@@ -39,15 +39,36 @@ def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
 
 
 def best_acceptable(losses: SubsetLosses) -> Subset:
-    """Of all sets that were evaluated the best plausible one, without the members that it does not need."""
-    for subset in losses.scored[:MOST_RANKED]:
-        if not subset.members:
+    """Of all sets that were evaluated the best plausible one, without the members that it does not need.
+
+    A description is no cause where effects do about as well: of sets that score alike, within an effect's price, the
+    one counts of which the effects alone score best.
+    """
+    best = Subset((), losses.baseline)
+    best_score = effects_score = float("inf")
+    ranked: dict[frozenset[str], Subset] = {}
+    for subset in losses.scored:
+        ranked.setdefault(frozenset(losses.name(k) for k in subset.members), subset)
+        if len(ranked) >= MOST_RANKED:
             break
-        if losses.is_plausible(subset.members):
-            needed = _pruned(losses, subset)
-            if losses.is_plausible(needed.members):
-                return needed
-    return Subset((), losses.baseline)
+    for subset in ranked.values():
+        if losses.score(subset) > best_score + losses.criteria.effect_price:
+            break
+        needed = _pruned(losses, subset) if losses.is_plausible(subset.members) else None
+        if needed is None or not losses.is_plausible(needed.members):
+            continue
+        best_score = min(best_score, losses.score(needed))
+        effects = Subset(*_without_descriptions(losses, needed))
+        if losses.score(effects) < effects_score:
+            best, effects_score = needed, losses.score(effects)
+        if not needed.members or not losses.describes:
+            break
+    return best
+
+
+def _without_descriptions(losses: SubsetLosses, subset: Subset) -> tuple[tuple[int, ...], float]:
+    effects = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
+    return effects, losses.loss(effects)
 
 
 def _exchanged(losses: SubsetLosses, subset: Subset) -> Subset:

@@ -73,6 +73,11 @@ class SubsetLosses:
         """Cross-validated loss without any candidate, L(0)."""
         return self.equations.nuisance_cv_loss
 
+    @cached_property
+    def describes(self) -> bool:
+        """Whether descriptions are among the candidates."""
+        return any(candidate.kind in ("description", "change") for candidate in self.candidates)
+
     def name(self, member: int) -> str:
         """The id of a candidate's effect."""
         return self.candidates[member].name
