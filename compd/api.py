@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -22,6 +23,7 @@ from compd.diagnosis.next_measurement import plan_measurement as plan_fitted_riv
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
+from compd.model.effect_needs import can_concern
 from compd.model.library import find_effect, load_library
 from compd.model.library.effects_file import gather_effects, named_effect
 from compd.model_document import read_stored
@@ -71,7 +73,7 @@ def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
     path = Path(path)
     if machine is None:
         name = read_stored(path).machine
-        links = 0 if name == EXTERNAL else _shipped_links(name, path)
+        links = None if name == EXTERNAL else _shipped_links(name, path)
     else:
         configuration = load_machine(machine)
         name, links = configuration.machine, configuration.geometry.links
@@ -169,7 +171,8 @@ def diagnose(
     aligned = _opened(recording)
     file = _opened_model(model, aligned)
     given = gather_effects(effects)
-    library = [effect for effect in load_library().values() if aligned.model is not None or not effect.live]
+    rows = aligned.rows
+    library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
     candidates = [*library, *given.values()]
     return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress or (lambda status: None))
 
@@ -342,7 +345,18 @@ def _opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
                 next_step="give this machine's model, or begin a new one",
             )
         )
-    return model
+    if model.links not in (0, links):
+        raise StateError(
+            Problem(
+                where="model",
+                what="has another number of links than the recording",
+                value=str(model.links),
+                allowed=str(links),
+                next_step="give the model of these links, or begin a new one",
+            )
+        )
+    # of an external model, whose effects had no number of a single link
+    return replace(model, links=links)
 
 
 def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:
