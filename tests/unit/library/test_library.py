@@ -17,6 +17,7 @@ from compd.model.effect import PORTS, Effect, FittedEffect
 from compd.model.effect_needs import can_concern, needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find_effect, load_library
 from compd.model.motion import Movement, update_motion
+from compd.model.observations import Observations
 from compd.model.observe import observe_external
 from tests.support.effect_rows import (
     HEXAPOD,
