@@ -44,7 +44,13 @@ _SENSITIVITY_STEM = r"d_[A-Za-z]\w*_(?:[xyz]|link_[1-9]\d*)"
 COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
     ColumnKind(names, re.compile(stem), unit, meaning)
     for names, stem, unit, meaning in (
-        ("time_s", r"time", "s", "seconds from the start; every row is later than the one above"),
+        (
+            "time_s",
+            r"time",
+            "s",
+            "seconds from the start; every row is later than the one above. With `machine: external` optional: the "
+            "rows then count as taken in order",
+        ),
         (
             "session",
             r"session",
@@ -70,7 +76,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "approach_<i>",
             r"approach_[1-9]\d*",
             "",
-            "1 or -1: the direction in which link i last moved; without it, from the scales",
+            "1 or -1: the direction in which link i, or axis i of an external model, last moved; without it, from the "
+            "scales",
         ),
         (
             "reference_x_mm, reference_y_mm, reference_z_mm",

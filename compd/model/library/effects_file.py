@@ -90,7 +90,7 @@ def named_effect(name: str, where: str, given: Mapping[str, Effect] | None = Non
         return find_effect(f"{Path(source).resolve()}:{chosen}", where)
     if name in given:
         return given[name]
-    if not _is_source(source):
+    if not chosen and not _is_source(source):
         return find_effect(name, where, given)
     effects = load_effects(source)
     if not chosen and len(effects) == 1:

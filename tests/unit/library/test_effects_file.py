@@ -132,6 +132,8 @@ def test_an_effect_is_named_by_its_file_and_id(tmp_path: Path) -> None:
     assert "stage_offset, stage_gain" in str(refused.value)
     with pytest.raises(CompdError, match="no such effect in this file"):
         named_effect(f"{stage}:stage_bow", "here")
+    with pytest.raises(CompdError, match="no file of effects of this name"):
+        named_effect("no-such-library:an", "here")
     with pytest.raises(CompdError, match="no such effect") as refused:
         named_effect("stage_bow", "here", load_effects(stage))
     assert "stage_gain" in str(refused.value)
