@@ -55,15 +55,19 @@ def estimate_parameters(
 def is_plausible(limits: tuple[float, float], theta: float, std: float, criteria: Criteria) -> bool:
     """Whether a fitted parameter may be inside its range (low, high), given its standard error.
 
-    It may be outside by `range_sigmas` standard errors, or by `range_slack` of the range; but where the range ends at
-    zero, beyond it is the wrong sign, and only the standard error counts. An unknown standard error (nan) excuses
-    nothing.
+    It may be outside by `range_sigmas` standard errors, or by `range_slack` of the range. A range on one side of zero
+    gives the sign, too: the slack ends at zero, and beyond it only the standard error counts. An unknown standard error
+    (nan) excuses nothing::
+
+        is_plausible((0.5, 200.0), 0.0, 0.1, criteria)  # True: weaker than usual
+        is_plausible((0.5, 200.0), -18.0, 0.1, criteria)  # False: the wrong sign
     """
     low, high = limits
     margin = criteria.range_sigmas * float(np.nan_to_num(std))
     slack = criteria.range_slack * (high - low)
-    below, above = (margin if end == 0 else max(margin, slack) for end in (low, high))
-    return bool(low - below <= theta <= high + above)
+    lowest = -margin if 0 <= low <= slack else low - max(margin, slack)
+    highest = margin if 0 <= -high <= slack else high + max(margin, slack)
+    return bool(lowest <= theta <= highest)
 
 
 def is_undetermined(limits: FloatArray, std: FloatArray) -> bool:
