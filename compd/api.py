@@ -13,7 +13,6 @@ from compd.comparison.compare import Comparison
 from compd.comparison.compare import compare as compare_aligned
 from compd.comparison.open import open_recording
 from compd.comparison.shape_search import search_constants
-from compd.configuration.document import read_document
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
@@ -24,7 +23,8 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import find_effect, load_library
-from compd.model_document import Declaration, read_stored
+from compd.model.library.effects_file import gather_effects, named_effect
+from compd.model_document import read_stored
 from compd.model_file import ModelFile, read_model_file
 from compd.recording.sidecar import EXTERNAL
 
@@ -32,6 +32,8 @@ from compd.recording.sidecar import EXTERNAL
 Recorded: TypeAlias = AlignedRecording | str | Path
 # An opened model or its path; None for the machine without effects.
 Model: TypeAlias = ModelFile | str | Path | None
+# Effects of one's own: an effect, a source of effects as `load_effects` takes it, or several of these.
+Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
 # Lowest and highest.
 Range: TypeAlias = tuple[float, float]
 
@@ -118,7 +120,7 @@ def diagnose(
     recording: Recorded,
     model: Model = None,
     *,
-    effects: Sequence[Effect] = (),
+    effects: Effects = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Learn which physical effect the model of the machine lacks.
@@ -133,8 +135,9 @@ def diagnose(
         make effects distinguishable.
     model : ModelFile, str or Path, optional
         What is known already; its effects are fitted along. The file is not changed.
-    effects : sequence of Effect
-        Effects of your own, tried beside those that are installed.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own, tried beside those that are installed: each an effect, or a source of several as
+        `load_effects` takes it.
     progress : callable
         Called with a text when a stage of the search begins. A diagnosis takes seconds.
 
@@ -146,10 +149,13 @@ def diagnose(
     Raises
     ------
     CompdError
-        As `compare`.
+        As `compare`, and as `load_effects` for `effects`.
 
     Notes
     -----
+    With ``machine: external`` only those effects of the library are tried that act on what was predicted; the others
+    act inside a machine that compd does not know.
+
     The selection is by cross-validation over sessions with a penalty for each further effect (M. Stone, J. R. Stat.
     Soc. B 36 (1974) 111); every threshold stands with its reason in `compd.diagnosis.criteria`.
 
@@ -162,11 +168,19 @@ def diagnose(
     """
     aligned = _opened(recording)
     file = _opened_model(model, aligned)
-    library = [*load_library().values(), *effects]
-    return diagnose_aligned(aligned, file.fitted, file.covariance, library, progress or (lambda status: None))
+    given = gather_effects(effects)
+    library = [effect for effect in load_library().values() if aligned.model is not None or not effect.live]
+    candidates = [*library, *given.values()]
+    return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress or (lambda status: None))
 
 
-def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], recording: Recorded) -> ModelFile:
+def add_effect(
+    model: Model,
+    effect: Effect | str | Path | Mapping[str, Any],
+    recording: Recorded,
+    *,
+    effects: Effects = (),
+) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
 
     Parameters
@@ -175,10 +189,12 @@ def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], re
         The model as it is; None begins a new one. It is not changed, nor is its file: the result is a new model, kept
         by its `write`.
     effect : Effect, str, Path or dict
-        An effect of the library or its id; ``"/absolute/file.py:NAME"``; a formula as a mapping, such as
-        `EmpiricalFinding.formula_effects` has, or the path of the YAML file that it is written in.
+        An effect of the library or of `effects`, or its id; ``"file.py:NAME"``; a formula as a mapping, such as
+        `EmpiricalFinding.formula_effects` has; the path of a YAML file with one effect, or ``"file.yaml:ID"``.
     recording : AlignedRecording, str or Path
         What to fit on.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own beside those that are installed, as for `diagnose`.
 
     Returns
     -------
@@ -203,9 +219,10 @@ def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], re
     >>> round(compd.compare(monday, model).rms_um, 2)
     0.18
     """
-    declared, found = _declared(effect)
+    found = _found(effect, gather_effects(effects))
+    declared = found.declared if isinstance(found.declared, str) else dict(found.declared)
     aligned = _opened(recording)
-    return model_changes.add(_opened_model(model, aligned), declared, found, aligned)
+    return model_changes.add(_opened_model(model, aligned), declared or found.id, found, aligned)
 
 
 def plan_measurement(
@@ -214,6 +231,7 @@ def plan_measurement(
     *,
     rows: int = 40,
     model: Model = None,
+    effects: Effects = (),
     workspace_M_mm: tuple[Range, Range, Range] | None = None,
     force_N: float | None = None,
     temperature_degC: Range | None = None,
@@ -231,6 +249,8 @@ def plan_measurement(
         How many rows may be measured at most.
     model : ModelFile, str or Path, optional
         What is known already.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own, which may be rivals, as for `diagnose`.
     workspace_M_mm : three pairs of float, optional
         Lowest and highest x, y and z of the tip in {M}, mm; left out, as in the recording.
     force_N : float, optional
@@ -279,7 +299,8 @@ def plan_measurement(
                 next_step="a diagnosis names rivals",
             )
         )
-    effects = [find_effect(name, "rivals") for name in rivals]
+    given = gather_effects(effects)
+    pair = [named_effect(name, "rivals", given) for name in rivals]
     aligned = _opened(recording)
     require_kinematics(aligned)
     file = _opened_model(model, aligned)
@@ -296,7 +317,7 @@ def plan_measurement(
         )
     limits = _limits(recorded_limits(aligned), workspace_M_mm, force_N, temperature_degC, speed_mm_per_s)
     sigma_um = compare_aligned(aligned, file.fitted, file.covariance).floor.by_axis_um
-    first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
+    first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in pair)
     return plan_fitted_rivals(aligned, file.fitted, (first, second), sigma_um, limits, rows)
 
 
@@ -324,24 +345,21 @@ def _opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
     return model
 
 
-def _declared(effect: Effect | str | Path | Mapping[str, Any]) -> tuple[Declaration, Effect]:
-    """How a model file declares the effect, and the effect. Raises CompdError with every problem."""
-    if isinstance(effect, Effect):
-        if load_library().get(effect.id) != effect:
-            raise CompdError(
-                Problem(
-                    where=f"effect {effect.id}",
-                    what="is not installed, so that a model file could not name it",
-                    next_step='put it into a file and give "/absolute/file.py:NAME"',
-                )
-            )
-        return effect.id, effect
+def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:
+    """The effect that is to be added, such that a model file can name it. Raises CompdError with every problem."""
     if isinstance(effect, Mapping):
-        return dict(effect), find_effect(effect, "effect")
-    if Path(effect).suffix in (".yaml", ".yml"):
-        declared = read_document(Path(effect)).data
-        return declared, find_effect(declared, str(effect))
-    return str(effect), find_effect(str(effect), "effect")
+        return find_effect(effect, "effect")
+    if not isinstance(effect, Effect):
+        return named_effect(str(effect), "effect", given)
+    if not effect.declared and load_library().get(effect.id) != effect:
+        raise CompdError(
+            Problem(
+                where=f"effect {effect.id}",
+                what="is not installed, so that a model file could not name it",
+                next_step='put it into a file and give "/absolute/file.py:NAME"',
+            )
+        )
+    return effect
 
 
 def _shipped_links(name: str, path: Path) -> int:

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 from compd.diagnosis.problem import DiagnosisProblem
 from compd.diagnosis.selection import estimate_parameters, explained_fraction, is_undetermined, penalty
 from compd.diagnosis.subset_search import Subset, SubsetSearch
-from compd.diagnosis.verdict import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 
 
 def candidate_results(

@@ -17,6 +17,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import Remainder, find_pair, rank_findings
 from compd.diagnosis.empirical_search import cv_losses_beside
 from compd.diagnosis.explanation import Explanation, Progress, explain
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding
 from compd.diagnosis.measurement_programmes import recorded_limits
 from compd.diagnosis.next_measurement import plan_measurement
 from compd.diagnosis.problem import DiagnosisProblem, build_problem, screen_outliers
@@ -25,7 +26,7 @@ from compd.diagnosis.selection import estimate_parameters, explained_fraction, i
 from compd.diagnosis.significance import OrthogonalComplement, p_values
 from compd.diagnosis.subset_search import SubsetSearch
 from compd.diagnosis.unmodelled import with_disturbances
-from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, Verdict
+from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 

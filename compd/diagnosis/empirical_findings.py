@@ -11,9 +11,9 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_search import EmpiricalFit, best_by_covariate
+from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.regression import RegressionData, normal_equations
 from compd.diagnosis.significance import OrthogonalComplement, p_values
-from compd.diagnosis.verdict import EmpiricalFinding
 
 
 class Remainder(NamedTuple):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from compd.diagnosis.findings import Rival
 from compd.diagnosis.significance import OrthogonalComplement
 from compd.diagnosis.subset_search import Subset, SubsetSearch
-from compd.diagnosis.verdict import Rival
 
 
 def simplify(search: SubsetSearch, subset: Subset) -> Subset:

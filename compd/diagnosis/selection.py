@@ -6,7 +6,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.verdict import ParameterEstimate
+from compd.diagnosis.findings import ParameterEstimate
 from compd.model.effect import Effect
 
 

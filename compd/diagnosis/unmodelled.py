@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult
+from compd.comparison.fit import FitResult, registration_beside
 from compd.comparison.least_squares import normal_inverse
 from compd.diagnosis.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
@@ -55,7 +55,8 @@ def with_disturbances(
     if not others or not result.fitted:
         return result
     own_um = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in result.fitted]
-    A = _whitened(np.concatenate([*own_um, aligned.registration_columns * UM_PER_MM], axis=2), result, sigma_um)
+    own = np.concatenate(own_um, axis=2)
+    A = _whitened(np.concatenate([own, registration_beside(aligned, own, result.used)], axis=2), result, sigma_um)
     inverse = normal_inverse(A, RANK_CUT)
     added = np.zeros((A.shape[1], A.shape[1]))
     variance = criteria.disturbance**2 * criteria.disturbances

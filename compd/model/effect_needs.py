@@ -47,6 +47,8 @@ def needed_quantities(effect: Effect, links: int) -> list[str]:
     for need in effect.needs:
         if "{link}" in need:
             quantities += [need.format(link=i + 1) for i in range(links)]
+        elif "{axis}" in need:
+            quantities += [need.format(axis=axis) for axis in "xyz"]
         elif need in _QUANTITIES_OF_NEED:
             quantities += _QUANTITIES_OF_NEED[need]
         elif need not in _SETTINGS:
@@ -64,8 +66,7 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
         Problem(
             where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
         )
-        for name in needed_quantities(effect, links)
-        if name not in available
+        for name in _missing_quantities(effect, available, links)
     ]
     problems += [
         Problem(
@@ -86,6 +87,13 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
             )
         )
     return problems
+
+
+def _missing_quantities(effect: Effect, available: Collection[str], links: int) -> list[str]:
+    """What of `needed_quantities` is not available; of a need for each axis one axis is enough."""
+    of_axes = {need: [need.format(axis=axis) for axis in "xyz"] for need in effect.needs if "{axis}" in need}
+    enough = {name for names in of_axes.values() if any(name in available for name in names) for name in names}
+    return [name for name in needed_quantities(effect, links) if name not in available and name not in enough]
 
 
 def _gauge_to_add(name: str) -> str:

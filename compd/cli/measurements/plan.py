@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import EffectsOption, MachineOption
 
 
 def plan(
@@ -18,6 +18,7 @@ def plan(
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
     machine: MachineOption = None,
     model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
+    effects: EffectsOption = None,
     workspace: Annotated[
         str | None,
         typer.Option(help="Where the tip may go, in mm: x0,x1,y0,y1,z0,z1; as in the recording if left out."),
@@ -44,6 +45,7 @@ def plan(
         (first, second),
         rows=rows,
         model=model,
+        effects=effects or (),
         workspace_M_mm=None if box is None else ((box[0], box[1]), (box[2], box[3]), (box[4], box[5])),
         force_N=force,
         temperature_degC=None if heat is None else (heat[0], heat[1]),

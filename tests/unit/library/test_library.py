@@ -33,6 +33,7 @@ from tests.support.model_machines import Floats
 PORT_FILES = {
     module.name: import_module(f"compd.model.library.{module.name}").EFFECTS
     for module in pkgutil.iter_modules(compd.model.library.__path__)
+    if module.name in PORTS
 }
 
 
