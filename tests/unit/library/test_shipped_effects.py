@@ -1,4 +1,4 @@
-"""The files of effects that come with compd for telescopes, stages, axes and plates: their physics, and real machines."""
+"""Files of effects that come with compd, for telescopes, stages, axes and plates: their physics, and real machines."""
 
 from __future__ import annotations
 
@@ -81,9 +81,7 @@ def points_at(azimuth_deg: float, elevation_deg: float, **askew: float) -> tuple
 
 @pytest.mark.parametrize("term", ["IA", "IE", "CA", "NPAE", "AN", "AW"])
 @pytest.mark.parametrize(("azimuth_deg", "elevation_deg"), [(20.0, 35.0), (115.0, 60.0), (230.0, 15.0), (310.0, 75.0)])
-def test_a_geometrical_term_is_what_the_askew_mount_does(
-    term: str, azimuth_deg: float, elevation_deg: float
-) -> None:
+def test_a_geometrical_term_is_what_the_askew_mount_does(term: str, azimuth_deg: float, elevation_deg: float) -> None:
     azimuth_rad, elevation_rad = points_at(azimuth_deg, elevation_deg, **{term: 1.0})
     d_azimuth = (azimuth_rad - np.deg2rad(azimuth_deg) + np.pi) % (2 * np.pi) - np.pi
     expected = np.array([d_azimuth * np.cos(elevation_rad), elevation_rad - np.deg2rad(elevation_deg)]) / ARCSEC
@@ -137,7 +135,9 @@ def test_a_cyclic_error_repeats_after_a_turn(library: str) -> None:
 
 def test_a_reading_20_ms_old_is_behind_a_moving_axis() -> None:
     """At 30 mm/s the axis has moved on by 0.6 mm."""
-    assert 20.0 * moved_um("axis", "axis_latency", speed_mm_per_s=[30.0, -30.0])[:, 0, 0] == pytest.approx([600.0, -600.0])
+    assert 20.0 * moved_um("axis", "axis_latency", speed_mm_per_s=[30.0, -30.0])[:, 0, 0] == pytest.approx(
+        [600.0, -600.0]
+    )
 
 
 def test_a_steel_screw_grows_from_where_it_is_held() -> None:
