@@ -80,18 +80,6 @@ def test_a_range_that_ends_at_zero_has_no_slack_there() -> None:
     assert not is_plausible((0.0, 1.0), -0.01, float("nan"), criteria)
 
 
-def test_the_slack_of_a_range_on_one_side_of_zero_ends_at_zero() -> None:
-    criteria = Criteria(range_sigmas=3.0, range_slack=0.1)
-    for sign in (1.0, -1.0):
-        limits = tuple(sorted((sign * 0.5, sign * 200.0)))
-        assert is_plausible(limits, sign * 219.0, 0.1, criteria)
-        assert is_plausible(limits, 0.0, 0.1, criteria)
-        assert not is_plausible(limits, sign * -18.0, 0.1, criteria)
-        assert is_plausible(limits, sign * -0.1, 0.04, criteria)
-        assert not is_plausible(limits, sign * -0.1, float("nan"), criteria)
-    assert is_plausible((-1.0, 1.0), -1.1, 0.0, criteria)
-
-
 def test_parameters_are_undetermined_unless_one_is_known_better_than_its_range() -> None:
     limits = np.array([[0.0, 1.0], [0.0, 1.0]])
     assert is_undetermined(limits, np.array([2.0, np.nan]))
