@@ -99,7 +99,12 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
         ),
         ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
-        ("force_x_N, force_y_N, force_z_N", r"force_[xyz]", "N", "force on the tip, in {M}"),
+        (
+            "force_x_N, force_y_N, force_z_N",
+            r"force_[xyz]",
+            "N",
+            "force on the tip, in {M}; where the tool stands on the plate, on the work",
+        ),
         ("pressure_hPa", r"pressure", "hPa", "air pressure"),
         ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
         (
