@@ -1,4 +1,4 @@
-"""What could be measured next: short programmes of rows, each with one purpose, within given limits."""
+"""What could be measured next on a machine whose kinematics is known: short programmes of rows, one purpose each."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.diagnosis.programme_rows import ProgrammeRows
 from compd.errors import Problem, RecordingError
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import MachineConstants, Observations, REFERENCE_TEMPERATURE_degC
 from compd.model.observe import observe
 from compd.model.solve_status import Reason
+from compd.recording.plan_file import plan_row
 
 # Places along each edge of the workspace's box.
 PLACES_PER_EDGE = 3
@@ -91,7 +95,33 @@ def recorded_limits(aligned: AlignedRecording) -> ProgrammeLimits:
     )
 
 
-def programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Programme]:
+def machine_programmes(aligned: AlignedRecording, effects: Sequence[Effect], limits: ProgrammeLimits) -> ProgrammeRows:
+    """The programmes within the limits that vary what `effects` are computed from.
+
+    Raises RecordingError where a place within the limits cannot be reached.
+    """
+    assert aligned.model is not None
+    names = list(dict.fromkeys(name for effect in effects for name in needed_quantities(effect, aligned.rows.links)))
+    possible = list(_programmes(aligned, limits, names))
+    observations = _observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
+    purposes = [programme.purpose for programme in possible for _ in range(len(programme))]
+    held = {name: observations.quantities[name] for name in names}
+    fastest_mm_per_s = np.abs(observations.velocity_mm_per_s).max(axis=1)
+    to_set = [
+        plan_row(
+            purpose,
+            observations.time_s[k],
+            observations.tip_M_mm[k],
+            {name: values[k] for name, values in held.items()},
+            observations.direction[k],
+            fastest_mm_per_s[k],
+        )
+        for k, purpose in enumerate(purposes)
+    ]
+    return ProgrammeRows(observations, np.array([len(programme) for programme in possible]), to_set)
+
+
+def _programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Programme]:
     """Programmes that vary one thing each: place, load, temperature, another quantity, direction, speed, time.
 
     names : the quantities that the rivals need; others stay as they are.
@@ -182,7 +212,7 @@ def _temperature_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
     return [*([links] if links else []), *((name,) for name in names if name not in links)]
 
 
-def observe_programmes(
+def _observe_programmes(
     model: MachineModel, constants: MachineConstants, chosen: Sequence[Programme], aligned: AlignedRecording
 ) -> Observations:
     """The programmes as rows that effects can be computed on, each a session of its own, with perfect gauges.

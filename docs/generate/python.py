@@ -9,7 +9,7 @@ from compd.client import Client
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison
 from compd.configuration import Configuration
-from compd.diagnosis.next_measurement import MeasurementPlan
+from compd.diagnosis.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import (
     CandidateResult,
     Diagnosis,
