@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 LEAST_SEPARATION = 3.0
 # Standard deviations that the rows have to add to what was measured: the noise itself moves the difference by one.
 LEAST_GAIN = 1.0
+# A smaller one is rounding.
+LEAST_SHOWN = 0.01
 # A column with more values is told by its range.
 MOST_VALUES = 4
 
@@ -41,12 +43,15 @@ class MeasurementPlan:
         standard deviations of the noise (root of the sum of squares over all rows).
     before : float
         The same on the recording alone.
+    separated_by : str
+        What tells the rivals apart, in words, should these rows not.
     """
 
     rivals: tuple[str, ...]
     rows: tuple[dict[str, Any], ...]
     separation: float
     before: float
+    separated_by: str = ""
 
     @property
     def tells_apart(self) -> bool:
@@ -58,14 +63,18 @@ class MeasurementPlan:
         """What the rows are good for, in a sentence or two."""
         names = f"{', '.join(self.rivals[:-1])} and {self.rivals[-1]}"
         text = (
-            f"{names} differ by {self.before:.2g} times the noise on what was measured, by {self.separation:.2g} times "
-            f"with these {len(self.rows)} rows."
+            f"{names} differ by {as_factor(self.before)} times the noise on what was measured, by "
+            f"{as_factor(self.separation)} times with these {len(self.rows)} rows."
         )
         if self.tells_apart:
             return text
+        if self.separation < LEAST_SHOWN:
+            return f"{text} One of them does nothing on such rows that the other, a constant or the model does not do."
         if self.separation < LEAST_SEPARATION:
-            return f"{text} That does not tell them apart, which takes {LEAST_SEPARATION:.2g}: widen the limits."
-        return f"{text} These rows add little: widen the limits."
+            text += f" That does not tell them apart, which takes {LEAST_SEPARATION:.2g} times."
+        else:
+            text += " These rows add little."
+        return f"{text} Widen the limits, or measure otherwise: {self.separated_by}."
 
     @property
     def instructions(self) -> str:
@@ -79,9 +88,9 @@ class MeasurementPlan:
                 varied.append(f"{name} from {values[0]:g} to {values[-1]:g}")
             elif len(values):
                 varied.append(f"{name} to {', '.join(f'{value:g}' for value in values[:-1])} or {values[-1]:g}")
-        if any(row["time_s"] > 0 for row in self.rows):
-            held.append("the times time_s within each programme")
         parts = [f"set {', '.join(varied)}"] * bool(varied) + [f"hold {', '.join(held)}"] * bool(held)
+        if any(row["time_s"] > 0 for row in self.rows):
+            parts.append("keep to the times time_s, which count from the start of each programme")
         text = "; ".join(parts)
         return f"{text[:1].upper()}{text[1:]}."
 
@@ -148,7 +157,8 @@ class NextMeasurement:
     def promise(self) -> str:
         """What the rows will do; or that there are none, and what would do: a sentence."""
         if self.plan is not None:
-            return f"The rows under 'next' can: with them these differ by {self.plan.separation:.2g} times the noise."
+            factor = as_factor(self.plan.separation)
+            return f"The rows under 'next' can: with them these differ by {factor} times the noise."
         return f"No rows within the limits of this recording can: {self.why}. What can: {self.measure}."
 
     def as_json(self) -> list[dict[str, Any]]:
@@ -156,3 +166,10 @@ class NextMeasurement:
         if self.plan is not None:
             return [dict(row) for row in self.plan.rows]
         return [{"measure": self.measure, "why": self.why}]
+
+
+def as_factor(separation: float) -> str:
+    """A number of standard deviations as people read it: "18", "1.6", "0"."""
+    if separation >= 10:
+        return f"{separation:.0f}"
+    return f"{separation:.2g}" if separation >= LEAST_SHOWN else "0"

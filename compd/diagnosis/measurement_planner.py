@@ -100,10 +100,11 @@ class MeasurementPlanner:
         refit, _ = self._refit(contest)
         return refit.discrepancy_with_all() >= LEAST_SEPARATION**2
 
-    def plan(self, contests: Sequence[Contest], most_rows: int) -> MeasurementPlan:
+    def plan(self, contests: Sequence[Contest], most_rows: int, separated_by: str = "") -> MeasurementPlan:
         """At most so many rows, on which the truth of each contest differs most from its rival.
 
         A programme with a row on which something cannot be computed is not taken.
+        separated_by : what would tell them apart, in words, should the rows not.
         """
         refits, known = zip(*(self._refit(contest) for contest in contests), strict=True)
         lengths = np.where(np.all(known, axis=0), self._possible.lengths, most_rows + 1)
@@ -115,6 +116,7 @@ class MeasurementPlanner:
             rows=tuple({"row": number, **row} for number, row in enumerate(rows, start=1)),
             separation=float(np.sqrt(max(choice.after, 0.0))),
             before=float(np.sqrt(max(choice.before, 0.0))),
+            separated_by=separated_by,
         )
 
     def _refit(self, contest: Contest) -> tuple[RivalRefit, BoolArray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement
+from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
 from compd.diagnosis.measurement_planner import MeasurementPlanner
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
 from compd.diagnosis.measurement_settings import SettingLimits
@@ -54,7 +54,7 @@ def plan_measurement(
     possible = _programmes(aligned, [fitted.effect for fitted in pair], model, limits)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
     first, second = (planner.contender(fitted) for fitted in pair)
-    return planner.plan([(first, second), (second, first)], rows)
+    return planner.plan([(first, second), (second, first)], rows, _words([fitted.effect for fitted in pair]))
 
 
 def next_measurement(
@@ -71,16 +71,15 @@ def next_measurement(
     found : the effect as fitted.  rival : taken with the numbers by which it imitates `found` best.
     sigma_um : (m,) noise; where more is left than noise, what is left.
     """
-    names = (found.effect.id, rival.id)
-    words = " or ".join(dict.fromkeys(effect.separated_by for effect in (found.effect, rival)))
+    effects = [found.effect, rival]
     try:
-        possible = _programmes(aligned, [found.effect, rival], model)
+        possible = _programmes(aligned, effects, model)
     except CompdError as error:
-        return NextMeasurement(names, None, words, error.problems[0].what)
+        return _words_alone(effects, error)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
     first = planner.contender(found)
     second = planner.imitation(first, rival)
-    return _rows_or_words(planner.plan([(first, second), (second, first)], rows), words)
+    return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)))
 
 
 def measurement_of_constant(
@@ -98,19 +97,18 @@ def measurement_of_constant(
     with what is constant everywhere, such as the zero of the instrument. Two causes that no rows within the limits part
     are left out.
     """
-    names = tuple(cause.id for cause in causes)
-    words = " or ".join(dict.fromkeys(cause.separated_by for cause in causes))
     try:
         possible = _programmes(aligned, causes, model)
     except CompdError as error:
-        return NextMeasurement(names, None, words, error.problems[0].what)
+        return _words_alone(causes, error)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False)
     constant = planner.constant(constant_um)
     contenders = [constant, *(planner.imitation(constant, cause) for cause in causes)]
     contests = [contest for contest in permutations(contenders, 2) if planner.separable(contest)]
     if not contests:
-        return NextMeasurement(names, None, words, "they remain one constant on all rows within it")
-    return _rows_or_words(planner.plan(contests, rows), words)
+        names = tuple(cause.id for cause in causes)
+        return NextMeasurement(names, None, _words(causes), "they remain the same constant on all of them")
+    return _rows_or_words(planner.plan(contests, rows, _words(causes)))
 
 
 def measurement_to_test(
@@ -137,16 +135,18 @@ def measurement_to_test(
     try:
         possible = _programmes(aligned, [effect], model)
     except CompdError as error:
-        return NextMeasurement(names, None, effect.separated_by, error.problems[0].what)
+        return _words_alone([effect], error)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
     sizes = [
         EXPECTED_SIZE * max(map(abs, column.parameter.theta_range)) for column in effect.columns(aligned.rows.links)
     ]
     plans = [
-        planner.plan([(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)], rows)
+        planner.plan(
+            [(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)], rows, effect.separated_by
+        )
         for constants in effect.constant_grid(aligned.rows)
     ]
-    return _rows_or_words(max(plans, key=lambda plan: plan.separation), effect.separated_by)
+    return _rows_or_words(max(plans, key=lambda plan: plan.separation))
 
 
 def _programmes(
@@ -162,8 +162,9 @@ def _programmes(
     if aligned.model is not None:
         given = limits if isinstance(limits, ProgrammeLimits) else recorded_limits(aligned)
         return machine_programmes(aligned, effects, given)
-    given_limits = {} if limits is None or isinstance(limits, ProgrammeLimits) else limits
-    possible = setting_programmes(aligned, effects, [fitted.effect for fitted in model], given_limits)
+    by_column = {} if limits is None or isinstance(limits, ProgrammeLimits) else limits
+    # what the model's effects are computed from is varied too: only then are these parted from the others
+    possible = setting_programmes(aligned, [*effects, *(fitted.effect for fitted in model)], by_column)
     if not len(possible.lengths):
         raise CompdError(
             Problem(
@@ -181,7 +182,9 @@ def _unvaried(aligned: AlignedRecording, effect: Effect) -> dict[str, float]:
     usable = aligned.usable.mask
     values = {}
     for name in needed_quantities(effect, aligned.rows.links):
-        known = aligned.rows.quantity(name)[usable]
+        if name not in aligned.rows.quantities:
+            continue
+        known = aligned.rows.quantities[name][usable]
         known = known[np.isfinite(known)]
         if len(known) and np.ptp(known) > 0:
             return {}
@@ -189,13 +192,22 @@ def _unvaried(aligned: AlignedRecording, effect: Effect) -> dict[str, float]:
     return values
 
 
-def _rows_or_words(plan: MeasurementPlan, words: str) -> NextMeasurement:
-    """The plan where it is worth measuring; else `words`, what is, and why."""
+def _words(effects: Sequence[Effect]) -> str:
+    """What tells the effects from others, as they say it themselves."""
+    return "; ".join(dict.fromkeys(effect.separated_by for effect in effects))
+
+
+def _words_alone(effects: Sequence[Effect], error: CompdError) -> NextMeasurement:
+    return NextMeasurement(tuple(effect.id for effect in effects), None, _words(effects), error.problems[0].what)
+
+
+def _rows_or_words(plan: MeasurementPlan) -> NextMeasurement:
+    """The plan where it is worth measuring; else what is, and why, in words."""
     if plan.tells_apart:
         return NextMeasurement(plan.rivals, plan)
     if plan.separation < LEAST_SEPARATION:
-        why = f"the best {len(plan.rows)} rows make a difference of {plan.separation:.2g} times the noise"
+        why = f"the best {len(plan.rows)} rows make a difference of {as_factor(plan.separation)} times the noise"
         why += f", and it takes {LEAST_SEPARATION:.2g}"
     else:
-        why = f"the best {len(plan.rows)} rows add little to a difference of {plan.before:.2g} times the noise"
-    return NextMeasurement(plan.rivals, None, words, why)
+        why = f"the best {len(plan.rows)} rows add little to a difference of {as_factor(plan.before)} times the noise"
+    return NextMeasurement(plan.rivals, None, plan.separated_by, why)

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
@@ -19,6 +19,7 @@ from compd.errors import CompdError, Problem
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
+from compd.recording.columns import approach_columns, scale_columns
 from compd.recording.plan_file import TIP_COLUMNS, settings_row
 
 # A step of a setting is watched for two hours, as long as machines take to warm through, or for 12 minutes; times after
@@ -44,25 +45,22 @@ class _Programmes(NamedTuple):
     columns: Mapping[str, FloatArray]
 
 
-def setting_programmes(
-    aligned: AlignedRecording, effects: Sequence[Effect], model: Sequence[Effect], limits: SettingLimits
-) -> ProgrammeRows:
+def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], limits: SettingLimits) -> ProgrammeRows:
     """Settings of the columns that `effects` are computed from, within the limits.
 
     A grid of all settings, one row each. Where an effect remembers, also steps of one setting that are watched; where
     one changes with time, the same settings again later. Where an effect is computed from derivatives of the external
     model's prediction, which are known where that was computed, the recorded rows again.
 
-    model : effects that are fitted along; columns that only they need are held in the middle of what was recorded.
     limits : by column, where they are not those of the recording.
     Raises CompdError where a limit is given for a column that none of the effects is computed from, or leaves no value.
     """
     usable = aligned.usable.mask
-    columns = {**aligned.recording.quantities, **dict(zip(TIP_COLUMNS, aligned.rows.tip_M_mm.T, strict=True))}
+    columns = {**aligned.rows.quantities, **_motion_columns(aligned.rows)}
     recorded = {name: values for name, values in columns.items() if np.isfinite(values[usable]).any()}
     names = [name for name in _column_names(aligned, effects) if name in recorded]
     _check_names(limits, names)
-    if any(_SENSITIVITY.fullmatch(need) for effect in (*effects, *model) for need in effect.needs):
+    if any(_SENSITIVITY.fullmatch(need) for effect in effects for need in effect.needs):
         return _recorded_rows(aligned, recorded, limits)
     settings = settings_of({name: recorded[name][usable] for name in names}, limits)
     programmes = [_grid(settings)] if settings else []
@@ -70,28 +68,45 @@ def setting_programmes(
         programmes += _watched_steps(settings)
     if any("time" in effect.needs for effect in effects):
         programmes += [_later(settings, watched_s) for watched_s in WATCHED_S]
-    held = [name for name in _column_names(aligned, model) if name in recorded]
-    return _programme_rows(aligned, programmes, recorded, list(dict.fromkeys([*names, *held])))
+    return _programme_rows(aligned, programmes, recorded, names)
 
 
 def _column_names(aligned: AlignedRecording, effects: Sequence[Effect]) -> list[str]:
-    """The columns that the effects are computed from, in the order in which they name them; coordinates last."""
+    """The columns that the effects are computed from, in the order in which they name them; places and motion last."""
     names = [name for effect in effects for name in needed_quantities(effect, aligned.rows.links)]
     rows = aligned.rows.select(np.flatnonzero(aligned.usable.mask)[:PROBED_ROWS])
-    names += [
-        name
-        for axis, name in enumerate(TIP_COLUMNS)
-        if aligned.registered or any(_depends_on_tip(effect, rows, axis) for effect in effects)
-    ]
+    for field, columns in _motion_names(rows).items():
+        for k, name in enumerate(columns):
+            framed = aligned.registered and name in TIP_COLUMNS
+            if framed or any(_depends_on(effect, rows, field, k) for effect in effects):
+                names.append(name)
     return list(dict.fromkeys(names))
 
 
-def _depends_on_tip(effect: Effect, rows: Observations, axis: int) -> bool:
-    """Whether what an effect does changes when all points lie 1 mm further along an axis."""
-    moved = replace(rows, tip_M_mm=rows.tip_M_mm + np.eye(3)[axis])
+def _depends_on(effect: Effect, rows: Observations, field: str, k: int) -> bool:
+    """Whether what an effect does changes with column k of an array of the observations."""
+    moved: dict[str, Any] = {field: np.array(getattr(rows, field))}
+    moved[field][:, k] += 1.0
     constants = effect.constant_grid(rows)[0]
-    here, there = effect.basis(rows, constants, None)[0], effect.basis(moved, constants, None)[0]
+    (here, _), (there, _) = (effect.basis(known, constants, None) for known in (rows, replace(rows, **moved)))
     return not np.array_equal(here, there, equal_nan=True)
+
+
+def _motion_names(rows: Observations) -> dict[str, Sequence[str]]:
+    """The arrays of observations that say where the machine is and how it moves: field -> name of each column."""
+    links = range(1, rows.links + 1)
+    return {
+        "tip_M_mm": TIP_COLUMNS,
+        "scale_mm": scale_columns(rows.links),
+        "direction": approach_columns(rows.links),
+        "velocity_mm_per_s": [f"velocity_{i}_mm_per_s" for i in links],
+    }
+
+
+def _motion_columns(rows: Observations) -> dict[str, FloatArray]:
+    return {
+        name: getattr(rows, field)[:, k] for field, names in _motion_names(rows).items() for k, name in enumerate(names)
+    }
 
 
 def _check_names(limits: SettingLimits, names: Sequence[str]) -> None:
@@ -121,7 +136,7 @@ def _grid(settings: Sequence[Setting]) -> _Programmes:
     for setting, place in zip(settings, places, strict=True):
         columns |= setting.columns(setting.values[place])
     count = places.shape[1]
-    return _Programmes("these settings", np.ones(count, dtype=np.int64), np.zeros(count), columns)
+    return _Programmes("at these settings", np.ones(count, dtype=np.int64), np.zeros(count), columns)
 
 
 def _watched_steps(settings: Sequence[Setting]) -> list[_Programmes]:
@@ -182,13 +197,14 @@ def _programme_rows(
     time_s = np.concatenate([np.zeros(0), *(kind.time_s for kind in programmes)])
     purposes = [kind.purpose for kind in programmes for _ in range(len(kind.time_s))]
     # whatever else observations hold stays as it was in some row
-    rows = replace(
-        aligned.rows.select(np.full(count, np.flatnonzero(usable)[0])),
-        tip_M_mm=np.stack([columns.get(name, np.full(count, np.nan)) for name in TIP_COLUMNS], axis=1),
-        quantities={name: values for name, values in columns.items() if name not in TIP_COLUMNS},
-        time_s=time_s,
-        session_start=_starts(lengths),
-    )
+    rows = aligned.rows.select(np.full(count, np.flatnonzero(usable)[0]))
+    motion: dict[str, Any] = {
+        field: np.stack([columns.get(name, getattr(rows, field)[:, k]) for k, name in enumerate(names)], axis=1)
+        for field, names in _motion_names(rows).items()
+        if names
+    }
+    quantities = {name: columns.get(name, values) for name, values in rows.quantities.items()}
+    rows = replace(rows, **motion, quantities=quantities, time_s=time_s, session_start=_starts(lengths))
     to_set = [
         settings_row(purpose, time_s[k], {name: columns[name][k] for name in shown})
         for k, purpose in enumerate(purposes)

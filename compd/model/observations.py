@@ -129,7 +129,7 @@ class Observations:
         joined: dict[str, Any] = {
             column.name: np.concatenate([getattr(self, column.name), getattr(rows, column.name)])
             for column in fields(self)
-            if column.name not in ("constants", "quantities")
+            if isinstance(getattr(self, column.name), np.ndarray)
         }
         names = [name for name in self.quantities if name in rows.quantities]
         quantities = {name: np.concatenate([self.quantities[name], rows.quantities[name]]) for name in names}
