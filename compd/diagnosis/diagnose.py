@@ -17,7 +17,7 @@ from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.constant import describe_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.explanation import Explanation, Progress, explain
+from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, UntestedEffect
 from compd.diagnosis.gross_rows import gross_rows
 from compd.diagnosis.measurement_programmes import recorded_limits
@@ -75,7 +75,7 @@ def diagnose(
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
     weights = problem.weigh_beside([explanation.losses.candidates[k] for k in explanation.members])
     problem = build_problem(before, pool, criteria, weights)
-    explanation = explain(problem, progress)
+    explanation = explain_again(problem, explanation, progress)
     progress("fitting on the real forward model")
     return _diagnosis(problem, explanation, covariance)
 
