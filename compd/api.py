@@ -410,7 +410,7 @@ def _plan_limits(
             where=name,
             what="is a limit of an external machine" if not external else "is no limit of an external machine",
             allowed="limits by column" if external else "workspace, force, temperature and speed",
-            next_step="give `--limit COLUMN LOW HIGH`, in Python limits={COLUMN: (LOW, HIGH)}" if external else "",
+            next_step="give `--limit COLUMN=LOW,HIGH`, in Python limits={COLUMN: (LOW, HIGH)}" if external else "",
         )
         for name in ([*pairs, *given] if external else [f"limit of {name}" for name in by_column])
     ]

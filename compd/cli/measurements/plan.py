@@ -36,9 +36,9 @@ def plan(
         float | None, typer.Option(min=0, help="Highest speed in mm/s; as in the recording if left out.")
     ] = None,
     limit: Annotated[
-        list[tuple[str, float, float]] | None,
+        list[str] | None,
         typer.Option(
-            metavar="COLUMN LOW HIGH",
+            metavar="COLUMN=LOW,HIGH",
             help="With `machine: external`: lowest and highest value of a column; as in the recording if left out. "
             "May be repeated.",
         ),
@@ -61,7 +61,7 @@ def plan(
         force_N=force,
         temperature_degC=None if heat is None else (heat[0], heat[1]),
         speed_mm_per_s=speed,
-        limits=None if limit is None else _by_column(limit),
+        limits=_by_column(limit or []),
     )
     if out is None:
         planned.write_to(sys.stdout)
@@ -88,22 +88,18 @@ def _pair(text: str) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def _by_column(limits: list[tuple[str, float, float]]) -> dict[str, tuple[float, float]]:
-    """The limits by column. Raises CompdError where there are two for one."""
+def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:
+    """The limits COLUMN=LOW,HIGH by column. Raises CompdError with the first that is not understood."""
     from compd.errors import CompdError, Problem
 
-    by_column = {name: (low, high) for name, low, high in limits}
-    if len(by_column) < len(limits):
-        names = [name for name, _, _ in limits]
-        raise CompdError(
-            Problem(
-                where="--limit",
-                what="is given twice for one column",
-                value=", ".join(name for name in by_column if names.count(name) > 1),
-                allowed="one for each column",
-            )
-        )
-    return by_column
+    limits: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        name, _, numbers = text.partition("=")
+        low, high = _numbers(f"--limit {name}", numbers, 2)
+        if name in limits:
+            raise CompdError(Problem(where=f"--limit {name}", what="is given twice", next_step="leave one out"))
+        limits[name] = low, high
+    return limits
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
