@@ -61,9 +61,10 @@ class MeasurementPlan:
     @property
     def summary(self) -> str:
         """What the rows are good for, in a sentence or two."""
-        names = f"{', '.join(self.rivals[:-1])} and {self.rivals[-1]}"
+        *others, last = self.rivals
+        subject, by = (f"{', '.join(others)} and {last} differ", "by") if others else (f"{last} is seen", "at")
         text = (
-            f"{names} differ by {as_factor(self.before)} times the noise on what was measured, by "
+            f"{subject} {by} {as_factor(self.before)} times the noise on what was measured, {by} "
             f"{as_factor(self.separation)} times with these {len(self.rows)} rows."
         )
         if self.tells_apart:
@@ -157,8 +158,8 @@ class NextMeasurement:
     def promise(self) -> str:
         """What the rows will do; or that there are none, and what would do: a sentence."""
         if self.plan is not None:
-            factor = as_factor(self.plan.separation)
-            return f"The rows under 'next' can: with them these differ by {factor} times the noise."
+            what = "these differ by" if len(self.effects) > 1 else "it is seen at"
+            return f"The rows under 'next' can: with them {what} {as_factor(self.plan.separation)} times the noise."
         return f"No rows within the limits of this recording can: {self.why}. What can: {self.measure}."
 
     def as_json(self) -> list[dict[str, Any]]:

@@ -11,9 +11,9 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.least_squares import solve_least_squares
 from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan
-from compd.diagnosis.programme_rows import ProgrammeRows, columns_on, nuisance_columns_on
+from compd.diagnosis.programme_rows import ProgrammeRows, at_rows
 from compd.diagnosis.t_optimal import Predictions, RivalRefit, choose_programmes
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
 
 
@@ -60,15 +60,17 @@ class MeasurementPlanner:
         with_nuisance : whether the instrument's frame and the constants are fitted along as well.
         """
         self._aligned, self._sigma_um, self._possible = aligned, sigma_um, possible
+        self._planned = at_rows(aligned, possible.observations)
         self._along = [self.contender(effect).columns for effect in model]
         if with_nuisance:
-            self._along.append(self._whitened(*nuisance_columns_on(aligned, possible.observations)))
+            # one frame for all rows
+            nuisance_mm = at_rows(aligned, aligned.rows.extended_by(possible.observations)).registration_columns
+            self._along.append(self._whitened(*np.split(nuisance_mm, [len(aligned.rows)])))
 
     def contender(self, fitted: FittedEffect) -> Contender:
         """A fitted effect."""
-        recorded = self._aligned.columns(fitted.effect, fitted.constants)
-        (possible,) = columns_on(self._aligned, self._possible.observations, [fitted])
-        return Contender(fitted.effect.id, self._whitened(recorded, possible), fitted.theta)
+        columns = (rows.columns(fitted.effect, fitted.constants) for rows in (self._aligned, self._planned))
+        return Contender(fitted.effect.id, self._whitened(*columns), fitted.theta)
 
     def constant(self, by_axis_um: FloatArray) -> Contender:
         """A constant (m,) of the measured coordinates."""
@@ -77,23 +79,24 @@ class MeasurementPlanner:
         columns = (np.broadcast_to(axes, (count, *axes.shape)) for count in counts)
         return Contender("a constant", self._whitened(*columns), by_axis_um)
 
-    def imitation(self, truth: Contender, effect: Effect) -> Contender:
-        """An effect with the numbers and nonlinear constants by which it imitates `truth` best on the recording."""
-        links = self._aligned.rows.links
-        best, least = None, np.inf
-        for constants in effect.constant_grid(self._aligned.rows):
-            contender = self.contender(FittedEffect(effect, np.zeros(len(effect.columns(links))), constants))
-            columns = [contender.columns, *self._along]
-            rows = self._known([truth.columns, *columns])
-            A = np.concatenate([part.recorded[rows] for part in columns], axis=2)
+    def imitation(self, truth: Contender, effect: Effect, constants: ConstantValues | None = None) -> Contender:
+        """An effect with the numbers by which it imitates `truth` best on the recording.
+
+        constants : its nonlinear constants; None for those of its grid by which it does best.
+        """
+        grid = effect.constant_grid(self._aligned.rows) if constants is None else [constants]
+        along = [part.recorded for part in self._along]
+        trials = []
+        for trial in grid:
+            columns = self._aligned.columns(effect, trial) * UM_PER_MM / self._sigma_um[:, None]
+            rows = self._known([truth.columns.recorded, columns, *along])
+            A = np.concatenate([part[rows] for part in (columns, *along)], axis=2)
             A = A.reshape(-1, A.shape[2])
             y = (truth.columns.recorded[rows] @ truth.theta).ravel()
             theta = solve_least_squares(A, y)
             left = float(((y - A @ theta) ** 2).sum())
-            if best is None or left < least:
-                best, least = contender._replace(theta=theta[: len(contender.theta)]), left
-        assert best is not None
-        return best
+            trials.append((left, FittedEffect(effect, theta[: columns.shape[2]], trial)))
+        return self.contender(min(trials, key=lambda pair: pair[0])[1])
 
     def separable(self, contest: Contest) -> bool:
         """Whether all possible rows together would tell the two apart."""
@@ -123,7 +126,7 @@ class MeasurementPlanner:
         """The rival's refit, and (K,) the programmes on which it can be computed."""
         truth, rival = contest
         fitted = self._along if rival is None else [rival.columns, *self._along]
-        rows = self._known([truth.columns, *fitted])
+        rows = self._known([part.recorded for part in (truth.columns, *fitted)])
         recorded = np.concatenate([part.recorded[rows] for part in fitted], axis=2)
         possible = np.concatenate([part.possible for part in fitted], axis=2)
         effect = truth.columns.possible @ truth.theta
@@ -135,9 +138,9 @@ class MeasurementPlanner:
         )
         return refit, np.logical_and.reduceat(known, self._possible.ends[:-1])
 
-    def _known(self, columns: Sequence[Columns]) -> BoolArray:
-        """(N,) usable rows of the recording on which all columns are known."""
-        finite = [np.isfinite(part.recorded).all(axis=(1, 2)) for part in columns]
+    def _known(self, columns: Sequence[FloatArray]) -> BoolArray:
+        """(N,) usable rows of the recording on which all columns (N, m, P) are known."""
+        finite = [np.isfinite(values).all(axis=(1, 2)) for values in columns]
         return np.asarray(self._aligned.usable.mask & np.all(finite, axis=0))
 
     def _whitened(self, recorded_mm: FloatArray, possible_mm: FloatArray) -> Columns:

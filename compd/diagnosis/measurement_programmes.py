@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.programme_rows import ProgrammeRows
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts
 from compd.errors import Problem, RecordingError
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -105,18 +105,20 @@ def machine_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     possible = list(_programmes(aligned, limits, names))
     observations = _observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
     purposes = [programme.purpose for programme in possible for _ in range(len(programme))]
-    held = {name: observations.quantities[name] for name in names}
-    fastest_mm_per_s = np.abs(observations.velocity_mm_per_s).max(axis=1)
+    held = (
+        zip(*(observations.quantities[name].tolist() for name in names), strict=True) if names else [()] * len(purposes)
+    )
     to_set = [
-        plan_row(
-            purpose,
-            observations.time_s[k],
-            observations.tip_M_mm[k],
-            {name: values[k] for name, values in held.items()},
-            observations.direction[k],
-            fastest_mm_per_s[k],
+        plan_row(purpose, time_s, tip_M_mm, dict(zip(names, values, strict=True)), direction, speed_mm_per_s)
+        for purpose, time_s, tip_M_mm, values, direction, speed_mm_per_s in zip(
+            purposes,
+            observations.time_s.tolist(),
+            observations.tip_M_mm.tolist(),
+            held,
+            observations.direction.tolist(),
+            np.abs(observations.velocity_mm_per_s).max(axis=1).tolist(),
+            strict=True,
         )
-        for k, purpose in enumerate(purposes)
     ]
     return ProgrammeRows(observations, np.array([len(programme) for programme in possible]), to_set)
 
@@ -234,19 +236,16 @@ def _observe_programmes(
             )
         )
     scale_mm = pose.link_length_mm - zero.link_length_mm
-    starts = np.zeros(count, dtype=bool)
-    starts[np.cumsum([0, *(len(programme) for programme in chosen)])[:-1]] = True
+    starts = programme_starts(np.array([len(programme) for programme in chosen]))
     direction = np.concatenate([programme.direction for programme in chosen])
     travel_mm = np.diff(scale_mm, axis=0, prepend=scale_mm[:1])
     follows = (direction == 0).all(axis=1)
     direction[follows] = np.where(starts[:, None], 1.0, np.sign(travel_mm))[follows]
     velocity = np.concatenate([programme.velocity_mm_per_s for programme in chosen])
-    quantities = {
-        name: np.concatenate(
-            [np.broadcast_to(programme.quantities.get(name, value), (len(programme),)) for programme in chosen]
-        )
-        for name, value in _values_at_rest(aligned).items()
-    }
+    quantities = {name: np.full(count, value) for name, value in _values_at_rest(aligned).items()}
+    for programme, begin in zip(chosen, np.flatnonzero(starts), strict=True):
+        for name, values in programme.quantities.items():
+            quantities[name][begin : begin + len(programme)] = values
     comparators = model.joint_weights.shape[1]
     return observe(
         model,

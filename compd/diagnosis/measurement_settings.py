@@ -102,9 +102,11 @@ def _follower(name: str, values: FloatArray, leader: FloatArray) -> Follower | N
     x, y = leader[known], values[known]
     if not len(x) or not np.ptp(x) or not np.ptp(y):
         return None
-    slope, offset = np.polynomial.Polynomial.fit(x, y, 1).convert().coef[::-1]
+    dx = x - x.mean()
+    slope = float(dx @ y / (dx @ dx))
+    offset = float(y.mean() - slope * x.mean())
     is_tied = np.abs(y - offset - slope * x).max() <= TIED * np.ptp(y)
-    return Follower(name, float(slope), float(offset)) if is_tied else None
+    return Follower(name, slope, offset) if is_tied else None
 
 
 def _steps(name: str, values: FloatArray, limits: tuple[float, float] | None) -> FloatArray:

@@ -16,7 +16,7 @@ from compd.diagnosis.measurement_settings import SettingLimits
 from compd.diagnosis.programme_rows import ProgrammeRows
 from compd.diagnosis.setting_programmes import setting_programmes
 from compd.errors import CompdError, Problem
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 
 # Rows that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
@@ -64,12 +64,14 @@ def next_measurement(
     rival: Effect,
     sigma_um: FloatArray,
     rows: int = NEXT_ROWS,
+    constants: ConstantValues | None = None,
 ) -> NextMeasurement:
     """What tells an effect from its rival: rows within the limits of the recording, or words.
 
     model : effects that are fitted along: the model's own, and the others that were found.
     found : the effect as fitted.  rival : taken with the numbers by which it imitates `found` best.
     sigma_um : (m,) noise; where more is left than noise, what is left.
+    constants : nonlinear constants of the rival; None for those of its grid by which it imitates best.
     """
     effects = [found.effect, rival]
     try:
@@ -78,7 +80,7 @@ def next_measurement(
         return _words_alone(effects, error)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
     first = planner.contender(found)
-    second = planner.imitation(first, rival)
+    second = planner.imitation(first, rival, constants)
     return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)))
 
 

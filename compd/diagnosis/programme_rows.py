@@ -1,4 +1,4 @@
-"""Rows that could be measured next, and what effects predict on them."""
+"""Rows that could be measured next, in programmes, and the machine at such rows."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.model.effect import FittedEffect
 from compd.model.observations import Observations
 
 
@@ -38,23 +37,14 @@ class ProgrammeRows:
         return self.to_set[begin:end]
 
 
-def columns_on(aligned: AlignedRecording, rows: Observations, effects: Sequence[FittedEffect]) -> list[FloatArray]:
-    """(R, m, P) of each effect, mm per unit of each parameter, on R rows that were not measured."""
-    planned = replace(aligned, rows=rows, measured_mm=_not_measured(aligned, rows), _by_port={})
-    return [planned.columns(effect.effect, effect.constants) for effect in effects]
+def programme_starts(lengths: IntArray) -> BoolArray:
+    """(R,) whether a row is the first of its programme. lengths : (K,) rows of each."""
+    starts = np.zeros(int(lengths.sum()), dtype=bool)
+    starts[np.cumsum([0, *lengths])[:-1]] = True
+    return starts
 
 
-def nuisance_columns_on(aligned: AlignedRecording, rows: Observations) -> tuple[FloatArray, FloatArray]:
-    """(N, m, Q) and (R, m, Q): columns that every fit contains, on the recording's rows and on R others.
-
-    Of one motion of the instrument's frame, for which the rows have to be taken together.
-    """
-    count = len(aligned.rows)
-    measured_mm = np.concatenate([aligned.measured_mm, _not_measured(aligned, rows)])
-    both = replace(aligned, rows=aligned.rows.extended_by(rows), measured_mm=measured_mm, _by_port={})
-    columns = both.registration_columns
-    return columns[:count], columns[count:]
-
-
-def _not_measured(aligned: AlignedRecording, rows: Observations) -> FloatArray:
-    return np.full((len(rows), aligned.measured_mm.shape[1]), np.nan)
+def at_rows(aligned: AlignedRecording, rows: Observations) -> AlignedRecording:
+    """The machine and the measured coordinates of a recording at other rows, where nothing was measured."""
+    measured_mm = np.full((len(rows), len(aligned.labels)), np.nan)
+    return replace(aligned, rows=rows, measured_mm=measured_mm, _by_port={})

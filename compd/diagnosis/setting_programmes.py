@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
-from compd.diagnosis.programme_rows import ProgrammeRows
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts
 from compd.errors import CompdError, Problem
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -204,7 +204,7 @@ def _programme_rows(
         if names
     }
     quantities = {name: columns.get(name, values) for name, values in rows.quantities.items()}
-    rows = replace(rows, **motion, quantities=quantities, time_s=time_s, session_start=_starts(lengths))
+    rows = replace(rows, **motion, quantities=quantities, time_s=time_s, session_start=programme_starts(lengths))
     to_set = [
         settings_row(purpose, time_s[k], {name: columns[name][k] for name in shown})
         for k, purpose in enumerate(purposes)
@@ -223,7 +223,7 @@ def _recorded_rows(
     # of very many rows some, evenly over the recording
     index = index[np.linspace(0, len(index) - 1, min(len(index), MOST_COMBINATIONS)).astype(np.int64)]
     lengths = np.ones(len(index), dtype=np.int64)
-    rows = replace(aligned.rows.select(index), session_start=_starts(lengths))
+    rows = replace(aligned.rows.select(index), session_start=programme_starts(lengths))
     shown = [name for name in recorded if not _SENSITIVITY.fullmatch(name)]
     to_set = [
         settings_row(
@@ -234,10 +234,3 @@ def _recorded_rows(
         for i in index
     ]
     return ProgrammeRows(rows, lengths, to_set)
-
-
-def _starts(lengths: IntArray) -> BoolArray:
-    """(R,) whether a row is the first of its programme."""
-    starts = np.zeros(int(lengths.sum()), dtype=bool)
-    starts[np.cumsum([0, *lengths])[:-1]] = True
-    return starts

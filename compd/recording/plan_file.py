@@ -26,7 +26,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
 from compd.recording.columns import approach_columns
@@ -43,9 +42,9 @@ WRITTEN_BY = "`compd plan` writes such a file"
 def plan_row(
     purpose: str,
     time_s: float,
-    tip_M_mm: FloatArray,
+    tip_M_mm: Sequence[float],
     quantities: Mapping[str, float],
-    approach: FloatArray,
+    approach: Sequence[float],
     speed_mm_per_s: float,
 ) -> dict[str, Any]:
     """One row by column, rounded to what a person can set.
