@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, step_times_s
 from compd.errors import Problem, RecordingError
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -31,8 +31,6 @@ LOADS = (1 / 6, 1 / 2, 1.0)
 REVERSALS_MM = (0.02, 0.1, 0.5, 2.0, 10.0, 30.0)
 # Speeds as shares of the fastest.
 SPEEDS = (0.25, 1.0)
-# Times after a step of temperature, as shares of the longest time that may be waited.
-WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)
 ROW_EVERY_S = 30.0
 # Quantiles of the recorded positions that bound the workspace, so that no single row stretches it.
 WORKSPACE_QUANTILES = (0.02, 0.98)
@@ -152,8 +150,8 @@ def _programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Seque
             for value in (low, high):
                 temperatures = {name: np.array([value]) for name in group}
                 yield _programme_at(place, n, "one part warm or cold alone", temperatures)
-        step = np.array([low, *[high] * len(WAITS)])
-        times_s = np.array([0.0, *(1.0 + limits.wait_s * share for share in WAITS)])
+        times_s = step_times_s(limits.wait_s)
+        step = np.where(times_s > 0, high, low)
         yield _programme_at(middle, n, "a step of temperature, watched", dict.fromkeys(group, step), times_s)
     for name in names:
         if not name.startswith(("temperature_", "force_")):

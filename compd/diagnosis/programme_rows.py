@@ -8,9 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import BoolArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.model.observations import Observations
+
+# Times after a step, as shares of the time for which it is watched.
+WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)
+# The step itself takes a second: no instant, and short beside all that is watched.
+STEP_S = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,11 @@ def programme_starts(lengths: IntArray) -> BoolArray:
     starts = np.zeros(int(lengths.sum()), dtype=bool)
     starts[np.cumsum([0, *lengths])[:-1]] = True
     return starts
+
+
+def step_times_s(watched_s: float) -> FloatArray:
+    """Times of the rows of a step that is watched so long: one before it, then one for each of WAITS."""
+    return np.array([0.0, *(STEP_S + watched_s * share for share in WAITS)])
 
 
 def at_rows(aligned: AlignedRecording, rows: Observations) -> AlignedRecording:

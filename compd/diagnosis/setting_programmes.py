@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
-from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, step_times_s
 from compd.errors import CompdError, Problem
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -22,11 +22,8 @@ from compd.model.observations import Observations
 from compd.recording.columns import approach_columns, scale_columns
 from compd.recording.plan_file import TIP_COLUMNS, settings_row
 
-# A step of a setting is watched for two hours, as long as machines take to warm through, or for 12 minutes; times after
-# the step are shares of that. The step itself takes a second: no instant, and short beside all that is watched.
+# A step of a setting is watched for two hours, as long as machines take to warm through, or for 12 minutes.
 WATCHED_S = (7200.0, 720.0)
-WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)
-STEP_S = 1.0
 # Rows on which it is tried whether an effect depends on the place: where it does, hardly any row hides it.
 PROBED_ROWS = 50
 # Derivatives of the external model's prediction: known where it was computed, on the recorded rows.
@@ -147,9 +144,9 @@ def _watched_steps(settings: Sequence[Setting]) -> list[_Programmes]:
             continue
         for begin, end in (setting.values[[0, -1]], setting.values[[-1, 0]]):
             for watched_s in WATCHED_S:
-                time_s = np.array([0.0, *(STEP_S + watched_s * share for share in WAITS)])
+                time_s = step_times_s(watched_s)
                 others = _in_the_middle([other for other in settings if other is not setting], len(time_s))
-                columns = others | setting.columns(np.array([begin, *[end] * len(WAITS)]))
+                columns = others | setting.columns(np.where(time_s > 0, end, begin))
                 purpose = f"a step of {setting.name}, watched"
                 steps.append(_Programmes(purpose, np.array([len(time_s)]), time_s, columns))
     return steps

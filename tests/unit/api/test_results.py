@@ -321,5 +321,3 @@ def test_recordings_of_links_name_their_columns(tmp_path: Path) -> None:
     recording = compd.open_recording(external)
     assert "measured_link_1_mm" in recording.to_dataframe()
     assert "residual_link_1_um" in compd.compare(recording).to_dataframe()
-    with pytest.raises(RecordingError, match="external"):
-        compd.plan_measurement(recording, ("reference_drift", "reference_registration"))
