@@ -21,6 +21,10 @@ REFERENCE_TEMPERATURE_degC = 20.0
 # ISO 2533 standard atmosphere: at this pressure interferometers' tables have their zero.
 REFERENCE_PRESSURE_hPa = 1013.25
 
+# What a machine of known kinematics gives in every recording and live: its pose with all lengths and directions, the
+# scales, which way the links last moved and how fast, and the rows' order in time.
+GIVEN_BY_KINEMATICS = frozenset({"kinematics", "scale", "direction", "motion", "time", "order"})
+
 # Columns of the reference instrument and of a model: an effect computed from them would be fitted to its own answer.
 ANSWER_PREFIXES = ("reference_", "model_")
 
@@ -79,6 +83,7 @@ class Observations:
     velocity_mm_per_s (N, n), joint_velocity_mm_per_s (N, k): of the readings.
     link_mm (N, n), directions_M (N, n, 3) from base to platform joint, base_joints_M_mm (N, n, 3).
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
+    recorded : of a machine without known kinematics, what of GIVEN_BY_KINEMATICS was recorded all the same.
     """
 
     constants: MachineConstants
@@ -97,6 +102,7 @@ class Observations:
     origin_M_mm: FloatArray
     rotation_M_P: FloatArray
     tip_M_mm: FloatArray
+    recorded: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
@@ -119,7 +125,7 @@ class Observations:
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
-            if column.name not in ("constants", "quantities")
+            if column.name not in ("constants", "quantities", "recorded")
         }
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
@@ -148,7 +154,7 @@ class Observations:
     @property
     def available(self) -> set[str]:
         """Names of the quantities and settings that there are, as `unmet_needs` takes them."""
-        return set(self.quantities) | available_settings(self.constants)
+        return set(self.quantities) | available_settings(self.constants) | self.recorded
 
     def setting(self, name: str) -> float | None:
         """A number from the machine's description, None where it has none."""
@@ -210,6 +216,8 @@ class Observations:
 def available_settings(constants: MachineConstants) -> set[str]:
     """The settings that this machine has, of those that effects may need."""
     settings = {"revolute_axes"} if len(constants.revolute_axes_P) else set()
+    if len(constants.platform_joints_P_mm):
+        settings |= GIVEN_BY_KINEMATICS
     for name in ("plate_thickness_mm", "scale_signal_period_mm"):
         if not np.isnan(getattr(constants, name)):
             settings.add(name)

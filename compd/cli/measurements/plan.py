@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import EffectsOption, MachineOption
 
 
 def plan(
@@ -18,6 +18,7 @@ def plan(
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
     machine: MachineOption = None,
     model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
+    effects: EffectsOption = None,
     beside: Annotated[
         str | None,
         typer.Option(help="Other effects that were found and are not in the model, by id: C,D. They are fitted along."),
@@ -56,6 +57,7 @@ def plan(
         (first, second),
         rows=rows,
         model=model,
+        effects=effects or (),
         beside=[name.strip() for name in beside.split(",")] if beside else (),
         workspace_M_mm=None if box is None else ((box[0], box[1]), (box[2], box[3]), (box[4], box[5])),
         force_N=force,
