@@ -17,8 +17,8 @@ from compd.comparison.shape_search import search_constants
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
+from compd.diagnosis.measurement_plan import MeasurementPlan
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.next_measurement import MeasurementPlan, require_kinematics
 from compd.diagnosis.next_measurement import plan_measurement as plan_fitted_rivals
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
@@ -235,10 +235,12 @@ def plan_measurement(
     rows: int = 40,
     model: Model = None,
     effects: Effects = (),
+    beside: Sequence[str] = (),
     workspace_M_mm: tuple[Range, Range, Range] | None = None,
     force_N: float | None = None,
     temperature_degC: Range | None = None,
     speed_mm_per_s: float | None = None,
+    limits: Mapping[str, Range] | None = None,
 ) -> MeasurementPlan:
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most.
 
@@ -253,7 +255,10 @@ def plan_measurement(
     model : ModelFile, str or Path, optional
         What is known already.
     effects : str, Path, Effect, or a sequence of these
-        Effects of your own, which may be rivals, as for `diagnose`.
+        Effects of your own, which `rivals` and `beside` may name, as for `diagnose`.
+    beside : sequence of str
+        Ids of other effects that act on the recording and are not in the model, such as the other steps of a diagnosis;
+        they are fitted along.
     workspace_M_mm : three pairs of float, optional
         Lowest and highest x, y and z of the tip in {M}, mm; left out, as in the recording.
     force_N : float, optional
@@ -262,6 +267,9 @@ def plan_measurement(
         Lowest and highest temperature, degC; left out, as in the recording.
     speed_mm_per_s : float, optional
         Fastest motion of a link, mm/s; left out, as in the recording.
+    limits : dict, optional
+        With ``machine: external``, in place of the four above: lowest and highest value of a column that the rivals are
+        computed from; of a column that is left out, as in the recording.
 
     Returns
     -------
@@ -272,10 +280,9 @@ def plan_measurement(
     ------
     CompdError
         Where the rivals are not two different effects, or one of them is in the model already; where a limit is no
-        rising pair or negative; where the effects cannot be fitted on this recording.
+        rising pair, negative, or for another kind of machine; where the effects cannot be fitted on this recording.
     RecordingError
-        For an external model, of whose machine no measurement can be planned; and where a place within the limits
-        cannot be reached.
+        Where a place within the limits cannot be reached.
 
     Notes
     -----
@@ -302,12 +309,11 @@ def plan_measurement(
                 next_step="a diagnosis names rivals",
             )
         )
-    given = gather_effects(effects)
-    pair = [named_effect(name, "rivals", given) for name in rivals]
+    own = gather_effects(effects)
+    first, second, *others = (named_effect(name, "rivals", own) for name in (*rivals, *beside))
     aligned = _opened(recording)
-    require_kinematics(aligned)
     file = _opened_model(model, aligned)
-    present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in rivals]
+    present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in (*rivals, *beside)]
     if present:
         raise CompdError(
             Problem(
@@ -318,10 +324,13 @@ def plan_measurement(
                 next_step="`compd effect remove` takes it out",
             )
         )
-    limits = _limits(recorded_limits(aligned), workspace_M_mm, force_N, temperature_degC, speed_mm_per_s)
+    given = _plan_limits(aligned, workspace_M_mm, force_N, temperature_degC, speed_mm_per_s, limits or {})
     sigma_um = compare_aligned(aligned, file.fitted, file.covariance).floor.by_axis_um
-    first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in pair)
-    return plan_fitted_rivals(aligned, file.fitted, (first, second), sigma_um, limits, rows)
+    fitted = file.fitted
+    for effect in others:
+        fitted = search_constants(aligned, fitted, effect, sigma_um).fitted
+    pair = [search_constants(aligned, fitted, effect, sigma_um).fitted for effect in (first, second)]
+    return plan_fitted_rivals(aligned, pair[0][:-1], (pair[0][-1], pair[1][-1]), sigma_um, given, rows)
 
 
 def _opened(recording: Recorded) -> AlignedRecording:
@@ -391,34 +400,55 @@ def _shipped_links(name: str, path: Path) -> int:
     return load_machine(name).geometry.links
 
 
-def _limits(
-    recorded: ProgrammeLimits,
+def _plan_limits(
+    aligned: AlignedRecording,
     workspace_M_mm: tuple[Range, Range, Range] | None,
     force_N: float | None,
     temperature_degC: Range | None,
     speed_mm_per_s: float | None,
-) -> ProgrammeLimits:
-    """The recorded limits, with those that a person gives instead. Raises CompdError with every one that is faulty."""
+    by_column: Mapping[str, Range],
+) -> ProgrammeLimits | Mapping[str, Range]:
+    """The limits that a plan keeps.
+
+    Raises CompdError with every one that is faulty, or for the other kind of machine.
+    """
     pairs = {f"workspace_M_mm, {axis}": pair for axis, pair in zip("xyz", workspace_M_mm or (), strict=False)}
     if temperature_degC is not None:
         pairs["temperature_degC"] = temperature_degC
     largest = {"force_N": force_N, "speed_mm_per_s": speed_mm_per_s}
+    given: dict[str, Any] = {name: value for name, value in largest.items() if value is not None}
     problems = [
         Problem(where=name, what="is not understood", value=str(pair), allowed="two numbers, low before high")
         for name, pair in pairs.items()
         if not (len(pair) == 2 and pair[0] < pair[1])
     ]
     problems += [
+        Problem(where=f"limit of {name}", what="is not understood", value=str(pair), allowed="two numbers, low first")
+        for name, pair in by_column.items()
+        if not (len(pair) == 2 and pair[0] <= pair[1])
+    ]
+    problems += [
         Problem(where=name, what="is not understood", value=str(value), allowed="0 or more")
-        for name, value in largest.items()
-        if value is not None and not value >= 0
+        for name, value in given.items()
+        if not value >= 0
+    ]
+    external = aligned.model is None
+    problems += [
+        Problem(
+            where=name,
+            what="is a limit of an external machine" if not external else "is no limit of an external machine",
+            allowed="limits by column" if external else "workspace, force, temperature and speed",
+            next_step="give `--limit COLUMN=LOW,HIGH`, in Python limits={COLUMN: (LOW, HIGH)}" if external else "",
+        )
+        for name in ([*pairs, *given] if external else [f"limit of {name}" for name in by_column])
     ]
     if problems:
         raise CompdError(problems)
-    given: dict[str, Any] = {name: value for name, value in largest.items() if value is not None}
+    if external:
+        return by_column
     if workspace_M_mm is not None:
         low_M_mm, high_M_mm = np.array(workspace_M_mm, dtype=np.float64).T
         given |= {"tip_low_M_mm": low_M_mm, "tip_high_M_mm": high_M_mm}
     if temperature_degC is not None:
         given["temperature_degC"] = temperature_degC
-    return recorded._replace(**given)
+    return recorded_limits(aligned)._replace(**given)

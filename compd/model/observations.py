@@ -132,6 +132,17 @@ class Observations:
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
 
+    def extended_by(self, rows: Observations) -> Observations:
+        """These rows and then those of the same machine, with the quantities that both have."""
+        joined: dict[str, Any] = {
+            column.name: np.concatenate([getattr(self, column.name), getattr(rows, column.name)])
+            for column in fields(self)
+            if isinstance(getattr(self, column.name), np.ndarray)
+        }
+        names = [name for name in self.quantities if name in rows.quantities]
+        quantities = {name: np.concatenate([self.quantities[name], rows.quantities[name]]) for name in names}
+        return replace(self, **joined, quantities=quantities)
+
     @property
     def links(self) -> int:
         """n; 0 for a machine of another model, of which only the tip is known."""
