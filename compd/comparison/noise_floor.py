@@ -138,7 +138,7 @@ def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: Co
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
     below = float(f_distribution.cdf(ratio, dof, criteria.declared_dof * axes))
     if min(below, 1 - below) < criteria.contradiction_p_value / 2:
-        remark = _contradiction(float(np.sqrt(ratio)), criteria.contradiction_factor)
+        remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio)
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)
     pooled_dof = scatter.dof + criteria.declared_dof
     variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof
