@@ -11,6 +11,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import in_place_unit
 from compd.comparison.registration import Registration, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
@@ -29,6 +30,7 @@ from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitiviti
 from compd.model.solve_status import MEANING, Reason
 from compd.recording.recording import Recording, UsableRows
 from compd.tables import Columns, data_frame, html_table
+from compd.units import REFERENCE_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,6 +70,11 @@ class AlignedRecording:
     registration: Registration | None
     geometry_hash: str = ""
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
+
+    @property
+    def unit(self) -> str:
+        """The unit in which people read the residual: ``"um"``, or what the sidecar names, such as ``"arcsec"``."""
+        return self.recording.unit
 
     @property
     def of_links(self) -> bool:
@@ -139,19 +146,20 @@ class AlignedRecording:
         pandas.DataFrame
             N rows: `row`, the row as a spreadsheet shows it; every column of the file under its own name, in its own
             unit; then for each measured coordinate `measured_x_mm` and `predicted_x_mm` in {M} (or
-            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect. nan where a cell is
-            empty and where there is no pose.
+            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect; for a reference in
+            another unit `measured_x_arcsec` ... nan where a cell is empty and where there is no pose.
 
         Raises
         ------
         CompdError
             Where pandas is not installed.
         """
-        predicted_mm = self.predicted_mm({})
+        measured, predicted = (in_place_unit(place, self.unit) for place in (self.measured_mm, self.predicted_mm({})))
+        ending = REFERENCE_UNITS[self.unit]
         columns: dict[str, Any] = {"row": self.recording.row, **self.recording.columns}
         for k, name in enumerate(self.label_names):
-            columns[f"measured_{name}_mm"] = self.measured_mm[:, k]
-            columns[f"predicted_{name}_mm"] = predicted_mm[:, k]
+            columns[f"measured_{name}_{ending}"] = measured[:, k]
+            columns[f"predicted_{name}_{ending}"] = predicted[:, k]
         return data_frame(columns)
 
     @property

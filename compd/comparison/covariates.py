@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.display_unit import in_place_unit, place_unit
 from compd.units import unit_of
 
 
@@ -31,7 +32,7 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
     recording = aligned.recording
     result = [Covariate("time", "h", recording.time_s / 3600.0)]
     result += [
-        Covariate(axis, "mm", column)
+        Covariate(axis, place_unit(aligned.unit), in_place_unit(column, aligned.unit))
         for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True)
         if np.isfinite(column).any()
     ]

@@ -21,6 +21,7 @@ from compd.recording.columns import (
     scale_columns,
 )
 from compd.recording.problem_list import ProblemList
+from compd.recording.reference import sigma_key
 from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
 from compd.units import REFERENCE_UNITS
 
@@ -161,27 +162,22 @@ def _count(names: Sequence[str], stem: str, unit: str, external: bool, problems:
 
 
 def _names_in_unit(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) -> list[str]:
-    """The names, those of reference and model in the sidecar's unit; each that is in another one is a problem."""
+    """The names, those of reference and model in the sidecar's unit; it is a problem where they are in another one."""
     ending = REFERENCE_UNITS[sidecar.unit]
-    right = []
-    for name in names:
-        column = parse_name(name)
-        if column is None or column.unit == ending or not _IN_REFERENCE_UNIT.fullmatch(column.stem):
-            right.append(name)
+    right = {name: name for name in names}
+    for unit, other in REFERENCE_UNITS.items():
+        columns = [(name, column.stem) for name in names if (column := parse_name(name)) and column.unit == other]
+        wrong = {name: f"{stem}_{ending}" for name, stem in columns if _IN_REFERENCE_UNIT.fullmatch(stem)}
+        if other == ending or not wrong:
             continue
-        unit = next(unit for unit, of_column in REFERENCE_UNITS.items() if of_column == column.unit)
-        wanted = f"{column.stem}_{ending}"
-        next_step = f"name it {wanted} if its values are in {ending}"
-        if sidecar.external:
-            next_step += f", or write `unit: {unit}` under `reference:`"
+        mend = f"convert them and name them {', '.join(wrong.values())}"
         problems.add(
-            f"column {name}",
-            f"is in {column.unit} by its name, but the sidecar's reference is in {sidecar.unit}",
-            allowed=wanted,
-            next_step=next_step,
+            "",
+            f"{', '.join(wrong)}: in {other} by their names, but the reference is in {sidecar.unit} by the sidecar",
+            next_step=f"write `unit: {unit}` under `reference:`, or {mend}" if sidecar.external else mend,
         )
-        right.append(wanted)
-    return right
+        right |= wrong
+    return list(right.values())
 
 
 def _check_reference(
@@ -228,7 +224,7 @@ def _check_reference(
     if quantity == "ball_plate" and "ball" not in names:
         _add_missing(["ball"], names, problems)
     count = len(layout.links) if quantity == "link_length" else len(layout.axes)
-    key, sigma = sidecar.reference.sigma_key, sidecar.reference.standard_uncertainty
+    key, sigma = sigma_key(sidecar.unit), sidecar.reference.standard_uncertainty
     if count and len(sigma) not in (1, count):
         problems.add(
             "",

@@ -14,6 +14,7 @@ from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.recording.columns import ID_COLUMNS
 from compd.recording.recording import Recording
+from compd.recording.reference import sigma_key
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 
@@ -177,7 +178,7 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
             reference_contents["unit"] = reference.unit
         sigma = [value for value in reference.standard_uncertainty if np.isfinite(value)]
         if sigma:
-            reference_contents[reference.sigma_key] = sigma[0] if len(sigma) == 1 else sigma
+            reference_contents[sigma_key(reference.unit)] = sigma[0] if len(sigma) == 1 else sigma
     rows_before = 0
     excluded: dict[int, str] = {}
     for recording in recordings:

@@ -20,6 +20,11 @@ StandardUncertainty = Annotated[
 ]
 
 
+def sigma_key(unit: str) -> str:
+    """The key that holds the standard uncertainty of a reference in `unit`."""
+    return "sigma_um" if unit == "um" else "sigma"
+
+
 class Reference(Section):
     """What the reference instrument measured. An unknown uncertainty is nan; `balls` is relative to the sidecar."""
 
@@ -51,11 +56,6 @@ class Reference(Section):
         validate_default=True,
         description="ball_plate only: the ball plate's file, relative to the sidecar",
     )
-
-    @property
-    def sigma_key(self) -> str:
-        """The key that holds the standard uncertainty."""
-        return "sigma_um" if self.unit == "um" else "sigma"
 
     @property
     def standard_uncertainty(self) -> tuple[float, ...]:
@@ -101,7 +101,7 @@ class Reference(Section):
     @classmethod
     def _standard_uncertainties(cls, sigma: Any, info: ValidationInfo) -> Any:
         unit = info.data.get("unit", "um")
-        key = "sigma_um" if unit == "um" else "sigma"
+        key = sigma_key(unit)
         if info.field_name != key:
             raise refusal(f"does not go with the unit {unit}", f"{key}, in {unit}", f"write `{key}:`")
         sigmas = sigma if isinstance(sigma, list) else [sigma]

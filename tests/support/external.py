@@ -32,11 +32,11 @@ def write_external(
     return path
 
 
-def plane(count: int = 60, seed: int = 5) -> dict[str, Floats]:
-    """Places on two axes, in mm, each measured twice, the second time long after; and a number that belongs to each."""
+def measured_places(axes: str = "xy", count: int = 60, seed: int = 5) -> dict[str, Floats]:
+    """Places in mm, each measured twice, the second time long after, within 1 um; and a number that belongs to each."""
     rng = np.random.default_rng(seed)
     columns: dict[str, Floats] = {}
-    for axis in "xy":
+    for axis in axes:
         columns[f"model_{axis}_mm"] = np.round(np.tile(rng.uniform(-100, 100, count), 2), 6)
         columns[f"reference_{axis}_mm"] = columns[f"model_{axis}_mm"] + rng.normal(0, 1e-3, 2 * count)
     columns["hole_mm"] = np.tile(rng.integers(1, 5, count) * 1.5, 2)
