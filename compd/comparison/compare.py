@@ -79,6 +79,9 @@ class Comparison:
         Rotation vector from the modelled to the measured attitude in {M}, urad; None where none was measured.
     criteria : ComparisonCriteria
         The thresholds on which it rests, each with unit, meaning and reason.
+    constant_um : (m,) array
+        Constant of each coordinate that was taken off the residual, um: of an external model, or an instrument's frame;
+        zeros for a machine in its own frame.
     """
 
     aligned: AlignedRecording
@@ -95,6 +98,7 @@ class Comparison:
     link_residual_um: FloatArray | None
     attitude_residual_urad: FloatArray | None
     criteria: ComparisonCriteria
+    constant_um: FloatArray
 
     @cached_property
     def rms_by_axis_um(self) -> FloatArray:
@@ -223,6 +227,7 @@ class Comparison:
             "axes": list(self.aligned.labels),
             "residual_rms_um": self.rms_um,
             "residual_rms_xyz_um": self._by_axis(self.rms_by_axis_um),
+            "constant_xyz_um": self._by_axis(self.constant_um),
             "residual_mean_xyz_um": self._by_axis(self.residual_um[self.used].mean(axis=0)),
             "residual_p95_xyz_um": self._by_axis(np.quantile(size, 0.95, axis=0)),
             "residual_max_xyz_um": self._by_axis(size.max(axis=0)),
@@ -283,10 +288,12 @@ def compare(
     fitted: Sequence[FittedEffect] = (),
     covariance: FloatArray | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
+    outlier: BoolArray | None = None,
 ) -> Comparison:
     """Compare a recording with the model and its effects; nothing of the model is fitted here.
 
     covariance : (P, P) of the effects' parameters jointly; where None, from each effect's own.
+    outlier : (N,) rows that do not count; None to find them.
     Raises CompdError where an effect needs what the recording has not, RecordingError where too few rows are usable.
     """
     by_effect, total = effect_deltas(fitted, aligned.rows)
@@ -294,7 +301,8 @@ def compare(
     known, left_out = _known_rows(aligned, predicted_mm, criteria)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
     residual_um[~known] = np.nan
-    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known, criteria)
+    measured_um = residual_um
+    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known, criteria, outlier)
     used = known & ~outlier
     gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
     floor = noise_floor(
@@ -327,7 +335,15 @@ def compare(
         link_residual_um=links_um,
         attitude_residual_urad=aligned.attitude_residual_urad(total),
         criteria=criteria,
+        constant_um=_constant_um(aligned, measured_um - residual_um, used),
     )
+
+
+def _constant_um(aligned: AlignedRecording, removed_um: FloatArray, used: BoolArray) -> FloatArray:
+    """(m,) mean of what was fitted along (N, m) over the rows used; zeros where nothing is."""
+    if not aligned.registration_columns.shape[2]:
+        return np.zeros(removed_um.shape[1])
+    return np.asarray(removed_um[used].mean(axis=0))
 
 
 def _known_rows(
@@ -353,9 +369,18 @@ def _known_rows(
 
 
 def _remove_frame_motion(
-    aligned: AlignedRecording, residual_um: FloatArray, known: BoolArray, criteria: ComparisonCriteria
+    aligned: AlignedRecording,
+    residual_um: FloatArray,
+    known: BoolArray,
+    criteria: ComparisonCriteria,
+    given: BoolArray | None,
 ) -> tuple[FloatArray, BoolArray]:
-    """The residual (N, m) without what a motion of the instrument's frame explains, and the outliers (N,)."""
+    """The residual (N, m) without what a motion of the instrument's frame explains, and the outliers (N,).
+
+    given : the outliers where they are known.
+    """
+    if given is not None:
+        return residual_um - frame_motion_um(aligned, residual_um, known & ~given), given & known
     outlier = np.zeros(len(known), dtype=bool)
     rest_um = residual_um
     for _ in range(FRAME_ROUNDS):

@@ -10,7 +10,6 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.criteria import Criteria
 from compd.errors import Problem, RecordingError
 from compd.recording.recording import BLOCKS
 from compd.recording.sidecar import PLACE, TIME
@@ -20,9 +19,13 @@ MOST_VALUES = 12
 # Share of an axis's extent: places nearer to each other are one place, and an axis along which the tip moves less than
 # this share of the longest one does not count as an axis of the workspace.
 SAME_PLACE = 0.01
+# With fewer sessions blocks of time are left out in their place: of two, one would have to predict the other.
+FEWEST_SESSIONS = 3
+# Sectors into which the workspace is divided: a fifth left out leaves four fifths to learn from.
+SECTORS = 5
 
 
-def row_splits(aligned: AlignedRecording, criteria: Criteria) -> tuple[IntArray, ...]:
+def row_splits(aligned: AlignedRecording) -> tuple[IntArray, ...]:
     """Splits of the N rows, each (N,) the fold of each row, numbered from 0.
 
     By what the sidecar's `folds:` names; without it by time, and by place where it is known:
@@ -39,20 +42,20 @@ def row_splits(aligned: AlignedRecording, criteria: Criteria) -> tuple[IntArray,
     """
     recording = aligned.recording
     if not recording.sidecar.folds:
-        by_place = _split_by_place(aligned, criteria.sectors)
-        by_time = _split_by_time(aligned, criteria.fewest_sessions)
+        by_place = _split_by_place(aligned)
+        by_time = _split_by_time(aligned)
         return (by_time,) if by_place is None else (by_time, by_place)
     splits: list[IntArray] = []
     problems: list[Problem] = []
     for name in recording.sidecar.folds:
         if name == TIME:
-            split: IntArray | None = _split_by_time(aligned, criteria.fewest_sessions)
+            split: IntArray | None = _split_by_time(aligned)
         elif name == PLACE:
-            split = _split_by_place(aligned, criteria.sectors)
+            split = _split_by_place(aligned)
         else:
             split = _split_by_values(aligned, recording.columns[name])
         if split is None or split.max() == 0:
-            problems.append(_undivided(aligned, name, criteria.sectors))
+            problems.append(_undivided(aligned, name))
         else:
             splits.append(split)
     if problems:
@@ -60,8 +63,8 @@ def row_splits(aligned: AlignedRecording, criteria: Criteria) -> tuple[IntArray,
     return tuple(splits)
 
 
-def _undivided(aligned: AlignedRecording, name: str, sectors: int) -> Problem:
-    by_place = f"the tip moves along two axes, and {2 * sectors} places were measured"
+def _undivided(aligned: AlignedRecording, name: str) -> Problem:
+    by_place = f"the tip moves along two axes, and {2 * SECTORS} places were measured"
     return Problem(
         where=f"{aligned.recording.sidecar.path} folds",
         what="does not divide the rows",
@@ -71,11 +74,11 @@ def _undivided(aligned: AlignedRecording, name: str, sectors: int) -> Problem:
     )
 
 
-def _split_by_time(aligned: AlignedRecording, fewest_sessions: int) -> IntArray:
+def _split_by_time(aligned: AlignedRecording) -> IntArray:
     """(N,) sessions; with too few of them, blocks of time."""
     recording = aligned.recording
     fold = recording.fold
-    if len(np.unique(fold[fold >= 0])) < fewest_sessions:
+    if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
         fold = _first_of_visit(aligned, np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
     return _numbered(fold)
 
@@ -90,7 +93,7 @@ def _split_by_values(aligned: AlignedRecording, values: FloatArray) -> IntArray:
     return _numbered(_first_of_visit(aligned, np.unique(values, return_inverse=True)[1]))
 
 
-def _split_by_place(aligned: AlignedRecording, sectors: int) -> IntArray | None:
+def _split_by_place(aligned: AlignedRecording) -> IntArray | None:
     """(N,) sectors with equally many places each; None with fewer than two axes, or two places per sector."""
     tip_mm = aligned.rows.tip_M_mm
     extent_mm = np.array([np.ptp(axis[np.isfinite(axis)]) if np.isfinite(axis).any() else 0.0 for axis in tip_mm.T])
@@ -102,12 +105,12 @@ def _split_by_place(aligned: AlignedRecording, sectors: int) -> IntArray | None:
     # rows without a prediction count nowhere, and are one place
     place = _places(aligned, np.where(known[:, None], np.rint(at_mm / (SAME_PLACE * extent_mm)), np.inf))
     count = int(place.max()) + 1
-    if count < 2 * sectors:
+    if count < 2 * SECTORS:
         return None
     middle_mm = at_mm[known].mean(axis=0)
     azimuth_rad = np.array([_azimuth_rad(at_mm[known & (place == k)] - middle_mm) for k in range(count)])
     sector = np.empty(count, dtype=np.int64)
-    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(count) * sectors // count
+    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(count) * SECTORS // count
     return sector[place]
 
 

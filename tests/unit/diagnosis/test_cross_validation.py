@@ -8,22 +8,21 @@ import numpy as np
 import pytest
 
 from compd.comparison.open import open_recording
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.cross_validation import row_splits
+from compd.diagnosis.cross_validation import SECTORS, row_splits
 from compd.errors import RecordingError
 from tests.support.external import Floats, measured_places, write_external
 from tests.support.hidden_effects import record_with_effects
 
 
 def splits(directory: Path, columns: dict[str, Floats], folds: str | list[str] | None = None):  # type: ignore[no-untyped-def]
-    return row_splits(open_recording(write_external(directory, columns, folds=folds)), Criteria())
+    return row_splits(open_recording(write_external(directory, columns, folds=folds)))
 
 
 def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
     aligned = record_with_effects(tmp_path / "run.csv", 1, {})
-    by_session, by_sector = row_splits(aligned, Criteria())
+    by_session, by_sector = row_splits(aligned)
     assert len(np.unique(by_session)) == 4
-    assert len(np.unique(by_sector)) == Criteria().sectors
+    assert len(np.unique(by_sector)) == SECTORS
     point, session = aligned.recording.point, aligned.recording.session
     assert point is not None
     assert session is not None
