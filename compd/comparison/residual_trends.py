@@ -23,6 +23,7 @@ from compd.comparison.covariates import Covariate, covariates
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error
 from compd.comparison.noise_floor import NoiseFloor
+from compd.recording.gaps import filled
 
 # Trends per coordinate, and collinear covariates per trend: more are noise in a report.
 PER_COORDINATE = 2
@@ -113,7 +114,8 @@ def find_trends(
         # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
         ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
-    all_covariates = covariates(aligned)
+    time_s = aligned.recording.time_s
+    all_covariates = [covariate._replace(values=filled(covariate.values, time_s)) for covariate in covariates(aligned)]
     block = neighbour_blocks(aligned.recording)
     tests = len(coordinates) * len(all_covariates)
     trends: list[tuple[float, Trend]] = []
