@@ -96,7 +96,7 @@ class AlignedRecording:
         rows = self.rows if rows is None else rows
         if self.model is None:
             predicted = np.asarray(_external_prediction(self.recording))
-            return predicted if "reference" not in added else predicted + added["reference"][:, list(self.axes)]
+            return predicted + self._along_axes(added["reference"]) if "reference" in added else predicted
         prediction = predict(self.model, rows, added)
         if self.of_links:
             return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
@@ -113,9 +113,16 @@ class AlignedRecording:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
         if self.model is None:
-            return np.asarray(basis[:, list(self.axes)])
+            return self._along_axes(basis)
         derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))
         return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
+
+    def _along_axes(self, at_reference: FloatArray) -> FloatArray:
+        """(N, m, ...) what an external model's coordinates show of a displacement (N, 3, ...) at the reference."""
+        shown = np.zeros((len(at_reference), len(self.axes), *at_reference.shape[2:]))
+        within = [k for k, axis in enumerate(self.axes) if axis < at_reference.shape[1]]
+        shown[:, within] = at_reference[:, [self.axes[k] for k in within]]
+        return shown
 
     @cached_property
     def registration_columns(self) -> FloatArray:
@@ -245,7 +252,7 @@ def align_recording(
         observations = _observations(recording, model, starts)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
-        links = tuple(i - 1 for i in recording.reference_links)
+        links = tuple(range(len(labels)) if model is None else (i - 1 for i in recording.reference_links))
         return AlignedRecording(
             recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
         )
