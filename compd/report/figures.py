@@ -17,6 +17,8 @@ from compd.units import UM_PER_MM
 ARROWS = 400
 # Cells of the map along each axis.
 CELLS = 9
+# Of a map: its name, and the axes to the right and upwards.
+VIEWS = (("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2))
 # The typical arrow is drawn as long as this share of the workspace.
 ARROW_SHARE = 0.12
 
@@ -41,11 +43,12 @@ def plot_link_residuals(comparison: Comparison) -> Figure | PageTable:
 def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     """Residual vectors in the workspace, and how many times they are enlarged."""
     aligned = comparison.aligned
-    used = np.flatnonzero(comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1))
-    if aligned.of_links or not len(used):
+    places_mm, axes = _places_mm(comparison)
+    used = np.flatnonzero(comparison.used & np.isfinite(places_mm).all(axis=1))
+    if aligned.of_links or len(axes) < 2 or not len(used):
         return NOT_RECORDED, 1.0
     chosen = thin(used, ARROWS)
-    tip_mm, unit = aligned.rows.tip_M_mm[chosen], aligned.unit
+    tip_mm, unit = places_mm[chosen], aligned.unit
     vector_um = np.zeros((len(chosen), 3))
     vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
     typical_mm = max(rms(np.linalg.norm(vector_um, axis=1)) / UM_PER_MM, 1e-9)
@@ -146,16 +149,16 @@ def plot_histogram(comparison: Comparison) -> Figure:
 
 
 def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
-    """Rms residual in cells of the workspace, seen from above, from the front and from the side."""
-    aligned = comparison.aligned
-    used = comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1)
-    if not used.any():
+    """Rms residual in cells of the workspace, seen from above, from the front and from the side, as axes are known."""
+    places_mm, axes = _places_mm(comparison)
+    used = comparison.used & np.isfinite(places_mm).all(axis=1)
+    views = [(name, a, b) for name, a, b in VIEWS if a in axes and b in axes]
+    if not views or not used.any() or np.ptp(places_mm[used], axis=0).max() == 0:
         return NOT_RECORDED
-    unit, shown = aligned.unit, place_unit(aligned.unit)
-    place = in_place_unit(aligned.rows.tip_M_mm[used], unit)
+    unit = comparison.aligned.unit
+    shown, place = place_unit(unit), in_place_unit(places_mm[used], unit)
     square_um2 = (comparison.residual_um[used] ** 2).mean(axis=1)
-    views = [("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2)]
-    figure = make_subplots(1, 3, subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
+    figure = make_subplots(1, len(views), subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
     maps: list[tuple[list[FloatArray], FloatArray]] = []
     for _, a, b in views:
         edges = [np.linspace(*_ends(place[:, axis]), CELLS + 1) for axis in (a, b)]
@@ -174,7 +177,7 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
                 zmin=0.0,
                 zmax=highest_um,
                 colorscale="Viridis",
-                showscale=k == 3,
+                showscale=k == len(views),
                 colorbar={"title": f"{unit} rms", "thickness": 14},
                 name=name,
                 hovertemplate=f"%{{z:.3g}} {unit} rms<extra></extra>",
@@ -185,6 +188,13 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
         figure.update_xaxes(title_text=f"{'xyz'[a]}, {shown}", row=1, col=k)
         figure.update_yaxes(title_text=f"{'xyz'[b]}, {shown}", title_standoff=2, row=1, col=k)
     return style_figure(figure, f"x, {shown}", f"y, {shown}", 390).update_layout(margin={"r": 80, "t": 60})
+
+
+def _places_mm(comparison: Comparison) -> tuple[FloatArray, list[int]]:
+    """(N, 3) places of the tip, and the axes that are known; the place is 0 along those that a model does not have."""
+    tip_M_mm = comparison.aligned.rows.tip_M_mm
+    known = np.isfinite(tip_M_mm).any(axis=0)
+    return np.where(known, tip_M_mm, 0.0), np.flatnonzero(known).tolist()
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:

@@ -7,7 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plotly.graph_objects import Figure
 
+from compd.comparison.compare import compare
+from compd.comparison.open import open_recording
+from compd.report.figures import plot_residual_vectors, plot_workspace_map
+from compd.report.small_multiples import NOT_RECORDED
 from tests.scoreboard.trial import run_in_process
 from tests.support.external import Floats, measured_places, write_external
 
@@ -65,3 +70,12 @@ def test_what_an_external_recording_follows_is_described(
     assert "temperature_room_degC" in text
     for page in ("compare", "diagnose"):
         assert "</html>" in (tmp_path / f"{page}.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("axes", "views"), [("x", 0), ("xy", 1), ("yz", 1), ("xyz", 3)])
+def test_the_map_has_a_view_of_every_two_axes_that_are_known(tmp_path: Path, axes: str, views: int) -> None:
+    comparison = compare(open_recording(write_external(tmp_path, positions(axes))))
+    workspace, (vectors, _) = plot_workspace_map(comparison), plot_residual_vectors(comparison)
+    assert (workspace is NOT_RECORDED) == (vectors is NOT_RECORDED) == (views == 0)
+    if isinstance(workspace, Figure):
+        assert len(workspace.data) == views
