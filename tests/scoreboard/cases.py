@@ -85,11 +85,11 @@ def _size(seed: int, least: float, most: float, count: int = 1) -> tuple[float, 
 
 
 def _swept(family: str, strengths: Sequence[float], among: Callable[[], list[str]]) -> Callable[[int, int], Case]:
-    """Each cause once per round, with another one of the strengths in every round."""
+    """Each cause once per round, with another one of the strengths in every round and in every set."""
 
     def draw(number: int, seed: int) -> Case:
         names = among()
-        strength = strengths[(number + number // len(names)) % len(strengths)]
+        strength = strengths[(number + number // len(names) + seed // SEEDS_PER_SET) % len(strengths)]
         return Case(family, (names[number % len(names)],), (strength,), seed)
 
     return draw
@@ -136,9 +136,9 @@ def _counts(prepared: int, full: int) -> dict[str, int]:
     return {"tuning": prepared, "test": prepared, "full": full}
 
 
-# Seed of a set's first case; a set and the families have no seed in common.
-FIRST_SEED = {"full": 1_000_000, "tuning": 2_000_000, "test": 3_000_000}
-SEEDS_PER_FAMILY = 10_000
+# Sets and families have no seed in common.
+SEEDS_PER_SET, SEEDS_PER_FAMILY = 1_000_000, 10_000
+FIRST_SEED = {name: SEEDS_PER_SET * place for place, name in enumerate(("full", "tuning", "test"), start=1)}
 
 FAMILIES: Mapping[str, Family] = {
     family.name: family
