@@ -7,24 +7,17 @@ With --set the cases of that set are made, where they are not on disk, and diagn
 from __future__ import annotations
 
 import argparse
-import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
-
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from typing import Any
 
 from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
+from tests.scoreboard.parallel import Failures, append_results, in_parallel, read_results
 from tests.scoreboard.real import FAMILY as REAL
 from tests.scoreboard.real import PLACE, prepare_real
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepared, read_answer, run
-
-Item = TypeVar("Item")
-Failures = list[tuple[str, str]]
 
 
 def main() -> None:
@@ -33,9 +26,10 @@ def main() -> None:
     directories, failed = _directories(options)
     results: list[dict[str, Any]] = []
     if not options.prepare:
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        failed += _diagnose(directories, options)
-        wanted = {read_answer(directory)["case"] for directory in directories}
+        wanted = {read_answer(directory)["case"]: directory for directory in directories}
+        done = {result["case"] for result in read_results(options.out)}
+        todo = [directory for case, directory in wanted.items() if case not in done]
+        failed += append_results(options.out, run, todo, options.jobs, "diagnosing")
         results = [result for result in read_results(options.out) if result["case"] in wanted]
         print(report(results))
     print(f"\n{len(results)} of {len(directories)} cases diagnosed, {len(failed)} failed")
@@ -80,45 +74,12 @@ def _directories(options: argparse.Namespace) -> tuple[list[Path], Failures]:
     todo = wanted[: options.most]
     work = partial(prepare, campaigns=options.campaigns)
     failed: Failures = []
-    for case, outcome in in_parallel(work, todo, options.jobs, "preparing"):
-        if isinstance(outcome, BaseException):
-            failed.append((case.name, str(outcome)))
+    for case, directory, error in in_parallel(work, todo, options.jobs, "preparing"):
+        if error is None:
+            directories.append(directory)
         else:
-            directories.append(outcome)
+            failed.append((case.name, f"{type(error).__name__}: {error}"))
     return directories, failed
-
-
-def _diagnose(directories: Sequence[Path], options: argparse.Namespace) -> Failures:
-    """Diagnose the cases that have no result yet."""
-    done = {result["case"] for result in read_results(options.out)}
-    todo = [directory for directory in directories if read_answer(directory)["case"] not in done]
-    failed: Failures = []
-    with options.out.open("a", encoding="utf-8") as file:
-        for directory, outcome in in_parallel(run, todo, options.jobs, "diagnosing"):
-            if isinstance(outcome, BaseException):
-                failed.append((directory.name, f"{type(outcome).__name__}: {outcome}"))
-                continue
-            file.write(json.dumps(outcome) + "\n")
-            file.flush()
-    return failed
-
-
-def read_results(path: Path) -> list[dict[str, Any]]:
-    """Every result of the file; none where there is no file."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-
-
-def in_parallel(work: Callable[[Item], Any], todo: Iterable[Item], jobs: int, what: str) -> Iterator[tuple[Item, Any]]:
-    """(item, `work` of it or the error that it raised), in the order in which they are done."""
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with ProcessPoolExecutor(jobs) as pool, Progress(*columns, transient=True) as progress:
-        running = {pool.submit(work, item): item for item in todo}
-        bar = progress.add_task("", total=len(running))
-        for future in as_completed(running):
-            progress.advance(bar)
-            yield running[future], future.exception() or future.result()
 
 
 if __name__ == "__main__":
