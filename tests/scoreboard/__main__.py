@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
+from tests.scoreboard.page import write_page
 from tests.scoreboard.parallel import Failures, append_results, in_parallel, read_results
 from tests.scoreboard.real import FAMILY as REAL
 from tests.scoreboard.real import PLACE, prepare_real
@@ -32,6 +33,9 @@ def main() -> None:
         failed += append_results(options.out, run, todo, options.jobs, "diagnosing")
         results = [result for result in read_results(options.out) if result["case"] in wanted]
         print(report(results))
+        page = options.out.with_suffix(".html")
+        write_page(page, results, options.campaigns)
+        print(f"\n{page}: every case that is not right, with what was hidden and what was said")
     print(f"\n{len(results)} of {len(directories)} cases diagnosed, {len(failed)} failed")
     for name, why in failed:
         print(f"failed: {name}: {why}")
