@@ -91,17 +91,20 @@ def expectation(case: Case, answer: Mapping[str, Any], change_s: float | None) -
         case "drift":
             return Expectation(("unexplained", "not_testable"))
         case "outside":
-            follows = tuple(POSITION if name == "position" else (name,) for name in answer["follows"])
-            return Expectation(("unexplained",), follows=(tuple(name for group in follows for name in group),), first=2)
+            return Expectation(("unexplained",), follows=(covariates(answer["follows"]),), first=2)
         case "blind":
             return Expectation(("unexplained", "partial", "not_testable"), may_name=tuple(large) + small)
         case "change" if change_s is not None:
             (changing,) = _groups(answer["answers"])
             return Expectation(("unexplained", *NAMED), may_name=changing, change=Change(changing, change_s))
         case "shifted":
-            constants = tuple(name for name in CONSTANT_CAUSES)
-            return Expectation(words, (*groups, constants), small)
+            return Expectation(NAMED, (*groups, CONSTANT_CAUSES), small)
     return Expectation(words, groups, small)
+
+
+def covariates(follows: Sequence[str]) -> tuple[str, ...]:
+    """Columns by which a cause outside the library can be described, from what its answer says that it follows."""
+    return tuple(column for name in follows for column in (POSITION if name == "position" else (name,)))
 
 
 def _groups(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
