@@ -1,4 +1,4 @@
-"""`python -m tests.scoreboard`: prepare cases, diagnose them on all cores, print the tables.
+"""`python -m tests.scoreboard`: prepare cases, diagnose them on all cores, print the tables and write the page.
 
 With --set the cases of that set are made, where they are not on disk, and diagnosed; without it, those that are in
 --campaigns. Every result is a line of --out, written when its case is done: a run that was interrupted goes on.
@@ -8,35 +8,39 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
 from tests.scoreboard.page import write_page
-from tests.scoreboard.parallel import Failures, append_results, in_parallel, read_results
+from tests.scoreboard.parallel import append_results, in_parallel, read_results
 from tests.scoreboard.real import FAMILY as REAL
 from tests.scoreboard.real import PLACE, prepare_real
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepared, read_answer, run
 
+# A case to prepare, or the directory of one that is prepared.
+Item = Case | Path
+
 
 def main() -> None:
     options = _options()
     options.campaigns.mkdir(parents=True, exist_ok=True)
-    directories, failed = _directories(options)
-    results: list[dict[str, Any]] = []
-    if not options.prepare:
-        wanted = {read_answer(directory)["case"]: directory for directory in directories}
+    wanted = dict(_wanted(options))
+    if options.prepare:
+        outcomes = in_parallel(partial(_directory, campaigns=options.campaigns), list(wanted.values()), options.jobs)
+        failed = [(str(item), str(error)) for item, _, error in outcomes if error]
+    else:
         done = {result["case"] for result in read_results(options.out)}
-        todo = [directory for case, directory in wanted.items() if case not in done]
-        failed += append_results(options.out, run, todo, options.jobs, "diagnosing")
+        todo = [item for name, item in wanted.items() if name not in done]
+        failed = append_results(options.out, partial(_run, campaigns=options.campaigns), todo, options.jobs)
         results = [result for result in read_results(options.out) if result["case"] in wanted]
-        print(report(results))
         page = options.out.with_suffix(".html")
         write_page(page, results, options.campaigns)
-        print(f"\n{page}: every case that is not right, with what was hidden and what was said")
-    print(f"\n{len(results)} of {len(directories)} cases diagnosed, {len(failed)} failed")
+        print(report(results))
+        print(f"\n{len(results)} of {len(wanted)} cases; those that are not right, with what was said: {page}")
     for name, why in failed:
         print(f"failed: {name}: {why}")
     raise SystemExit(bool(failed))
@@ -53,37 +57,42 @@ def _options() -> argparse.Namespace:
     add("--prepare", action="store_true", help="prepare the campaigns, and diagnose nothing")
     add("--campaigns", type=Path, default=Path("out/campaigns"), help="where they are kept")
     add("--real", type=Path, default=PLACE, help="where the recordings of real machines are, with answers.yaml")
-    add("--out", type=Path, default=Path("out/scoreboard.jsonl"), help="results, one line each")
+    add("--out", type=Path, default=Path("out/scoreboard.jsonl"), help="results; the page is written beside them")
     return parser.parse_args()
 
 
-def _directories(options: argparse.Namespace) -> tuple[list[Path], Failures]:
-    """Directories of the wanted cases, which are prepared where that is asked for; and what failed."""
-    real = [name for name in options.case or () if name.startswith(f"{REAL}:")]
-    wanted: list[Case] = []
-    if options.case:
-        wanted = [parse_case(name) for name in options.case if name not in real]
-    elif options.set:
-        wanted = cases([name for name in options.family if name != REAL], options.set)
-    if not wanted and not real and not options.set:
-        found = [path for path in prepared(options.campaigns) if read_answer(path)["family"] in options.family]
-        return found[: options.most], []
-    with_real = bool(real) or (bool(options.set) and REAL in options.family)
-    directories = prepare_real(options.campaigns, options.real) if with_real else []
-    if real:
-        directories = [path for path in directories if read_answer(path)["case"] in real]
+def _wanted(options: argparse.Namespace) -> Iterator[tuple[str, Item]]:
+    """Name and item of each wanted case."""
+    if not options.case and not options.set:
+        answers = ((read_answer(path), path) for path in prepared(options.campaigns))
+        found = [(answer["case"], path) for answer, path in answers if answer["family"] in options.family]
+        yield from found[: options.most]
+        return
+    is_real = {name: name.startswith(f"{REAL}:") for name in options.case or ()}
+    if any(is_real.values()) or (not options.case and REAL in options.family):
+        for path in prepare_real(options.campaigns, options.real):
+            if is_real.get(name := read_answer(path)["case"], not options.case):
+                yield name, path
+    simulated = (
+        [parse_case(name) for name, real in is_real.items() if not real]
+        if options.case
+        else cases([name for name in options.family if name != REAL], options.set)
+    )
+    yield from ((case.name, case) for case in simulated[: options.most])
+
+
+def _directory(item: Item, campaigns: Path) -> Path:
+    """Where the case is, which is prepared where it is not there yet."""
+    if isinstance(item, Path):
+        return item
     # the simulated machine is needed only where cases are made
     from tests.scoreboard.prepare import prepare
 
-    todo = wanted[: options.most]
-    work = partial(prepare, campaigns=options.campaigns)
-    failed: Failures = []
-    for case, directory, error in in_parallel(work, todo, options.jobs, "preparing"):
-        if error is None:
-            directories.append(directory)
-        else:
-            failed.append((case.name, f"{type(error).__name__}: {error}"))
-    return directories, failed
+    return prepare(item, campaigns)
+
+
+def _run(item: Item, campaigns: Path) -> dict[str, Any]:
+    return run(_directory(item, campaigns))
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def measures(results: Sequence[Result]) -> list[Measure]:
         _share("right effect named first, error 1 to 6 times the floor", library, named_first, ">= 97 %"),
         _share("the same, constants not taken as one family", library, named_first_exactly, ""),
         _share("right effect named or among the rivals", library, named_or_rival, "100 %"),
-        _share("an effect named that was not hidden", library, named_wrongly, ""),
+        _share("an effect named that is not there", library, named_wrongly, ""),
         _share("two hidden effects, both named or among the rivals", of["pair"], named_or_rival, ">= 90 %"),
         _share("nothing hidden: says adequate", of["nothing"], is_adequate, ">= 98 %"),
         _share("outside the library: names none", outside, lambda result: not scoring.steps(result), ""),
@@ -88,9 +88,10 @@ def named_or_rival(result: Result) -> bool:
 
 
 def named_wrongly(result: Result) -> bool:
-    """Whether something is named of which neither effect nor rival was hidden."""
-    groups = {name for group in result["expected"].get("groups", ()) for name in group}
-    return any(not groups & {step["effect"], *step["rivals"]} for step in scoring.steps(result))
+    """Whether something is named of which neither effect nor rival is there."""
+    there = {name for group in result["expected"].get("groups", ()) for name in group}
+    there |= {*result["expected"].get("may_name", ()), *result["answer"].get("weak_disturbances", ())}
+    return any(not there & {step["effect"], *step["rivals"]} for step in scoring.steps(result))
 
 
 def is_adequate(result: Result) -> bool:

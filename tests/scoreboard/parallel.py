@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
 Item = TypeVar("Item")
 # Name of an item, and the error that it raised.
@@ -16,10 +16,10 @@ Failures = list[tuple[str, str]]
 
 
 def in_parallel(
-    work: Callable[[Item], Any], todo: Sequence[Item], jobs: int, what: str
+    work: Callable[[Item], Any], todo: Sequence[Item], jobs: int
 ) -> Iterator[tuple[Item, Any, BaseException | None]]:
     """(item, `work` of it, the error that it raised), in the order in which they are done."""
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with ProcessPoolExecutor(jobs) as pool, Progress(*columns, transient=True) as progress:
         running = {pool.submit(work, item): item for item in todo}
         bar = progress.add_task("", total=len(todo))
@@ -29,12 +29,12 @@ def in_parallel(
             yield running[future], None if error else future.result(), error
 
 
-def append_results(path: Path, work: Callable[[Item], Any], todo: Sequence[Item], jobs: int, what: str) -> Failures:
+def append_results(path: Path, work: Callable[[Item], Any], todo: Sequence[Item], jobs: int) -> Failures:
     """Append `work` of each item to the file as it is done; returns what failed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     failed: Failures = []
     with path.open("a", encoding="utf-8") as file:
-        for item, result, error in in_parallel(work, todo, jobs, what):
+        for item, result, error in in_parallel(work, todo, jobs):
             if error is not None:
                 failed.append((str(item), f"{type(error).__name__}: {error}"))
                 continue

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -36,10 +35,10 @@ def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> 
     directory = campaigns / f"{FAMILY}_{name.replace(' ', '-')}"
     directory.mkdir(parents=True, exist_ok=True)
     for suffix in (".csv", ".yaml"):
-        shutil.copyfile(place / f"{recording}{suffix}", directory / f"train{suffix}")
+        _link(place / f"{recording}{suffix}", directory / f"train{suffix}")
     if library := entry.pop("library"):
         own = HERE / f"{library}-effects.yaml"
-        shutil.copyfile(own if own.exists() else place / library, directory / "effects.yaml")
+        _link(own if own.exists() else place / library, directory / "effects.yaml")
     known = model.removesuffix(_IN_THE_MODEL).split()
     if known:
         (directory / "known.json").write_text(json.dumps(known), encoding="utf-8")
@@ -54,3 +53,9 @@ def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> 
     }
     (directory / "answer.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
     return directory
+
+
+def _link(source: Path, target: Path) -> None:
+    """A link in place of a copy: the recordings are not the project's."""
+    target.unlink(missing_ok=True)
+    target.symlink_to(source.resolve())

@@ -89,7 +89,8 @@ def score(result: Result) -> Score:
 def _wrongly_named(result: Result, expected: Expectation) -> list[str]:
     """Steps whose effect was not hidden; also those that must not be named, or not without a rival."""
     allowed = {name for group in (*expected.groups, *expected.constant_or) for name in group}
-    allowed |= {*expected.may_name, *expected.constant}
+    # the weak disturbances are there, too: none has to be named, and each may be
+    allowed |= {*expected.may_name, *expected.constant, *result["answer"].get("weak_disturbances", ())}
     forbidden = [name for name in names(result) if name in expected.never]
     if result["family"] == "real":
         # nobody planted anything: effects that the answers do not mention may be there

@@ -55,7 +55,7 @@ def main() -> None:
         for case, directory in cases.items()
         if (case, *variant) not in done
     ]
-    failed = append_results(options.out, run_variant, todo, options.jobs, "sensitivity")
+    failed = append_results(options.out, run_variant, todo, options.jobs)
     results = [result for result in read_results(options.out) if result["case"] in cases]
     print("\n".join(table(results)))
     for name, why in failed:

@@ -14,6 +14,7 @@ from tests.scoreboard.cases import (
     cases,
     parse_case,
 )
+from tests.support.paths import ROOT
 
 
 @pytest.mark.parametrize("set_name", FIRST_SEED)
@@ -63,3 +64,9 @@ def test_shifted_and_unregistered_recordings_hide_no_constant():
 
 def test_blind_cases_hide_what_needs_a_thermometer():
     assert {case.causes[0] for case in cases(["blind"], "full")} == set(THERMOMETERS)
+
+
+def test_the_page_on_the_scoreboard_has_every_family_with_its_cases():
+    page = (ROOT / "docs" / "explanation" / "how-often-it-is-right.md").read_text(encoding="utf-8")
+    for name, family in FAMILIES.items():
+        assert f"| `{name}` | {family.counts['full']} | " in page
