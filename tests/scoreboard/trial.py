@@ -42,22 +42,22 @@ def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
     if train is None:
         raise FileNotFoundError(directory / "train.csv")
     effects = _effects(directory)
-    known, covariance = _known(directory, train, effects, criteria)
+    known, covariance = _known(directory, train, effects)
     begin_s = time.process_time()
     diagnosis = diagnose(train, known, covariance, effects, criteria=criteria)
     took_s = time.process_time() - begin_s
     answer = read_answer(directory)
     expected = answer["expected"]
     bounded = answer["family"] == BOUNDED
-    true_effects = _fitted(answer["answers"], train, effects, criteria)[0] if bounded else ()
+    true_effects = _fitted(answer["answers"], train, effects)[0] if bounded else ()
     return {
         "case": answer["case"],
         "family": answer["family"],
         "directory": directory.name,
         "verdict": diagnosis.as_json(),
         "took_s": round(took_s, 3),
-        "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted, criteria),
-        "true_floor_ratio": _floor_ratio(other, true_effects, criteria) if bounded else None,
+        "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted),
+        "true_floor_ratio": _floor_ratio(other, true_effects) if bounded else None,
         "times_s": train.rows.time_s.tolist() if "change" in expected else [],
         "expected": expected,
         "answer": answer,
@@ -70,12 +70,12 @@ def _open(directory: Path, name: str) -> AlignedRecording | None:
     return open_recording(path, machine if machine.exists() else None) if path.exists() else None
 
 
-def _floor_ratio(other: AlignedRecording | None, fitted: Sequence[FittedEffect], criteria: Criteria) -> float | None:
+def _floor_ratio(other: AlignedRecording | None, fitted: Sequence[FittedEffect]) -> float | None:
     """Floor ratio of the other recording with these effects; None without one, or where it lacks what they need."""
     if other is None:
         return None
     try:
-        return compare(other, fitted, criteria=criteria.comparison).floor_ratio
+        return compare(other, fitted).floor_ratio
     except CompdError:
         return None
 
@@ -87,23 +87,23 @@ def _effects(directory: Path) -> Sequence[Effect]:
 
 
 def _known(
-    directory: Path, aligned: AlignedRecording, effects: Sequence[Effect], criteria: Criteria
+    directory: Path, aligned: AlignedRecording, effects: Sequence[Effect]
 ) -> tuple[tuple[FittedEffect, ...], FloatArray | None]:
     """The effects that the model has already (known.json), fitted on the recording."""
     path = directory / "known.json"
     names = json.loads(path.read_text(encoding="utf-8")) if path.exists() else ()
-    return _fitted(names, aligned, effects, criteria)
+    return _fitted(names, aligned, effects)
 
 
 def _fitted(
-    names: Sequence[str], aligned: AlignedRecording, effects: Sequence[Effect], criteria: Criteria
+    names: Sequence[str], aligned: AlignedRecording, effects: Sequence[Effect]
 ) -> tuple[tuple[FittedEffect, ...], FloatArray | None]:
     """These effects, fitted on the recording one after the other, with their covariance."""
     fitted: tuple[FittedEffect, ...] = ()
     covariance: FloatArray | None = None
     for name in names:
         effect = next(effect for effect in effects if effect.id == name)
-        sigma_um = compare(aligned, fitted, covariance, criteria.comparison).floor.by_axis_um
-        result = search_constants(aligned, fitted, effect, sigma_um, criteria.comparison)
+        sigma_um = compare(aligned, fitted, covariance).floor.by_axis_um
+        result = search_constants(aligned, fitted, effect, sigma_um)
         fitted, covariance = result.fitted, result.covariance
     return fitted, covariance
