@@ -15,6 +15,7 @@ from compd.errors import CompdError, Problem
 from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
 from compd.model.statics import link_forces
+from compd.model.tool import Arrangement
 
 # ISO 1: lengths are stated at 20 degC.
 REFERENCE_TEMPERATURE_degC = 20.0
@@ -46,7 +47,8 @@ class MachineConstants(NamedTuple):
     """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
     platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.
-    tool_P_mm (3,), at machine zero.
+    arrangement: where the tool is; its tool_mm (3,) in {P}, or in {M} where the tool stands on the plate, as at machine
+        zero.
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
     zero_axes_M (n, 3): unit vector square to each link at machine zero, towards which its base joint's first angle
         counts: the revolute axis on a tripod, horizontal on a hexapod.
@@ -58,7 +60,7 @@ class MachineConstants(NamedTuple):
 
     platform_joints_P_mm: FloatArray
     revolute_axes_P: FloatArray
-    tool_P_mm: FloatArray
+    arrangement: Arrangement
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray
     zero_axial_force_N: FloatArray
@@ -186,8 +188,13 @@ class Observations:
 
     @cached_property
     def force_M_N(self) -> FloatArray:
-        """(N, 3) external force on the tip."""
+        """(N, 3) external force on what the platform carries: at the tip, on the tool or on the work."""
         return np.stack([self.quantity(f"force_{axis}_N") for axis in "xyz"], axis=1)
+
+    @cached_property
+    def force_on_tool_N(self) -> FloatArray:
+        """(N, 3) force on the tool's tip, in the frame of the tool vector: {P}, or {M} for a tool on the plate."""
+        return self.constants.arrangement.force_on_tool_N(self.force_M_N, self.rotation_M_P)
 
     @cached_property
     def axial_force_N(self) -> FloatArray:

@@ -14,6 +14,7 @@ from compd.model.kinematics import Pose, forward_kinematics, joint_shortening, l
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import MachineConstants, Observations
+from compd.model.tool import ToolOnPlatform
 
 
 def observe(
@@ -116,7 +117,7 @@ def observe_external(
     constants = MachineConstants(
         platform_joints_P_mm=no_vectors,
         revolute_axes_P=no_vectors,
-        tool_P_mm=unknown,
+        arrangement=ToolOnPlatform(unknown),
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,
         zero_axial_force_N=np.zeros(0),
