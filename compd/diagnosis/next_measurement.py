@@ -99,7 +99,7 @@ def measurement_of_constant(
 
     causes : effects that make nothing but a constant on the recording.  constant_um : (m,) the constant.
     Each cause is taken with the numbers by which it imitates the constant best, and contends with every other one and
-    with what is constant everywhere, such as the zero of the instrument. Two causes that no such rows part are left out.
+    with what is constant everywhere, such as the zero of the instrument. Two that no such rows part are left out.
     """
     try:
         possible = _programmes(aligned, causes, model)

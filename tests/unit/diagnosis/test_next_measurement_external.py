@@ -282,7 +282,7 @@ def test_an_effect_without_its_column_is_told_what_to_record(tmp_path: Path) -> 
     wind = along("y", "wind", "k * wind_m_per_s")
     answer = measurement_to_test(aligned, (), wind, sigma_um(aligned))
     assert answer.plan is None
-    assert "wind_m_per_s" in answer.measure
+    assert answer.measure == "read a gauge along and record a column `wind_m_per_s`"
     assert "wind_m_per_s" in answer.why
 
 
