@@ -100,20 +100,22 @@ def machine_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     possible = list(_programmes(aligned, limits, names))
     observations = _observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
     purposes = [programme.purpose for programme in possible for _ in range(len(programme))]
-    held = (
-        zip(*(observations.quantities[name].tolist() for name in names), strict=True) if names else [()] * len(purposes)
+    # lists, of which single numbers are taken faster than of arrays
+    time_s, tip_M_mm, direction = (
+        values.tolist() for values in (observations.time_s, observations.tip_M_mm, observations.direction)
     )
+    speed_mm_per_s = np.abs(observations.velocity_mm_per_s).max(axis=1).tolist()
+    held = {name: observations.quantities[name].tolist() for name in names}
     to_set = [
-        plan_row(purpose, time_s, tip_M_mm, dict(zip(names, values, strict=True)), direction, speed_mm_per_s)
-        for purpose, time_s, tip_M_mm, values, direction, speed_mm_per_s in zip(
-            purposes,
-            observations.time_s.tolist(),
-            observations.tip_M_mm.tolist(),
-            held,
-            observations.direction.tolist(),
-            np.abs(observations.velocity_mm_per_s).max(axis=1).tolist(),
-            strict=True,
+        plan_row(
+            purpose,
+            time_s[k],
+            tip_M_mm[k],
+            {name: values[k] for name, values in held.items()},
+            direction[k],
+            speed_mm_per_s[k],
         )
+        for k, purpose in enumerate(purposes)
     ]
     return ProgrammeRows(observations, np.array([len(programme) for programme in possible]), to_set)
 
