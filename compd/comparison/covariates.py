@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,6 +11,17 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.units import unit_of
+
+# Columns of the user's own model: derivatives of its prediction by a parameter.
+_SENSITIVITY = re.compile(r"d_\w+_(?:[xyz]|r[xyz]|link_[1-9]\d*)_(?:mm|rad)")
+# Units of pure numbers, and words by which people call a number that names something.
+_PURE = ("", "1", "counts")
+_LABEL_WORDS = frozenset(
+    [
+        *("row", "line", "index", "number", "no", "nr", "id", "point", "visit", "session", "run", "sample", "sequence"),
+        *("star", "target", "hole", "image", "exposure"),
+    ]
+)
 
 
 class Covariate(NamedTuple):
@@ -36,6 +48,8 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         if np.isfinite(column).any()
     ]
     for name, column in recording.quantities.items():
+        if why_no_covariate(name, column[np.isfinite(column)]):
+            continue
         unit = unit_of(name)
         result.append(Covariate(name.removesuffix(f"_{unit}"), _difference_unit(unit), column, _link_of(name)))
     for top in [name for name in recording.quantities if name.endswith("_top_degC")]:
@@ -49,6 +63,23 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         for i, direction in enumerate(recording.approach.T, start=1):
             result.append(Covariate(f"direction of link {i}", "1", direction, i))
     return result
+
+
+def why_no_covariate(name: str, values: FloatArray) -> str:
+    """Why nothing can depend on a measured quantity, in words; "" where something can.
+
+    A label is a whole number without unit that names rows or counts up by ones through the recording, as a column
+    `star_1` or `run_1` does: everything that changed in time follows it. Two values, off and on, are no label.
+
+    values : (R,) those that are known.
+    """
+    if _SENSITIVITY.fullmatch(name):
+        return "a derivative of the model's prediction, which belongs to an effect"
+    if unit_of(name) in _PURE and (values == np.rint(values)).all():
+        counts = len(np.unique(values)) > 2 and bool(np.isin(np.diff(values), (0.0, 1.0)).all())
+        if counts or _LABEL_WORDS & set(name.lower().split("_")):
+            return "only counts or names rows"
+    return ""
 
 
 def _link_of(name: str) -> int:

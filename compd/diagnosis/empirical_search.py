@@ -63,7 +63,7 @@ class EmpiricalSearch:
     def __init__(self, problem: DiagnosisProblem) -> None:
         self._problem = problem
         self._fits_by_size: dict[int, list[EmpiricalFit]] = {}
-        for term in empirical_terms(problem.aligned, problem.criteria):
+        for term in empirical_terms(problem.aligned, problem.comparison.residual_um):
             effect = term.effect()
             searched = problem.criteria.searched_constant_parameters if term.constant else 0
             for constant in term.grid or (None,):
