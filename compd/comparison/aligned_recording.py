@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.registration import Registration, register, registration_columns
+from compd.comparison.registration import Registration, displacement_columns, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
@@ -76,7 +76,7 @@ class AlignedRecording:
 
     @property
     def registered(self) -> bool:
-        """Whether six parameters of the instrument's frame are always fitted along."""
+        """Whether the parameters of the instrument's frame are always fitted along."""
         reference = self.recording.reference
         return reference is not None and reference.frame == "instrument" and not self.of_links
 
@@ -111,10 +111,16 @@ class AlignedRecording:
 
     @cached_property
     def registration_columns(self) -> FloatArray:
-        """(N, m, 6 or fewer) derivatives (mm) by a motion of the instrument's frame; none for a reference in {M}."""
-        if not self.registered:
-            return np.zeros((*self.measured_mm.shape, 0))
-        return registration_columns(self.rows.tip_M_mm, self.axes)
+        """(N, m, Q) derivatives (mm) of what is always fitted along; none of a machine's own frame, Q = 0.
+
+        Of an instrument's frame its small motion; of an external model a constant of each coordinate, because where
+        its zero lies says nothing about the machine.
+        """
+        if self.registered:
+            return registration_columns(self.rows.tip_M_mm, self.axes)
+        if self.model is None:
+            return displacement_columns(*self.measured_mm.shape)
+        return np.zeros((*self.measured_mm.shape, 0))
 
     @cached_property
     def usable(self) -> UsableRows:
@@ -231,15 +237,34 @@ def align_recording(
         raise RecordingError(Problem(where=where, what="has no column of the reference"))
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
     registration = None
-    # with fewer than three axes a frame cannot be laid over another: it must lie near already
-    if recording.reference.frame == "instrument" and len(axes) == 3:
-        registration = register(
-            np.where(recording.excluded[:, None], np.nan, measured_mm), observations.tip_M_mm, criteria
-        )
-        measured_mm = measured_mm if registration is None else registration.into_M(measured_mm)
+    if recording.reference.frame == "instrument":
+        registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
     return AlignedRecording(
         recording, model, observations, recording.reference_axes, axes, measured_mm, registration, geometry_hash
     )
+
+
+def _registered(
+    recording: Recording,
+    measured_mm: FloatArray,
+    tip_M_mm: FloatArray,
+    axes: tuple[int, ...],
+    criteria: ComparisonCriteria,
+) -> tuple[Registration | None, FloatArray]:
+    """How the instrument's frame lies in {M}, and what was measured (N, m), in {M}; None where nothing fixes it.
+
+    Points in the plane z = 0 are turned in it. Along fewer axes, or of a point of which the third coordinate matters,
+    no frame can be laid over another: it must lie near already.
+    """
+    in_plane = axes == (0, 1) and not np.isfinite(tip_M_mm[:, 2]).any()
+    if len(axes) < 3 and not in_plane:
+        return None, measured_mm
+    points, predicted = np.zeros((len(measured_mm), 3)), np.zeros((len(measured_mm), 3))
+    points[:, list(axes)], predicted[:, list(axes)] = measured_mm, tip_M_mm[:, list(axes)]
+    registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
+    if registration is not None:
+        measured_mm = registration.into_M(points)[:, list(axes)]
+    return registration, measured_mm
 
 
 def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:

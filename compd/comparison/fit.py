@@ -30,7 +30,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.cluster_covariance import cluster_covariance, neighbour_blocks
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.least_squares import column_norms, solve_least_squares
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.robust import huber_weights, robust_regression
 from compd.errors import CompdError, Problem
@@ -43,6 +43,8 @@ STEPS = 10
 ROUNDS = 8
 # A step that changes the prediction by less than this share of the residual ends the iteration.
 CONVERGED = 1e-6
+# What is fitted along is an effect's own where the effect leaves less of it than this share.
+LEAST_SHARE = 1e-4
 # um; below this a residual is rounding.
 LEAST_RMS_UM = 1e-9
 
@@ -85,11 +87,13 @@ def fit(
     effects: Sequence[FittedEffect],
     weight_sigma_um: FloatArray | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
+    outlier: BoolArray | None = None,
 ) -> FitResult:
     """Fit the effects together, and with them the instrument's frame where it is not known.
 
     effects : with the parameters to start from; nonlinear constants stay as they are.
     weight_sigma_um : (m,) standard deviation of each coordinate's noise; all alike if None.
+    outlier : (N,) rows to leave out, and no others; None to find them.
 
     Raises CompdError where an effect needs what the recording has not, or where fewer values are usable than there
     are parameters.
@@ -100,26 +104,31 @@ def fit(
     effect_deltas(initial, aligned.rows)  # raises where an effect needs what the recording has not
     columns_um = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM for effect in initial]
     ends = np.cumsum([0, *(column.shape[2] for column in columns_um)])
-    G_um = np.concatenate([*columns_um, aligned.registration_columns * UM_PER_MM], axis=2)
-    usable = usable & np.isfinite(G_um).all(axis=(1, 2))
+    own_um = np.concatenate([np.zeros((*aligned.measured_mm.shape, 0)), *columns_um], axis=2)
+    usable = usable & np.isfinite(own_um).all(axis=(1, 2)) & np.isfinite(aligned.registration_columns).all(axis=(1, 2))
+    if outlier is not None:
+        usable = usable & ~outlier
+    G_um = np.concatenate([own_um, registration_beside(aligned, own_um, usable)], axis=2)
     _check_rows(aligned, usable, G_um.shape[2])
 
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in initial)])
     registration = np.zeros(G_um.shape[2] - len(theta))
-    outlier = np.zeros(len(usable), dtype=bool)
+    left_out = np.zeros(len(usable), dtype=bool)
     earlier: set[bytes] = set()
     for _ in range(ROUNDS):
         theta, registration, residual_um = _gauss_newton(
-            aligned, initial, ends, G_um, theta, registration, usable & ~outlier, sigma_um
+            aligned, initial, ends, G_um, theta, registration, usable & ~left_out, sigma_um
         )
-        new_outlier = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, criteria)
-        # a set of outliers that comes back would alternate for ever
-        if (new_outlier == outlier).all() or new_outlier.tobytes() in earlier:
+        if outlier is not None:
             break
-        earlier.add(outlier.tobytes())
-        outlier = new_outlier
+        found = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, criteria)
+        # a set of outliers that comes back would alternate for ever
+        if (found == left_out).all() or found.tobytes() in earlier:
+            break
+        earlier.add(left_out.tobytes())
+        left_out = found
     residual_um[~usable] = np.nan
-    used = usable & ~outlier
+    used = usable & ~left_out
     block = neighbour_blocks(aligned.recording)[used]
     whole = cluster_covariance(G_um[used] / sigma_um[:, None], residual_um[used] / sigma_um, block)
     covariance = whole[: len(theta), : len(theta)]
@@ -136,9 +145,24 @@ def fit(
         covariance=covariance,
         residual_um=residual_um,
         used=used,
-        outlier=outlier,
+        outlier=left_out if outlier is None else outlier,
         clusters=len(np.unique(block)),
     )
+
+
+def registration_beside(aligned: AlignedRecording, own_um: FloatArray, use: BoolArray) -> FloatArray:
+    """(N, m, Q) columns in um of what is fitted along, without what the effects' own columns (N, m, P) make of it.
+
+    An effect of the model that is nothing but a constant takes the constant; else the two would share it.
+    """
+    columns_um = aligned.registration_columns * UM_PER_MM
+    if not columns_um.shape[2] or not own_um.shape[2] or not use.any():
+        return columns_um
+    A = own_um[use].reshape(-1, own_um.shape[2])
+    R = columns_um[use].reshape(len(A), -1)
+    R = R / column_norms(R)
+    _, sizes, combinations = np.linalg.svd(R - A @ solve_least_squares(A, R), full_matrices=False)
+    return np.asarray(columns_um @ combinations[sizes > LEAST_SHARE].T)
 
 
 def frame_motion_um(aligned: AlignedRecording, residual_um: FloatArray, use: BoolArray) -> FloatArray:

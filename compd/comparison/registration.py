@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.robust import LEAST_SIGMA, robust_sigma
 
@@ -45,7 +45,8 @@ def register(
 ) -> Registration | None:
     """The rigid motion that lays points (N, 3) over predicted ones (N, 3), by least squares without outliers.
 
-    Rows that are nan on either side are left out. None where fewer than three rows are left: nothing fixes a frame.
+    Of points in a plane the third coordinate is 0 on both sides, and the motion stays in the plane. Rows that are nan
+    on either side are left out. None where fewer than three rows are left: nothing fixes a frame.
     """
     known = np.isfinite(measured_mm).all(axis=1) & np.isfinite(predicted_M_mm).all(axis=1)
     use = known.copy()
@@ -67,32 +68,49 @@ def _rigid_motion(measured_mm: FloatArray, predicted_mm: FloatArray) -> Registra
     """Least-squares rotation about the centroids, then the translation between them.
 
     `Rotation.align_vectors` solves sum |p_i - R q_i|^2 by singular values (W. Kabsch, Acta Cryst. A32 (1976) 922) and
-    returns a rotation, never a mirror image.
+    returns a rotation, never a mirror image. In a plane, which half a turn about one of its lines would mirror, the
+    solution is the angle of sum (p_i . q_i, q_i x p_i).
     """
     measured_centroid_mm, predicted_centroid_mm = measured_mm.mean(axis=0), predicted_mm.mean(axis=0)
-    rotation, _ = Rotation.align_vectors(predicted_mm - predicted_centroid_mm, measured_mm - measured_centroid_mm)
+    q, p = measured_mm - measured_centroid_mm, predicted_mm - predicted_centroid_mm
+    if not p[:, 2].any() and not q[:, 2].any():
+        angle_rad = np.arctan2((q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]).sum(), (q[:, :2] * p[:, :2]).sum())
+        rotation = Rotation.from_rotvec([0.0, 0.0, angle_rad])
+    else:
+        rotation, _ = Rotation.align_vectors(p, q)
     matrix = rotation.as_matrix()
     return Registration(matrix, predicted_centroid_mm - matrix @ measured_centroid_mm, len(measured_mm))
 
 
 def registration_columns(tip_M_mm: FloatArray, axes: Sequence[int]) -> FloatArray:
-    """(N, m, m + 3) derivatives of what the instrument shows by a small motion of its frame.
+    """(N, m, m + 3 or fewer) derivatives of what the instrument shows by a small motion of its frame.
 
-    tip_M_mm : (N, 3) modelled points.  axes : the m measured ones of 0, 1, 2 = x, y, z.
-    The first m columns are displacements along `axes`: unit vectors. The last three are small rotations about the
-    centroid c of the points, phi x (p_i - c), divided by the points' spread s = rms of the coordinates of p_i - c: so
-    all have one size and unit (mm). Where no point is known in all three axes there are only displacements.
+    tip_M_mm : (N, 3) modelled points, nan along axes that are not known.  axes : the m measured ones, 0, 1, 2 for
+        x, y, z.
+    The first m columns are displacements along `axes`: unit vectors. Then come small rotations about the centroid c of
+    the points, phi x (p_i - c), divided by the points' spread s = rms of the coordinates of p_i - c: so all have one
+    size and unit (mm). A rotation that moves a measured coordinate by one that is not known is left out: of points in a
+    plane only the rotation in the plane is left.
     """
-    N = len(tip_M_mm)
-    displacement = np.broadcast_to(np.eye(3)[:, list(axes)].T, (N, len(axes), 3))[:, :, list(axes)]
-    known = np.isfinite(tip_M_mm).all(axis=1)
-    if not known.any():
-        return np.asarray(displacement)
-    lever_mm = tip_M_mm - tip_M_mm[known].mean(axis=0)
-    spread_mm = float(np.sqrt(np.mean(lever_mm[known] ** 2)))
-    x, y, z = (lever_mm / max(spread_mm, LEAST_SPREAD_MM)).T
-    rotation = np.zeros((N, 3, 3))
-    rotation[:, 0, 1], rotation[:, 0, 2] = z, -y
-    rotation[:, 1, 0], rotation[:, 1, 2] = -z, x
-    rotation[:, 2, 0], rotation[:, 2, 1] = y, -x
-    return np.concatenate([displacement, rotation[:, list(axes)]], axis=2)
+    columns = list(displacement_columns(len(tip_M_mm), len(axes)).transpose(2, 0, 1))
+    known: BoolArray = np.asarray(np.isfinite(tip_M_mm).any(axis=0))
+    rows = np.isfinite(tip_M_mm[:, known]).all(axis=1)
+    if not known.any() or not rows.any():
+        return np.stack(columns, axis=2)
+    lever_mm = tip_M_mm - tip_M_mm[rows].mean(axis=0)
+    spread_mm = max(float(np.sqrt(np.mean(lever_mm[rows][:, known] ** 2))), LEAST_SPREAD_MM)
+    for about in range(3):
+        first, second = (about + 1) % 3, (about + 2) % 3
+        # phi e_about x lever: the first axis moves by minus the second's lever, the second by the first's
+        moves = [(axis, lever, sign) for axis, lever, sign in ((first, second, -1), (second, first, 1)) if axis in axes]
+        if moves and all(known[lever] for _, lever, _ in moves):
+            column = np.zeros((len(tip_M_mm), len(axes)))
+            for axis, lever, sign in moves:
+                column[:, list(axes).index(axis)] = sign * lever_mm[:, lever] / spread_mm
+            columns.append(column)
+    return np.stack(columns, axis=2)
+
+
+def displacement_columns(rows: int, coordinates: int) -> FloatArray:
+    """(N, m, m) derivatives of m coordinates by a constant along each: unit vectors."""
+    return np.broadcast_to(np.eye(coordinates), (rows, coordinates, coordinates))

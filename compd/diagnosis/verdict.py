@@ -1,219 +1,30 @@
-"""The result of a diagnosis: verdict, effects found, every candidate with its reason; as data and as words."""
+"""The verdict of a diagnosis with all its evidence, as data."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from compd.comparison.compare import Comparison
+from compd.diagnosis.findings import (
+    CandidateResult,
+    ConstantFinding,
+    DiagnosisStep,
+    EmpiricalFinding,
+    GrossRows,
+    UntestedEffect,
+)
+from compd.diagnosis.summary import summary
 from compd.json_text import nan_to_null
-from compd.model.effect import Effect, FittedEffect
 from compd.tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Verdict = Literal["adequate", "identified", "ambiguous", "unexplained", "not_testable"]
-Status = Literal["explains", "partial", "no_gain", "not_testable"]
-
-
-@dataclass(frozen=True)
-class ParameterEstimate:
-    """A fitted parameter in the unit that people read.
-
-    Attributes
-    ----------
-    name : str
-        As the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
-    value : float
-        The fitted value, in `unit`.
-    std : float
-        Its standard error, in `unit`.
-    unit : str
-        For instance ``"ppm/K"``.
-    plausible : bool
-        Whether the value lies in the range that the effect declares as plausible.
-    """
-
-    name: str
-    value: float
-    std: float
-    unit: str
-    plausible: bool
-
-    def as_json(self) -> dict[str, object]:
-        """Keys of the verdict's `parameters`."""
-        return {"name": self.name, "value": self.value, "std": self.std, "unit": self.unit, "plausible": self.plausible}
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An effect that explains the recording as well as one that was found, in its place.
-
-    Attributes
-    ----------
-    member : int
-        Its place among the candidates.
-    name : str
-        Id of the effect.
-    cosine : float
-        Similarity with the found effect on these rows, 0 to 1.
-    excess : float
-        By how much more it leaves, in squares of the noise floor.
-    std : float
-        Standard error of the excess.
-    """
-
-    member: int
-    name: str
-    cosine: float
-    excess: float
-    std: float
-
-
-@dataclass(frozen=True)
-class EmpiricalFinding:
-    """One covariate that the residual follows without a known cause.
-
-    Attributes
-    ----------
-    covariate : str
-        What the residual follows: the column of a quantity, ``"time"``, a link's length ...
-    form : str
-        Of the term that describes it best, for instance ``"linear"``.
-    port : str
-        Where in the machine the term acts.
-    p_value : float
-        Probability of so strong a term by noise alone, corrected for all that were tried.
-    explained_fraction : float
-        Share of what is above the noise that it explains on rows that were left out, 0 to 1.
-    heldout_rms_um : float
-        Error on rows that were left out with the term, um per coordinate.
-    formula_effects : tuple of dict
-        The term as formulas that `add_effect` and `compd effect add` take, the largest direction first.
-    parameters : tuple of dict
-        Fitted values by name, one mapping for each of `formula_effects`.
-    beside : tuple of str
-        Other covariates that are needed along with it.
-    """
-
-    covariate: str
-    form: str
-    port: str
-    p_value: float
-    explained_fraction: float
-    heldout_rms_um: float
-    formula_effects: tuple[dict[str, Any], ...]
-    parameters: tuple[dict[str, float], ...]
-    beside: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """Keys of the verdict's `depends_on`."""
-        return {
-            "covariate": self.covariate,
-            "form": self.form,
-            "port": self.port,
-            "p_adjusted": self.p_value,
-            "explained_fraction": self.explained_fraction,
-            "heldout_rms_um": self.heldout_rms_um,
-            "formula_effect": self.formula_effects[0],
-            "formula_effects": list(self.formula_effects),
-            "fitted": list(self.parameters),
-            "beside": list(self.beside),
-            "note": "a description, not a cause",
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class DiagnosisStep:
-    """One effect that was found.
-
-    Attributes
-    ----------
-    fitted : FittedEffect
-        The effect with its fitted numbers and searched constants.
-    rivals : tuple of Rival
-        Effects that explain as much, best first; empty where the recording tells it from all others.
-    heldout_rms_um : float
-        Error on rows that were left out, with it and those before it, um per coordinate.
-    explained_fraction : float
-        Share of what those before it left above the noise floor, 0 to 1.
-    p_value : float
-        Probability of so high a score by noise alone, corrected for all effects that were tried.
-    parameters : tuple of ParameterEstimate
-        Its numbers with standard errors.
-    """
-
-    fitted: FittedEffect
-    rivals: tuple[Rival, ...]
-    heldout_rms_um: float
-    explained_fraction: float
-    p_value: float
-    parameters: tuple[ParameterEstimate, ...]
-
-    @property
-    def effect(self) -> Effect:
-        """The effect without its parameters."""
-        return self.fitted.effect
-
-    def as_json(self) -> dict[str, Any]:
-        """Keys of the verdict's `steps`."""
-        return {
-            "effect": self.effect.id,
-            "rivals": [rival.name for rival in self.rivals],
-            "heldout_rms_um": self.heldout_rms_um,
-            "explained_fraction": self.explained_fraction,
-            "p_adjusted": self.p_value,
-            "parameters": [parameter.as_json() for parameter in self.parameters],
-            "constants": dict(self.fitted.constants),
-            "equation": self.effect.equation,
-            "alike": {rival.name: rival.cosine for rival in self.rivals},
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class CandidateResult:
-    """One effect of the library, tried alone; nan where it could not be tried.
-
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    status : str
-        ``"explains"``, ``"partial"``, ``"no_gain"`` or ``"not_testable"``.
-    why : str
-        The reason for the status, in words.
-    heldout_rms_um : float
-        Error on rows that were left out, with the effect alone, um per coordinate.
-    explained_fraction : float
-        Share of what is above the noise floor that it explains alone, 0 to 1.
-    p_value : float
-        Probability of so high a score by noise alone, corrected for all effects that were tried.
-    parameters : tuple of ParameterEstimate
-        Its numbers with standard errors.
-    """
-
-    effect: str
-    status: Status
-    why: str
-    heldout_rms_um: float = math.nan
-    explained_fraction: float = math.nan
-    p_value: float = math.nan
-    parameters: tuple[ParameterEstimate, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """Keys of the verdict's `candidates`."""
-        return {
-            "effect": self.effect,
-            "status": self.status,
-            "why": self.why,
-            "heldout_rms_um": self.heldout_rms_um,
-            "explained_fraction": self.explained_fraction,
-            "p_adjusted": self.p_value,
-            "parameters": [parameter.as_json() for parameter in self.parameters],
-        }
+Verdict = Literal["adequate", "identified", "ambiguous", "partial", "unexplained", "not_testable"]
+# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`.
+VERDICT_VERSION = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -225,7 +36,8 @@ class Diagnosis:
     verdict : str
         ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
-        ``"unexplained"``: the library has no such cause; `depends_on` says what the error follows.
+        ``"partial"``: they explain a part; the rest is above the noise, or the noise is not known.
+        ``"unexplained"``: no effect of the library gains; `depends_on` says what the error follows.
         ``"not_testable"``: the recording varies nothing by which an effect could be tested.
     before : Comparison
         The recording against the model as it was.
@@ -239,6 +51,16 @@ class Diagnosis:
         What the rest follows, the strongest first: a description, not a cause.
     next_measurement : sequence of dict
         Rows of a plan where rivals are to be told apart; else what to vary, in words.
+    constant : ConstantFinding or None
+        A constant of the measured coordinates, which buys no verdict; None where there is none to report.
+    gross : GrossRows
+        Rows that nothing explains and that do not count.
+    untested : tuple of UntestedEffect
+        Effects that cannot be tried here; first those that may be behind what was found.
+    heldout_before_um : float
+        Error on rows that were left out with the model as it was, without its constant, um per coordinate.
+    heldout_after_um : float
+        The same with the effects of `steps`.
     """
 
     verdict: Verdict
@@ -248,6 +70,16 @@ class Diagnosis:
     candidates: tuple[CandidateResult, ...]
     depends_on: tuple[EmpiricalFinding, ...]
     next_measurement: Sequence[Mapping[str, Any]] = field(default_factory=tuple)
+    constant: ConstantFinding | None = None
+    gross: GrossRows = field(default_factory=GrossRows)
+    untested: tuple[UntestedEffect, ...] = ()
+    heldout_before_um: float = float("nan")
+    heldout_after_um: float = float("nan")
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one or two sentences."""
+        return summary(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per effect of the library, as a pandas data frame.
@@ -303,6 +135,7 @@ class Diagnosis:
         recording = self.before.aligned.recording
         data: dict[str, Any] = {
             "verdict": self.verdict,
+            "version": VERDICT_VERSION,
             "said": self.summary,
             "recording": str(recording.path),
             "sha256": recording.sha256,
@@ -310,6 +143,9 @@ class Diagnosis:
             "noise_floor_source": self.before.floor.source,
             "residual_rms_um": self.before.rms_um,
             "floor_ratio": self.before.floor_ratio,
+            "heldout_before_um": self.heldout_before_um,
+            "heldout_after_um": self.heldout_after_um,
+            "constant": None if self.constant is None else self.constant.as_json(),
             "steps": [step.as_json() for step in self.steps],
             "candidates": [candidate.as_json() for candidate in self.candidates],
             "depends_on": [finding.as_json() for finding in self.depends_on],
@@ -321,56 +157,3 @@ class Diagnosis:
         }
         finite: dict[str, Any] = nan_to_null(data)
         return finite
-
-    @property
-    def summary(self) -> str:
-        """The verdict in one or two sentences."""
-        floor = in_um(self.before.floor.um)
-        noise = f"where noise alone is {floor}"
-        before, after = in_um(self.before.rms_um), in_um(self.after.rms_um)
-        error = f"the error of {before}"
-        names = _joined([step.effect.id for step in self.steps])
-        match self.verdict:
-            case "adequate":
-                return f"Nothing is missing: {error} is the measurement's own noise ({floor})."
-            case "identified":
-                with_them = "with it" if len(self.steps) == 1 else "with them"
-                return f"What is missing is {names}: {with_them} {error} falls to {after}, {noise}."
-            case "ambiguous":
-                pairs = "; ".join(
-                    f"{step.effect.id} or {_joined([rival.name for rival in step.rivals], 'or')}"
-                    for step in self.steps
-                    if step.rivals
-                )
-                return (
-                    f"With {names} {error} falls to {after}, {noise}. But this recording cannot tell apart: "
-                    f"{pairs}. The rows under 'next' can."
-                )
-            case "not_testable":
-                return f"{_capitalized(error)} is above the noise of {floor}, but no effect can be tested on it."
-        if self.steps:
-            subject = f"{_capitalized(names)} explains a part ({before} -> {after}). The rest"
-        else:
-            subject = _capitalized(error)
-        if not self.depends_on:
-            return (
-                f"{subject} has no cause in the library and follows nothing that was measured: {after} are left, "
-                f"{noise}."
-            )
-        first = self.depends_on[0]
-        follows = _joined([first.covariate, *first.beside])
-        left = in_um(first.heldout_rms_um)
-        return f"{subject} has no cause in the library. It follows {follows}: to describe that leaves {left}, {noise}."
-
-
-def in_um(value: float) -> str:
-    """A length with two figures and without powers of ten: "0.12 um"."""
-    return f"{value:.0f} um" if value >= 100 else f"{value:.2g} um"
-
-
-def _joined(names: Sequence[str], word: str = "and") -> str:
-    return f" {word} ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
-
-
-def _capitalized(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -11,8 +11,10 @@ from plotly.graph_objects import Figure
 
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import Covariate, covariates
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.verdict import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding, in_um
+from compd.diagnosis.summary import in_um
+from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
 from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page

@@ -14,8 +14,9 @@ from compd.cli.options import MachineOption
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
     from compd.diagnosis.holdout import Holdout
-    from compd.diagnosis.verdict import Diagnosis, DiagnosisStep, EmpiricalFinding
+    from compd.diagnosis.verdict import Diagnosis
 
 # Covariates that are listed; --json has them all.
 SHOWN = 8

@@ -1,0 +1,282 @@
+"""What a diagnosis finds: effects with their numbers, rivals, descriptions, constants, gross rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from compd.model.effect import Effect, FittedEffect
+
+Status = Literal["explains", "partial", "no_gain", "not_testable"]
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A fitted parameter in the unit that people read.
+
+    Attributes
+    ----------
+    name : str
+        As the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
+    value : float
+        The fitted value, in `unit`.
+    std : float
+        Its standard error, in `unit`.
+    unit : str
+        For instance ``"ppm/K"``.
+    plausible : bool
+        Whether the value lies in the range that the effect declares as plausible.
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    plausible: bool
+
+    def as_json(self) -> dict[str, object]:
+        """Keys of the verdict's `parameters`."""
+        return {"name": self.name, "value": self.value, "std": self.std, "unit": self.unit, "plausible": self.plausible}
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect that explains the recording as well as one that was found, in its place.
+
+    Attributes
+    ----------
+    member : int
+        Its place among the candidates.
+    name : str
+        Id of the effect.
+    cosine : float
+        Similarity with the found effect on these rows, 0 to 1.
+    excess : float
+        By how much more it leaves, in squares of the noise floor.
+    std : float
+        Standard error of the excess.
+    """
+
+    member: int
+    name: str
+    cosine: float
+    excess: float
+    std: float
+
+
+@dataclass(frozen=True)
+class EmpiricalFinding:
+    """One covariate that the residual follows without a known cause.
+
+    Attributes
+    ----------
+    covariate : str
+        What the residual follows: the column of a quantity, ``"time"``, a link's length ...
+    form : str
+        Of the term that describes it best, for instance ``"linear"``.
+    port : str
+        Where in the machine the term acts.
+    p_value : float
+        Probability of so strong a term by noise alone, corrected for all that were tried.
+    explained_fraction : float
+        Share of what is above the noise that it explains on rows that were left out, 0 to 1.
+    heldout_rms_um : float
+        Error on rows that were left out with the term, um per coordinate.
+    formula_effects : tuple of dict
+        The term as formulas that `add_effect` and `compd effect add` take, the largest direction first.
+    parameters : tuple of dict
+        Fitted values by name, one mapping for each of `formula_effects`.
+    beside : tuple of str
+        Other covariates that are needed along with it.
+    effect : str
+        Of a ``"change"``, the effect of the library that begins or changes; ``""`` for every other form.
+    time_s : float
+        Of a ``"change"``, when, on the recording's clock, s; nan for every other form.
+    """
+
+    covariate: str
+    form: str
+    port: str
+    p_value: float
+    explained_fraction: float
+    heldout_rms_um: float
+    formula_effects: tuple[dict[str, Any], ...]
+    parameters: tuple[dict[str, float], ...]
+    beside: tuple[str, ...] = ()
+    effect: str = ""
+    time_s: float = math.nan
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `depends_on`."""
+        return {
+            "covariate": self.covariate,
+            "form": self.form,
+            "port": self.port,
+            "p_adjusted": self.p_value,
+            "explained_fraction": self.explained_fraction,
+            "heldout_rms_um": self.heldout_rms_um,
+            "formula_effect": self.formula_effects[0],
+            "formula_effects": list(self.formula_effects),
+            "fitted": list(self.parameters),
+            "beside": list(self.beside),
+            **({"effect": self.effect, "time_s": self.time_s} if self.effect else {}),
+            "note": "a description, not a cause",
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisStep:
+    """One effect that was found.
+
+    Attributes
+    ----------
+    fitted : FittedEffect
+        The effect with its fitted numbers and searched constants.
+    rivals : tuple of Rival
+        Effects that explain as much, best first; empty where the recording tells it from all others.
+    heldout_rms_um : float
+        Error on rows that were left out, with it and those before it, um per coordinate.
+    explained_fraction : float
+        Share of what those before it left above the noise floor, 0 to 1.
+    p_value : float
+        Probability of so high a score by noise alone, corrected for all effects that were tried.
+    parameters : tuple of ParameterEstimate
+        Its numbers with standard errors.
+    """
+
+    fitted: FittedEffect
+    rivals: tuple[Rival, ...]
+    heldout_rms_um: float
+    explained_fraction: float
+    p_value: float
+    parameters: tuple[ParameterEstimate, ...]
+
+    @property
+    def effect(self) -> Effect:
+        """The effect without its parameters."""
+        return self.fitted.effect
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `steps`."""
+        return {
+            "effect": self.effect.id,
+            "rivals": [rival.name for rival in self.rivals],
+            "heldout_rms_um": self.heldout_rms_um,
+            "explained_fraction": self.explained_fraction,
+            "p_adjusted": self.p_value,
+            "parameters": [parameter.as_json() for parameter in self.parameters],
+            "constants": dict(self.fitted.constants),
+            "equation": self.effect.equation,
+            "alike": {rival.name: rival.cosine for rival in self.rivals},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateResult:
+    """One effect of the library, tried alone; nan where it could not be tried.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    status : str
+        ``"explains"``, ``"partial"``, ``"no_gain"`` or ``"not_testable"``.
+    why : str
+        The reason for the status, in words.
+    heldout_rms_um : float
+        Error on rows that were left out, with the effect alone, um per coordinate.
+    explained_fraction : float
+        Share of what is above the noise floor that it explains alone, 0 to 1.
+    p_value : float
+        Probability of so high a score by noise alone, corrected for all effects that were tried.
+    parameters : tuple of ParameterEstimate
+        Its numbers with standard errors.
+    """
+
+    effect: str
+    status: Status
+    why: str
+    heldout_rms_um: float = math.nan
+    explained_fraction: float = math.nan
+    p_value: float = math.nan
+    parameters: tuple[ParameterEstimate, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `candidates`."""
+        return {
+            "effect": self.effect,
+            "status": self.status,
+            "why": self.why,
+            "heldout_rms_um": self.heldout_rms_um,
+            "explained_fraction": self.explained_fraction,
+            "p_adjusted": self.p_value,
+            "parameters": [parameter.as_json() for parameter in self.parameters],
+        }
+
+
+@dataclass(frozen=True)
+class ConstantFinding:
+    """A constant along the measured coordinates: no effect's signature, and every effect's that moves all rows alike.
+
+    Attributes
+    ----------
+    by_axis_um : dict
+        The constant of each coordinate, um.
+    std_um : dict
+        Its standard error; nan where it is not known.
+    effects : tuple of str
+        Ids of effects that make nothing but a constant on these rows: any of them may be its cause.
+    separated_by : str
+        What would part them, in words.
+    """
+
+    by_axis_um: Mapping[str, float]
+    std_um: Mapping[str, float]
+    effects: tuple[str, ...]
+    separated_by: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `constant`."""
+        return {
+            "um": dict(self.by_axis_um),
+            "std_um": dict(self.std_um),
+            "effects": list(self.effects),
+            "separated_by": self.separated_by,
+        }
+
+
+@dataclass(frozen=True)
+class GrossRows:
+    """Rows that neither noise nor anything that was found explains; they do not count.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        As a spreadsheet shows them, rising.
+    runs : tuple of (int, int)
+        First and last row of each stretch in which most rows are gross: there something happened.
+    """
+
+    rows: tuple[int, ...] = ()
+    runs: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class UntestedEffect:
+    """An effect that cannot be tried on the recording, with the reason and what to measure.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    why : str
+        Why it cannot be tried.
+    likely : bool
+        Whether what was found could be this effect, seen through a quantity that goes along with its own.
+    """
+
+    effect: str
+    why: str
+    likely: bool = False
