@@ -108,15 +108,21 @@ def strongest_periods(quantity: FloatArray, series: FloatArray, limits: PeriodLi
 
 
 def _without_slow(quantity: FloatArray, series: FloatArray) -> FloatArray:
-    """The series (N, S) without a parabola in their quantity; what is beyond all noise is held at OUTLIER_SIGMAS."""
-    y = np.empty_like(series)
-    for k in range(series.shape[1]):
+    """The series (N, S) without a parabola in their quantity, about their means; outliers held before and after."""
+    y = _outliers_held(series)
+    for k in range(y.shape[1]):
         q = quantity[:, min(k, quantity.shape[1] - 1)]
         powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), LEAST_SPAN), SLOW_DEGREE + 1)
-        y[:, k] = series[:, k] - powers @ solve_least_squares(powers, series[:, k])
-    limit = OUTLIER_SIGMAS * robust_sigma(y)
-    y = np.clip(y, -limit, limit)
+        y[:, k] -= powers @ solve_least_squares(powers, y[:, k])
+    y = _outliers_held(y)
     return np.asarray(y - y.mean(axis=0))
+
+
+def _outliers_held(series: FloatArray) -> FloatArray:
+    """The series (N, S) about their medians; a value beyond OUTLIER_SIGMAS counts as one there."""
+    y = series - np.median(series, axis=0)
+    limit = OUTLIER_SIGMAS * robust_sigma(y)
+    return np.asarray(np.clip(y, -limit, limit))
 
 
 def _peaks(explained: FloatArray, apart: int, count: int) -> IntArray:

@@ -117,6 +117,9 @@ class Constant:
         The values that a search tries, in `unit`; two of them are a choice, with nothing between them.
     setting : str
         Name of the machine's setting that gives the value, which is then not searched; ``""`` for none.
+    period_of : str
+        Of a period, the quantity that it is a period of, as a formula names it (``"scale_mm"``, a measured column):
+        other periods than those of the grid are then looked for in a residual. ``""`` for what is no period.
     """
 
     name: str
@@ -126,6 +129,7 @@ class Constant:
     source: str
     grid: tuple[float, ...]
     setting: str = ""
+    period_of: str = ""
 
     @property
     def choice(self) -> bool:
