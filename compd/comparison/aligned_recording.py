@@ -104,6 +104,10 @@ class AlignedRecording:
     def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
+        return self.propagated(effect, basis)
+
+    def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:
+        """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
         if self.model is None:
             return np.asarray(basis[:, list(self.axes)])
         derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))

@@ -180,6 +180,10 @@ class Effect:
         What the effect is not linear in.
     remembers : bool
         A row's value depends on earlier rows; memory goes in and comes out.
+    unknown_states : tuple of int
+        Which arrays of the memory nobody knows when a session begins, by their place: what a body had in it then.
+        These states are fitted along, for each session of a recording. The memory of a lag is (time, x, y), of which
+        y is unknown: 2.
     follows_reading : bool
         What it adds depends on its comparators' own readings.
     registration : bool
@@ -219,6 +223,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    unknown_states: tuple[int, ...] = ()
     follows_reading: bool = False
     registration: bool = False
     declared: str | Mapping[str, Any] = ""

@@ -15,6 +15,7 @@ from compd.model.formula.basis import (
     SENSITIVITY_PORTS,
     VECTORS,
     formula_basis,
+    lagged_states,
     sensitivity_basis,
     sensitivity_columns,
 )
@@ -83,6 +84,7 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
         ),
         constants=tuple(_constant(name, declaration.parameters[name], periods.get(name, "")) for name in constants),
         remembers=any(formula.lags for formula in parsed),
+        unknown_states=lagged_states(sum(formula.lags for formula in parsed)),
     )
 
 
