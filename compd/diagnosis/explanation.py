@@ -53,6 +53,16 @@ class Explanation:
         return self._of_kind("effect", "constant")
 
     @property
+    def proxies(self) -> tuple[int, ...]:
+        """Effects that were not measured, by what stands for their temperature."""
+        return self._of_kind("proxy")
+
+    @property
+    def described(self) -> tuple[int, ...]:
+        """Everything in the set that names no cause, but for the constant."""
+        return self._of_kind("proxy", "description", "change")
+
+    @property
     def descriptions(self) -> tuple[int, ...]:
         """The descriptions in the set."""
         return self._of_kind("description")
@@ -165,7 +175,7 @@ class _Competitors:
 def _ordered(losses: SubsetLosses, members: Sequence[int]) -> tuple[int, ...]:
     """Effects, then the constant, then the rest; of each, first the one that beside those before it leaves least."""
     order: tuple[int, ...] = ()
-    for kinds in (("effect",), ("constant",), ("description", "change")):
+    for kinds in (("effect",), ("constant",), ("proxy", "description", "change")):
         left = [k for k in members if losses.candidates[k].kind in kinds]
         while left:
             best = min(left, key=lambda k: losses.loss((*order, k)))

@@ -97,9 +97,10 @@ def build_problem(
     sigma_um = _unit_um(comparison)
     nuisance_um = _nuisance_um(comparison)
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    for columns in (nuisance_um, *(candidate.columns_um for candidate in pool.candidates)):
+    for columns in (nuisance_um, *(candidate.columns_um for candidate in (*pool.candidates, *pool.proxies))):
         known &= np.isfinite(columns).all(axis=(1, 2))
     candidates, same = split_constants(pool.candidates, nuisance_um, known)
+    candidates += pool.proxies
     constant = constant_candidate(aligned)
     if constant is not None:
         candidates = (*candidates, constant)
