@@ -108,12 +108,8 @@ def _at_places(
     size = port_size(port, aligned.rows)
     basis, _ = effect.basis(aligned.rows, {**others, constant.name: constant.high}, None)
     acts = (np.nan_to_num(basis[:, :size]) != 0).any(axis=(0, 2))
-    if aligned.model is None:
-        derivatives = np.broadcast_to(np.eye(size)[list(aligned.axes)], (len(rows), len(aligned.axes), size))
-    else:
-        sensitivity = aligned.sensitivity([port])[port]
-        derivatives = (sensitivity.link_length if aligned.of_links else sensitivity.tip)[:, list(aligned.axes)]
-    derivatives = derivatives[:, :, acts]
+    one_each = np.broadcast_to(np.eye(basis.shape[1], size), (len(rows), basis.shape[1], size))
+    derivatives = aligned.propagated(effect, one_each)[:, :, acts]
     quantity = column_values(aligned.rows, constant.period_of, port)
     if quantity.shape[1] > 1:
         quantity = np.repeat(quantity, size // quantity.shape[1], axis=1)[:, acts]

@@ -15,7 +15,6 @@ from compd.diagnosis.search_covariates import (
     STAYED_THE_SAME,
     Kind,
     SearchCovariate,
-    fill_gaps,
     round_middle,
     round_within,
     search_covariates,
@@ -94,7 +93,7 @@ class EmpiricalTerm:
         effect : as from `effect`.  value : of the nonlinear constant; None for a term without one. The few empty cells
         of a covariate are filled.
         """
-        aligned, constants = fill_gaps(aligned, effect), self.constant_values(value)
+        aligned, constants = aligned.gaps_filled, self.constant_values(value)
         if self.axes == ("",):
             return aligned.columns(effect, constants) * UM_PER_MM
         basis, _ = effect.basis(aligned.rows, constants, None)
@@ -106,9 +105,8 @@ class EmpiricalTerm:
         """(N, m, axes) by how much the measured coordinates change per displacement of the port along each axis."""
         axes = ["xyz".index(axis) for axis in self.axes]
         if self.port == "reference":
-            return np.broadcast_to(
-                np.eye(3)[list(aligned.axes)][:, axes], (len(aligned.rows), len(aligned.axes), len(axes))
-            )
+            shown = np.equal.outer(aligned.axes, axes).astype(np.float64)
+            return np.broadcast_to(shown, (len(aligned.rows), *shown.shape))
         return aligned.sensitivity(["tool"])["tool"].tip[:, list(aligned.axes)][:, :, axes]
 
     def declaration(
@@ -170,16 +168,19 @@ class EmpiricalTerm:
 
 
 def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Iterator[EmpiricalTerm]:
-    """Every term that can be tried on a recording.
+    """Every term that can be tried on a recording; without times none but a step, which needs only the rows' order.
 
     residual_um : (N, m) what is to be described; periods are looked for in it. nan where a row does not count.
     """
     rows = aligned.usable.mask & np.isfinite(residual_um).all(axis=1)
     ports = list(_ports(aligned))
+    timed = aligned.recording.has_time
     for covariate in search_covariates(aligned, rows):
-        yield from _terms_of(covariate, ports, residual_um[rows])
+        yield from _terms_of(covariate, ports, residual_um[rows], timed=timed)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
-    grids = {"linear": (), "step": step_times_s(time.values), "periodic": periods(time, residual_um[rows])}
+    grids = {"step": step_times_s(time.values)}
+    if timed:
+        grids |= {"linear": (), "periodic": periods(time, residual_um[rows])}
     for form, grid in grids.items():
         for port in ports:
             if _repeats_along(port, form) and (grid or form not in CONSTANTS):
@@ -193,16 +194,16 @@ def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Itera
 
 
 def _terms_of(
-    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray
+    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray, *, timed: bool
 ) -> Iterator[EmpiricalTerm]:
-    """Every form of one covariate at every port."""
+    """Every form of one covariate at every port; timed : whether the rows have times, which a lag needs."""
     grids: dict[str, tuple[float, ...]] = {"linear": ()}
     for form in FORMS_BY_KIND[covariate.kind]:
         if covariate.distinct >= FEWEST_VALUES.get(form, 2):
             grids[form] = _grid(form, covariate, residual_um)
     for form, grid in grids.items():
         for port in ports:
-            if _repeats_along(port, form) and (grid or form not in CONSTANTS):
+            if _repeats_along(port, form) and (grid or form not in CONSTANTS) and (timed or form != "lagged"):
                 yield _term(port, covariate, form, grid)
             if form == "lagged" and port.port == "link":  # expansion is proportional to length
                 yield _term(port, covariate, "strain", ())
@@ -230,10 +231,10 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     if aligned.model is not None:
         yield EmpiricalTerm("", "", "link", 0.0, 0.0)
         yield EmpiricalTerm("", "", "link", 0.0, 0.0, per_link=True)
-    if not aligned.of_links:
-        if aligned.model is not None:
+        if not aligned.of_links:
             yield EmpiricalTerm("", "", "tool", 0.0, 0.0, axes=("x", "y", "z"))
-        axes = tuple("xyz"[axis] for axis in aligned.axes)
+    if aligned.model is None or not aligned.of_links:
+        axes = tuple("xyz"[axis] for axis in aligned.axes[:3])
         fitted_along = aligned.registration_columns.shape[2] > 0
         yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=not fitted_along)
 

@@ -2,13 +2,13 @@
 
 Not every column of a recording is one. A number that only counts or names rows follows everything that changed in time;
 a derivative of the user's own model belongs to an effect; a column that stayed the same explains nothing. What is left
-out is told with its reason (`untried_quantities`). A column with few empty cells is tried all the same: a gap is filled
-from the nearest row in time (`fill_gaps`).
+out is told with its reason (`untried_quantities`). A column with few empty cells is tried all the same: gaps are filled
+from the nearest row in time (`compd.recording.gaps`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -16,15 +16,11 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.covariates import why_no_covariate
-from compd.model.effect import Effect
-from compd.model.effect_needs import needed_quantities
 from compd.units import UNIT_KINDS, unit_of
 
 # What a covariate is, by its unit: it decides in which forms a residual may follow it.
 Kind: TypeAlias = Literal["place", "angle", "load", "flow", "other"]
 
-# A covariate that is empty in a larger share of the rows is not tried: too much of it would be filled in.
-MOST_EMPTY = 0.1
 STAYED_THE_SAME = "stayed the same"
 # Smaller changes, as a share of the largest value, are rounding.
 LEAST_CHANGE = 1e-9
@@ -81,8 +77,8 @@ def search_covariates(aligned: AlignedRecording, rows: BoolArray) -> list[Search
     """
     reasons = untried_quantities(aligned)
     found = [
-        SearchCovariate(name, kind_of(name), fill_gap(column, aligned.rows.time_s)[rows])
-        for name, column in aligned.recording.quantities.items()
+        SearchCovariate(name, kind_of(name), column[rows])
+        for name, column in aligned.gaps_filled.rows.quantities.items()
         if name not in reasons
     ]
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
@@ -96,13 +92,12 @@ def untried_quantities(aligned: AlignedRecording) -> dict[str, str]:
     """The measured quantities that are not searched, with the reason in words."""
     usable = aligned.usable.mask
     reasons: dict[str, str] = {}
-    for name, column in aligned.recording.quantities.items():
-        values = column[usable]
-        empty = float(np.mean(~np.isfinite(values))) if len(values) else 1.0
-        known = values[np.isfinite(values)]
+    for name, column in aligned.gaps_filled.rows.quantities.items():
+        known = column[usable & np.isfinite(column)]
         if reason := why_no_covariate(name, known):
             reasons[name] = reason
-        elif empty > MOST_EMPTY:
+        elif len(known) < usable.sum():
+            empty = np.mean(~np.isfinite(aligned.rows.quantities[name]))
             reasons[name] = f"empty in {100 * empty:.0f} % of the rows"
         elif not _changes(known):
             reasons[name] = STAYED_THE_SAME
@@ -113,37 +108,6 @@ def kind_of(name: str) -> Kind:
     """What kind of quantity a column is, by the unit that its name ends in."""
     unit = unit_of(name)
     return next((kind for kind, units in _UNITS.items() if unit in units), "other")
-
-
-def fill_gaps(aligned: AlignedRecording, effect: Effect) -> AlignedRecording:
-    """The recording with the few empty cells of the quantities that an effect needs filled; itself without any.
-
-    Example: a thermometer that missed one row of 990 gives that row the value of its nearest neighbour in time.
-    """
-    rows = aligned.rows
-    filled = {
-        name: fill_gap(rows.quantities[name], rows.time_s)
-        for name in needed_quantities(effect, rows.links)
-        if name in rows.quantities and 0 < np.mean(~np.isfinite(rows.quantities[name])) <= MOST_EMPTY
-    }
-    if not filled:
-        return aligned
-    return replace(aligned, rows=replace(rows, quantities={**rows.quantities, **filled}))
-
-
-def fill_gap(values: FloatArray, time_s: FloatArray) -> FloatArray:
-    """(N,) values with each nan replaced by the value of the nearest row in time that has one, the earlier of two.
-
-    time_s : (N,) rising.  A column without any value stays as it is.
-    """
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) in (0, len(values)):
-        return values
-    after = np.minimum(np.searchsorted(known, np.arange(len(values))), len(known) - 1)
-    before = np.maximum(after - 1, 0)
-    earlier, later = known[before], known[after]
-    nearest = np.where(np.abs(time_s - time_s[earlier]) <= np.abs(time_s[later] - time_s), earlier, later)
-    return np.where(np.isfinite(values), values, values[nearest])
 
 
 def round_middle(values: FloatArray) -> float:

@@ -1,37 +1,55 @@
-"""Recordings of machines that compd does not know: columns, a model's prediction of zero, and an error to describe."""
+"""Recordings of a machine of an external model whose error is known, for tests."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
-from compd.comparison.open import read_with_machine
+from compd.model.effect import Effect
+from compd.model.formula.declaration import formula_effect
+from compd.recording.reader import read_recording
 
-SIDECAR = "machine: external\nreference: {{quantity: tool_position, frame: {frame}, sigma_um: 1.0}}\n"
+SIGMA_UM = 0.5
 
 
 def record_external(
-    path: Path, columns: Mapping[str, FloatArray], error_um: Mapping[str, FloatArray], frame: str = "machine"
+    path: Path,
+    columns: Mapping[str, FloatArray],
+    errors_um: Mapping[str, FloatArray],
+    *,
+    model_mm: Mapping[str, FloatArray] | None = None,
+    sigma_um: float = SIGMA_UM,
+    seed: int = 1,
+    frame: str = "machine",
 ) -> AlignedRecording:
-    """A recording, written and read: one row a minute unless `columns` have the time; nan is an empty cell.
+    """A recording, written and read: what was measured besides, and the error along each axis to which noise is added.
 
-    error_um : what the reference shows by axis; the model predicts 0.
+    columns : without `time_s` a row is measured every ten seconds; nan is an empty cell.
+    model_mm : the prediction by axis; 0 if left out.
     """
-    count = len(next(iter(error_um.values())))
-    table = {"time_s": 60.0 * np.arange(count), **columns}
-    table |= {f"model_{axis}_mm": np.zeros(count) for axis in error_um}
-    table |= {f"reference_{axis}_mm": error / 1e3 for axis, error in error_um.items()}
+    rng = np.random.default_rng(seed)
+    count = len(next(iter(errors_um.values())))
+    table = {"time_s": 10.0 * np.arange(count), **columns}
+    for axis, error_um in errors_um.items():
+        predicted_mm = np.zeros(count) if model_mm is None else model_mm[axis]
+        table[f"model_{axis}_mm"] = predicted_mm
+        table[f"reference_{axis}_mm"] = predicted_mm + 1e-3 * (error_um + rng.normal(0, sigma_um, count))
     lines = [",".join(table)]
-    lines += [",".join("" if np.isnan(v) else repr(float(v)) for v in row) for row in zip(*table.values(), strict=True)]
+    lines += [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    path.with_suffix(".yaml").write_text(SIDECAR.format(frame=frame), encoding="utf-8")
-    return align_recording(*read_with_machine(path, None))
+    reference = {"quantity": "tool_position", "frame": frame, "sigma_um": sigma_um}
+    path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": "external", "reference": reference}))
+    return align_recording(read_recording(path, None), None)
 
 
-def residual_um(aligned: AlignedRecording) -> FloatArray:
-    """(N, m) what the model leaves without any effect."""
-    return (aligned.measured_mm - aligned.predicted_mm({})) * 1e3
+def along(axis: str, effect_id: str, formula: str, **keys: Any) -> Effect:
+    """An effect along one axis with one parameter k; keys : others of its declaration."""
+    parameters = {"k": {"unit": "um", "plausible": [-100, 100], "source": "a test"}}
+    declaration = {"id": effect_id, "port": "reference", "axis": axis, "formula": formula, "parameters": parameters}
+    return formula_effect({**declaration, **keys}, "a test")

@@ -52,8 +52,8 @@ def test_the_described_period_stays_where_no_other_is_evident(tmp_path: Path, si
 def test_a_period_of_an_effect_written_as_a_formula_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     slide_mm = rng.uniform(0, 80, 250)
-    error_um = 3 * np.sin(2 * np.pi * slide_mm / 1.37 + 0.4) + rng.normal(0, 1, 250)
-    aligned = record_external(tmp_path / "run.csv", {"slide_mm": slide_mm}, {"x": error_um})
+    error_um = 3 * np.sin(2 * np.pi * slide_mm / 1.37 + 0.4)
+    aligned = record_external(tmp_path / "run.csv", {"slide_mm": slide_mm}, {"x": error_um}, sigma_um=1.0)
     size = {"unit": "um", "plausible": [-9, 9], "source": "test"}
     screw = find_effect(
         {

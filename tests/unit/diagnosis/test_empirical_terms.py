@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.diagnosis.empirical_terms import EmpiricalTerm, empirical_terms
-from compd.diagnosis.search_covariates import fill_gap, round_within, untried_quantities
+from compd.diagnosis.search_covariates import round_within, untried_quantities
 from compd.diagnosis.term_formula import formula_text
 from compd.model.library import find_effect
-from tests.support.external_recordings import record_external, residual_um
+from compd.recording.reader import read_recording
+from tests.support.external_recordings import record_external
 from tests.support.hidden_effects import record_with_effects
 
 ROWS = 200
@@ -21,6 +22,11 @@ RNG = np.random.default_rng(8)
 PLACES_MM = RNG.uniform(-150, 150, ROWS)
 WARM_degC = 23.4567 + np.cumsum(RNG.normal(0, 0.1, ROWS))
 NOISE_UM = RNG.normal(0, 1, ROWS)
+
+
+def residual_um(aligned: AlignedRecording) -> FloatArray:
+    """(N, m) what the model leaves without any effect."""
+    return (aligned.measured_mm - aligned.predicted_mm({})) * 1e3
 
 
 def terms_of(aligned: AlignedRecording) -> dict[tuple[str, str], EmpiricalTerm]:
@@ -163,18 +169,11 @@ def test_an_empty_cell_costs_no_covariate_and_no_row(tmp_path: Path) -> None:
     np.testing.assert_allclose(columns_um, term.columns_um(whole, term.effect(), None), atol=1.0)
 
 
-def test_a_gap_has_the_value_of_its_nearest_neighbour_in_time() -> None:
-    values = np.array([np.nan, 1.0, np.nan, np.nan, 4.0, np.nan])
-    time_s = np.array([0.0, 10.0, 20.0, 90.0, 100.0, 150.0])
-    assert fill_gap(values, time_s).tolist() == [1.0, 1.0, 1.0, 4.0, 4.0, 4.0]
-    assert np.isnan(fill_gap(np.full(2, np.nan), np.arange(2.0))).all()
-
-
 def test_a_formula_has_a_constant_only_where_no_constant_is_fitted_along(tmp_path: Path) -> None:
     known = record_with_effects(tmp_path / "known.csv", 1, {})
     assert terms_of(known)["humidity_pct", "linear"].declaration("x")["formula"].endswith("+ c")
     error_um = {"x": NOISE_UM, "y": NOISE_UM[::-1]}
-    external = record_external(tmp_path / "run.csv", {"slide_mm": PLACES_MM}, error_um, "instrument")
+    external = record_external(tmp_path / "run.csv", {"slide_mm": PLACES_MM}, error_um, frame="instrument")
     term = terms_of(external)["slide_mm", "linear"]
     assert term.declaration("x")["formula"] == "k * slide_mm"
     assert term.columns_um(external, term.effect(), None).shape == (ROWS, 2, 2)
@@ -196,3 +195,12 @@ def explained(aligned: AlignedRecording, term: EmpiricalTerm, constant: float) -
     A = np.concatenate([columns, np.ones_like(columns[:, :, :1])], axis=2).reshape(len(y), -1)
     rest = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
     return float(1 - rest @ rest / (y @ y))
+
+
+def test_without_times_nothing_drifts_lags_or_swings(tmp_path: Path) -> None:
+    record_external(tmp_path / "run.csv", {"temperature_bed_degC": WARM_degC}, {"x": NOISE_UM})
+    lines = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "run.csv").write_text("\n".join(line.partition(",")[2] for line in lines) + "\n", encoding="utf-8")
+    aligned = align_recording(read_recording(tmp_path / "run.csv", None), None)
+    assert forms_of(aligned, "temperature_bed_degC") == {"linear", "square"}
+    assert forms_of(aligned, "time_s") == {"step"}
