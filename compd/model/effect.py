@@ -28,7 +28,7 @@ PORTS: dict[Port, str] = {
     "platform_joint": "centre of each platform joint in {P}, mm (n x 3)",
     "revolute_axis": "direction of each revolute axis in {P}, rad (n x 3)",
     "plate": "plate points m1, m2, m3 in {M}, mm (3 x 3)",
-    "tool": "tool vector in {P}, mm (3)",
+    "tool": "tool vector in {P}, or in {M} where the tool stands on the plate, mm (3)",
     "reference": "what the reference instrument shows: x, y, z in mm, then rotation about x, y, z in rad (6)",
 }
 
@@ -117,6 +117,9 @@ class Constant:
         The values that a search tries, in `unit`; two of them are a choice, with nothing between them.
     setting : str
         Name of the machine's setting that gives the value, which is then not searched; ``""`` for none.
+    period_of : str
+        Of a period, the quantity that it is a period of, as a formula names it (``"scale_mm"``, a measured column):
+        other periods than those of the grid are then looked for in a residual. ``""`` for what is no period.
     """
 
     name: str
@@ -126,6 +129,7 @@ class Constant:
     source: str
     grid: tuple[float, ...]
     setting: str = ""
+    period_of: str = ""
 
     @property
     def choice(self) -> bool:
@@ -176,6 +180,10 @@ class Effect:
         What the effect is not linear in.
     remembers : bool
         A row's value depends on earlier rows; memory goes in and comes out.
+    unknown_states : tuple of int
+        Which arrays of the memory nobody knows when a session begins, by their place: what a body had in it then.
+        These states are fitted along, for each session of a recording. The memory of a lag is (time, x, y), of which
+        y is unknown: 2.
     follows_reading : bool
         What it adds depends on its comparators' own readings.
     registration : bool
@@ -215,6 +223,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    unknown_states: tuple[int, ...] = ()
     follows_reading: bool = False
     registration: bool = False
     declared: str | Mapping[str, Any] = ""

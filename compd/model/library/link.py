@@ -58,7 +58,7 @@ EFFECTS = (
             "dT_link_i": "temperature of link i above 20 degC, K",
         },
         source="Oiwa, section 2.2 and figure 5",
-        needs=("temperature_link_{link}_degC",),
+        needs=("kinematics", "temperature_link_{link}_degC"),
         parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
         mistaken_for=("link_expansion_lag", "link_zero"),
         separated_by="a change of temperature by 3 K, fast enough that a lag would show",
@@ -72,12 +72,12 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient, ppm/K",
             "l_i": "length of link i, mm",
-            "y_i": "warming of the rod in link i, K; dT_link_i at the start of a session",
+            "y_i": "warming of the rod in link i, K; fitted along at the start of a session, dT_link_i in the daemon",
             "dT_link_i": "temperature of link i above 20 degC, K",
             "tau": "time constant of warming up, s",
         },
         source="lumped heat capacity: Incropera, Fundamentals of Heat and Mass Transfer, chapter 5",
-        needs=("temperature_link_{link}_degC", "time", "order"),
+        needs=("kinematics", "temperature_link_{link}_degC", "time", "order"),
         parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
         mistaken_for=("link_expansion", "reference_drift"),
         separated_by="a step of temperature, watched for three time constants",
@@ -93,6 +93,7 @@ EFFECTS = (
             ),
         ),
         remembers=True,
+        unknown_states=(2,),
     ),
     Effect(
         id="link_elasticity",
@@ -105,7 +106,7 @@ EFFECTS = (
             "k": "stiffness of a link with its joints, N/um; 1/k is fitted",
         },
         source="Oiwa, section 1, factor (2); statics by virtual work",
-        needs=("force",),
+        needs=("kinematics", "force"),
         parameters=(
             Parameter(
                 "k",
@@ -131,7 +132,7 @@ EFFECTS = (
             "F0_i": "the same at machine zero, N",
         },
         source="Hertz (1882); Johnson, Contact Mechanics (1985), chapter 4",
-        needs=("force",),
+        needs=("kinematics", "force"),
         parameters=(Parameter("c", "um/N^(2/3)", 0.01, 1, "steel balls of 25 mm 0.05, of 5 mm on flats 0.5"),),
         mistaken_for=("link_elasticity",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
@@ -150,7 +151,7 @@ EFFECTS = (
         },
         source="arc less chord, w^2 l^3 / (24 H^2) of a catenary, 17 w^2 l^7 / (40320 (E I)^2) of a beam on two "
         "supports: Young, Roark's Formulas for Stress and Strain, chapter 8",
-        needs=(),
+        needs=("kinematics",),
         parameters=(Parameter("s", "um", 0, 20, "stiff tube 0, slender spindle 20"),),
         mistaken_for=("scale_gain",),
         separated_by="equally long links at different inclinations",
