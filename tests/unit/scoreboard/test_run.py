@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from compd.diagnosis.criteria import Criteria
+from compd.model.library.effects_file import load_effects
 from tests.scoreboard.cases import Case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare
@@ -16,7 +17,6 @@ from tests.scoreboard.scoring import score
 from tests.scoreboard.sensitivity import FACTORS, UNCHANGED, Variant, changed, table, thresholds, variants
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepared, read_answer, run
-from tests.scoreboard.two_axes import effects_of_file
 
 SHORT = Case("short", ("link_elasticity",), (4.0,), 7)
 
@@ -102,7 +102,7 @@ def test_real_recordings_are_cases_too(tmp_path):
     for suffix in ("csv", "yaml"):
         (tmp_path / f"disc.{suffix}").write_text("")
     first, second = prepare_real(tmp_path / "cases", tmp_path)
-    assert "plate_offset" in [effect.id for effect in effects_of_file(first / "effects.yaml")]
+    assert "plate_offset" in load_effects(first / "effects.yaml")
     assert read_answer(first)["expected"] == {
         "verdicts": ["partial"],
         "groups": [["plate_scale"]],
