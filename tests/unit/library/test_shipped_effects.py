@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import compd
 from compd.model.effect import Effect
-from compd.model.observe import observe_tip
+from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED
 
@@ -30,9 +30,8 @@ def moved_um(
     time_s = quantities.pop("time_s", None)
     count = max([len(np.atleast_2d(tip_mm)), *map(len, quantities.values())])
     time_s = np.arange(count, dtype=float) if time_s is None else time_s
-    rows = observe_tip(
-        np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3)), quantities, time_s, np.arange(count) == 0
-    )
+    tip_M_mm = np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3))
+    rows = external_rows(tip_M_mm, quantities, time_s=time_s)
     basis, _ = compd.load_effects(library)[id_].basis(rows, constants or {}, None)
     assert not basis[:, 2:].any()
     return np.asarray(basis[:, :2] * 1e3)
