@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.display_unit import in_place_unit, place_unit
 from compd.recording.columns import is_sensitivity
 from compd.units import unit_of
 
@@ -33,7 +34,7 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
     recording, quantities = aligned.recording, aligned.rows.quantities
     result = [Covariate("time", "h", recording.time_s / 3600.0)] if recording.has_time else []
     result += [
-        Covariate(axis, "mm", column)
+        Covariate(axis, place_unit(aligned.unit), in_place_unit(column, aligned.unit))
         for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True)
         if np.isfinite(column).any()
     ]

@@ -38,13 +38,19 @@ def external_prediction(recording: Recording) -> FloatArray:
     return np.asarray(predicted)
 
 
-def external_change(added: Deltas, coordinates: Sequence[int], of_links: bool) -> FloatArray | float:
+def external_change(added: Deltas, coordinates: Sequence[int], of_links: bool) -> FloatArray:
     """(N, m, ...) by how much the prediction of the measured coordinates changes with (N, size, ...) at the ports.
 
-    coordinates : axes of the tip or links, from 0.  of_links : whether link lengths were measured, not the tip.
+    coordinates : axes of the tip or links, from 0.  of_links : whether link lengths were measured, not the tip; what
+    the reference adds along its k-th axis is then added to link k.
     """
-    ports = ("scale", "link") if of_links else ("reference",)
-    return sum((added[port][:, list(coordinates)] for port in ports if port in added), start=np.zeros(()))
+    any_port = next(iter(added.values()))
+    change = np.zeros((len(any_port), len(coordinates), *any_port.shape[2:]))
+    for port in ("scale", "link", "reference") if of_links else ("reference",):
+        if port in added:
+            shown = [k for k, coordinate in enumerate(coordinates) if coordinate < added[port].shape[1]]
+            change[:, shown] += added[port][:, [coordinates[k] for k in shown]]
+    return change
 
 
 def external_observations(recording: Recording, starts: BoolArray) -> Observations:

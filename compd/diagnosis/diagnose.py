@@ -173,7 +173,7 @@ def _steps(
 
 
 def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
-    """Effects that would do in a member's place, with the descriptions or without: these settle no contest of causes."""
+    """Effects that would do in a member's place, with the descriptions or without: these settle no contest."""
     rivals = find_rivals(explanation.losses, explanation.members, member)
     if explanation.described:
         known = {rival.name for rival in rivals}

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
-from compd.units import KNOWN_UNITS, conversion_text, unit_of
+from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
@@ -30,7 +30,7 @@ class ColumnKind(NamedTuple):
     ----------
     names : as people write them, `<i>` for a number from 1.
     stem : what matches the name without its unit.
-    unit : the one unit that the format gives it; "" = no unit.
+    unit : the unit that the format gives it; "" = no unit.
     meaning : for the reference.
     """
 
@@ -38,6 +38,12 @@ class ColumnKind(NamedTuple):
     stem: re.Pattern[str]
     unit: str
     meaning: str
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The unit, and for the reference's lengths those that `reference.unit` of the sidecar may put in its place."""
+        of_reference = self.unit == "mm" and self.names.startswith("reference_")
+        return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
 
 
 _SENSITIVITY_STEM = r"d_[A-Za-z]\w*_(?:[xyz]|link_[1-9]\d*)"
@@ -83,7 +89,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "reference_x_mm, reference_y_mm, reference_z_mm",
             r"(?:reference|model)_[xyz]",
             "mm",
-            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes",
+            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes; with "
+            "another `reference.unit` in the sidecar the name ends in it, as in reference_x_arcsec",
         ),
         (
             "reference_rx_rad, reference_ry_rad, reference_rz_rad",
@@ -95,7 +102,7 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "reference_link_<i>_mm",
             r"(?:reference|model)_link_[1-9]\d*",
             "mm",
-            "in place of the tip: the change of link i as an interferometer measured it",
+            "in place of the tip: the change of link i as an interferometer measured it; the unit as that of the tip",
         ),
         ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
@@ -178,9 +185,10 @@ def number_text(value: float) -> str:
 def parse_name(name: str) -> ColumnName | None:
     """The parts of a name that is exactly a column of the format; None for every other name."""
     for kind in COLUMN_KINDS:
-        stem = name.removesuffix(f"_{kind.unit}") if kind.unit else name
-        if (stem != name or not kind.unit) and kind.stem.fullmatch(stem):
-            return ColumnName(stem, kind.unit)
+        for unit in kind.units:
+            stem = name.removesuffix(f"_{unit}") if unit else name
+            if (stem != name or not unit) and kind.stem.fullmatch(stem):
+                return ColumnName(stem, unit)
     return None
 
 

@@ -19,12 +19,10 @@ from compd.recording.columns import (
     ATTITUDES,
     AXES,
     FRAME_COLUMNS,
-    POSITION_COLUMNS,
     approach_columns,
     correct_names,
     is_header,
     joint_columns,
-    link_reference_column,
     scale_columns,
 )
 from compd.recording.csv_table import CsvTable, read_table
@@ -156,6 +154,11 @@ def _build(
         present = [columns[name] for name in names if name in columns]
         return np.column_stack(present) if present else None
 
+    def in_mm(kind: str, places: Iterable[str]) -> FloatArray | None:
+        """Reference or model; one unit of an angle counts as a micrometre."""
+        values = stack(f"{kind}_{place}_{layout.ending}" for place in places)
+        return values if values is None or layout.ending == "mm" else values / UM_PER_MM
+
     def ids(name: str) -> IntArray | None:
         return np.where(np.isnan(columns[name]), -1, columns[name]).astype(np.int64) if name in columns else None
 
@@ -166,7 +169,8 @@ def _build(
         approach = row_directions(scale_mm, session)
     joint_um = stack(joint_columns(layout.joints))
     frame_um = stack(FRAME_COLUMNS) if layout.frame else None
-    position = stack(POSITION_COLUMNS)
+    position = in_mm("reference", AXES)
+    links = [f"link_{i}" for i in layout.links]
     if plate is not None and ball is not None:
         position = plate.positions_of_mm(ball)
     return Recording(
@@ -188,12 +192,12 @@ def _build(
         reference_mm=position,
         reference_rotation_rad=stack(ATTITUDE_COLUMNS),
         reference_links=layout.links,
-        reference_link_mm=stack(link_reference_column(i) for i in layout.links),
+        reference_link_mm=in_mm("reference", links),
         ball=ball,
         plate=plate,
-        model_mm=stack(f"model_{axis}_mm" for axis in AXES),
+        model_mm=in_mm("model", AXES),
         model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
-        model_link_mm=stack(f"model_link_{i}_mm" for i in layout.links),
+        model_link_mm=in_mm("model", links),
         excluded=excluded[kept],
         left_out={reason: count for reason, count in left_out.items() if count},
         columns=columns,

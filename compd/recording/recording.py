@@ -14,7 +14,8 @@ from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
-from compd.recording.sidecar import Reference, Sidecar
+from compd.recording.reference import Reference
+from compd.recording.sidecar import Sidecar
 from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).
@@ -37,6 +38,8 @@ class UsableRows(NamedTuple):
 @dataclass(frozen=True)
 class Recording:
     """N rows of one recording. Lengths are mm (the file's um are converted), nan where a cell was empty.
+
+    Where the reference is in another `unit`, such as arcsec, one of it counts as a um (1e-3 mm) in the attributes.
 
     Attributes
     ----------
@@ -108,6 +111,11 @@ class Recording:
         return self.sidecar.reference
 
     @property
+    def unit(self) -> str:
+        """The unit in which people read the reference and its errors: "um", or what the sidecar names."""
+        return self.sidecar.unit
+
+    @property
     def rows(self) -> int:
         """N."""
         return len(self.time_s)
@@ -137,8 +145,8 @@ class Recording:
     def reference_sigma_mm(self) -> FloatArray:
         """(axes or links,) standard uncertainty of the reference; nan where it is not known."""
         count = len(self.reference_axes) or len(self.reference_links)
-        sigma_um = self.reference.sigma_um if self.reference else (np.nan,)
-        return np.broadcast_to(np.array(sigma_um) / UM_PER_MM, (count,)).astype(np.float64)
+        sigma = self.reference.standard_uncertainty if self.reference else (np.nan,)
+        return np.broadcast_to(np.array(sigma) / UM_PER_MM, (count,)).astype(np.float64)
 
     def exclusions_by_position(self) -> dict[int, str]:
         """Spreadsheet row -> reason, as the rows are numbered when this recording's N rows alone are written."""

@@ -150,6 +150,7 @@ def _finish(
     from rich.table import Table
 
     from compd.api import compare
+    from compd.comparison.display_unit import format_error
 
     if dry_run:
         done = f"not written: would have {done}"
@@ -158,7 +159,8 @@ def _finish(
     before, after = compare(aligned, model), compare(aligned, changed)
     console = Console(highlight=False)
     console.print(
-        f"{path}: {done}; residual {before.rms_um:.3g} um -> {after.rms_um:.3g} um, floor ratio "
+        f"{path}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
+        f"{format_error(after.rms_um, aligned.unit, 3)}, floor ratio "
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")

@@ -120,6 +120,6 @@ def _reference(contents: Recording) -> str:
     parts = [reference.quantity, ", ".join(contents.reference_columns)]
     if reference.quantity != "link_length":
         parts.append(f"in the {reference.frame}'s frame")
-    sigma = ", ".join(f"{value:g}" for value in reference.sigma_um)
-    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} um")
+    sigma = ", ".join(f"{value:g}" for value in reference.standard_uncertainty)
+    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} {reference.unit}")
     return "; ".join(parts)
