@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def test_a_tube_droops_by_its_weight_across_it() -> None:
 @pytest.mark.parametrize("library", ["stage", "axis"])
 def test_reversal_is_the_way_up_less_the_way_down(library: str) -> None:
     """ISO 230-2: B is the deviation approached upwards less that approached downwards."""
-    up, down = moved_um(library, f"{library}_backlash", moved_1=[1.0, -1.0])[:, 0, 0]
+    up, down = moved_um(library, f"{library}_backlash", approach_1=[1.0, -1.0])[:, 0, 0]
     assert up - down == pytest.approx(1.0)
     assert up + down == pytest.approx(0.0)
 
@@ -114,7 +115,7 @@ def test_a_wrong_lead_and_a_screw_that_winds_up_grow_with_the_travel(library: st
     gain = moved_um(library, f"{library}_gain", tip_mm=[[0.0, 0, 0], [500.0, 0, 0]])[:, 0, 0]
     assert gain == pytest.approx([0.0, 0.5]), "half a metre at 1 um/m"
     places = [[0.0, 0, 0], [500.0, 0, 0], [500.0, 0, 0]]
-    windup = moved_um(library, f"{library}_windup", tip_mm=places, moved_1=[1.0, 1.0, -1.0])[:, 0, 0]
+    windup = moved_um(library, f"{library}_windup", tip_mm=places, approach_1=[1.0, 1.0, -1.0])[:, 0, 0]
     assert windup == pytest.approx([0.0, 0.5, -0.5])
 
 
@@ -134,9 +135,8 @@ def test_a_cyclic_error_repeats_after_a_turn(library: str) -> None:
 
 def test_a_reading_20_ms_old_is_behind_a_moving_axis() -> None:
     """At 30 mm/s the axis has moved on by 0.6 mm."""
-    assert 20.0 * moved_um("axis", "axis_latency", speed_mm_per_s=[30.0, -30.0])[:, 0, 0] == pytest.approx(
-        [600.0, -600.0]
-    )
+    behind = moved_um("axis", "axis_latency", velocity_1_mm_per_s=[30.0, -30.0])[:, 0, 0]
+    assert 20.0 * behind == pytest.approx([600.0, -600.0])
 
 
 def test_a_steel_screw_grows_from_where_it_is_held() -> None:
@@ -188,12 +188,17 @@ def test_a_plate_turned_grown_and_drilled_askew() -> None:
 # --- real machines ---------------------------------------------------------------------------------------------------
 
 
-def fit_um(name: str, library: str, ids: list[str]) -> tuple[dict[str, float], Floats]:
-    """Plain least squares on a real recording: the numbers by name, and the residual (N, m), um."""
+def fit_um(name: str, library: str, ids: list[str], **renamed: str) -> tuple[dict[str, float], Floats]:
+    """Plain least squares on a real recording: the numbers by name, and the residual (N, m), um.
+
+    renamed : columns that the recording has under another name.
+    """
     path = REAL / f"{name}.csv"
     if not path.exists():
         pytest.skip(f"no real recordings: {path} is not there")
     aligned = compd.open_recording(path)
+    quantities = {renamed.get(column, column): values for column, values in aligned.rows.quantities.items()}
+    aligned = replace(aligned, rows=replace(aligned.rows, quantities=quantities))
     effects: list[Effect] = [compd.load_effects(library)[id_] for id_ in ids]
     residual_um = (aligned.measured_mm - aligned.predicted_mm({})) * 1e3
     columns_um = np.concatenate([aligned.columns(effect, {}) * 1e3 for effect in effects], axis=2)
@@ -225,6 +230,7 @@ def test_a_drilled_plate_is_explained_by_all_four() -> None:
 
 
 def test_a_stage_is_explained_by_zero_play_and_lead() -> None:
-    numbers, left_um = fit_um("slit-stage-11358-1", "stage", ["stage_offset", "stage_backlash", "stage_gain"])
+    ids = ["stage_offset", "stage_backlash", "stage_gain"]
+    numbers, left_um = fit_um("slit-stage-11358-1", "stage", ids, moved_1="approach_1")
     assert 0.1 < abs(numbers["B"]) < 2.6
     assert rms(left_um) < 0.13
