@@ -74,7 +74,10 @@ def external_observations(recording: Recording, starts: BoolArray) -> Observatio
         velocity = velocities(recording.time_s, starts, at_point, scale_mm, np.zeros((recording.rows, 0)))
         velocity = np.where(np.isfinite(scale_mm), velocity, np.nan)
     readings = {"scale": scale_mm, "direction": direction, "motion": velocity}
-    recorded = {name for name, values in readings.items() if links and np.isfinite(values).any(axis=0).all()}
+    measured = [link - 1 for link in recording.reference_links]
+    recorded = {
+        name for name, values in readings.items() if links and np.isfinite(values[:, measured]).any(axis=0).all()
+    }
     return observe_external(
         _external_tip(recording),
         scale_mm=scale_mm,
