@@ -12,6 +12,7 @@ import stat
 import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
@@ -96,20 +97,31 @@ def _load_point(point: EntryPoint, where: str) -> Any:
 
 
 def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
-    """From a person's own file; a file that others may write could run anything as the daemon."""
-    value = f"{file}:{name}"
+    """From a person's own file."""
+    module = load_module(file, where, kind)
+    try:
+        return getattr(module, name)
+    except AttributeError as error:
+        raise _unloadable(f"{file}:{name}", where, kind, error) from error
+
+
+def load_module(file: Path, where: str, kind: str) -> ModuleType:
+    """Execute a person's own file; one that others may write could run anything as the daemon, and is refused.
+
+    file : absolute.  kind : what is sought in it, for messages.  Raises PluginError.
+    """
     try:
         mode = file.stat().st_mode
     except OSError as error:
         raise PluginError(
-            Problem(where=where, what=f"cannot read the {kind}'s file: {error.strerror}", value=value)
+            Problem(where=where, what=f"cannot read the {kind}'s file: {error.strerror}", value=str(file))
         ) from error
     if mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise PluginError(
             Problem(
                 where=where,
                 what=f"the {kind}'s file may be written by group or others",
-                value=value,
+                value=str(file),
                 allowed="mode 644 or stricter",
                 next_step=f"chmod go-w {file}",
             )
@@ -118,13 +130,15 @@ def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
     module_name = "compd_file_" + re.sub(r"\W", "_", str(file))
     spec = importlib.util.spec_from_file_location(module_name, file)
     if spec is None or spec.loader is None:
-        raise PluginError(Problem(where=where, what="not a Python file", value=value))
+        raise PluginError(Problem(where=where, what="not a Python file", value=str(file)))
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
-        return getattr(module, name)
     except (ImportError, SyntaxError, AttributeError) as error:
-        raise PluginError(
-            Problem(where=where, what=f"the {kind}'s file cannot be loaded: {error}", value=value)
-        ) from error
+        raise _unloadable(str(file), where, kind, error) from error
+    return module
+
+
+def _unloadable(value: str, where: str, kind: str, error: Exception) -> PluginError:
+    return PluginError(Problem(where=where, what=f"the {kind}'s file cannot be loaded: {error}", value=value))

@@ -3,5 +3,6 @@
 A recording is opened with its machine (`open`), aligned with the model's prediction (`aligned_recording`,
 `registration`, `velocity`) and compared (`compare`: `noise_floor`, `contributions`, `residual_trends`,
 `prediction_uncertainty`). Effects are fitted by `fit` and, with nonlinear constants, by `shape_search`; both rest on
-`least_squares`, `robust`, `outliers` and `cluster_covariance`. Every threshold of a result stands in `criteria`.
+`least_squares`, `robust`, `outliers` and `cluster_covariance`. `replicates` are
+rows of one visit. Every threshold of a result stands in `criteria`.
 """

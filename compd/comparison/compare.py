@@ -17,6 +17,7 @@ from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import frame_motion_um
+from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
@@ -60,7 +61,8 @@ class Comparison:
     left_out : dict
         Reason, and the number of rows that cannot be used for it.
     floor : NoiseFloor
-        What noise alone makes of the residual: `floor.um` per coordinate, `floor.how` says where it is from.
+        What noise alone makes of the residual: `floor.um` per coordinate, `floor.how` says where it is from,
+        `floor.known` whether it was measured or declared.
     uncertainty : Uncertainty
         Standard uncertainty of the prediction, um, by gauges and by fitted parameters.
     gauges : GaugeNoise or None
@@ -120,11 +122,13 @@ class Comparison:
 
     @property
     def at_floor(self) -> bool:
-        """Whether noise alone could have made the floor ratio as large as it is.
+        """Whether noise alone could have made the floor ratio as large as it is; False where noise is not known.
 
         By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor
         rests on.
         """
+        if not self.floor.known:
+            return False
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
         return self.floor_ratio <= float(f_distribution.ppf(self.criteria.at_floor_confidence, numbers, dof))
@@ -136,6 +140,11 @@ class Comparison:
             f"{self.aligned.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um "
             "(rms per coordinate)"
         )
+        if not self.floor.known:
+            return (
+                f"{who}. How much of it is noise cannot be known: measure one point twice, with the same number in the "
+                "column `visit`, or declare the reference's uncertainty, `sigma_um`."
+            )
         if self.at_floor:
             return f"{who}, which is the noise of the measurement itself ({self.floor.um:.3g} um): nothing is missing."
         share = 1 - 1 / self.floor_ratio
@@ -191,6 +200,7 @@ class Comparison:
         remarks = [
             f"{int(self.used.sum())} rows used, {len(self.used) - int(self.used.sum())} not. "
             f"Noise floor: {self.floor.how}.",
+            *([self.floor.contradiction] if self.floor.contradiction else []),
             *(trend.text for trend in self.trends[:MOST_TRENDS]),
         ]
         return html_table(self.verdict, table, remarks)
@@ -225,6 +235,7 @@ class Comparison:
             "noise_floor_xyz_um": self._by_axis(self.floor.by_axis_um),
             "noise_floor_source": self.floor.source,
             "noise_floor_how": self.floor.how,
+            "noise_floor_remark": self.floor.contradiction,
             "floor_ratio": self.floor_ratio,
             "at_floor": self.at_floor,
             "rows_used": int(self.used.sum()),
@@ -295,6 +306,7 @@ def compare(
         aligned.recording.visit,
         aligned.recording.reference_sigma_mm * UM_PER_MM,
         np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
+        _last_digit_um(aligned),
         _orders(aligned),
         criteria,
     )
@@ -387,16 +399,25 @@ def _uncertainty(
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
         return None, first_order_uncertainty(aligned, None, fitted, covariance)
-    gauges = gauge_noise(aligned, criteria=criteria)
+    gauges = gauge_noise(aligned)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
-    repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
+    repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter
         if (gauges_um > criteria.most_gauge_share * repeats.by_axis_um).any():
-            gauges = gauge_noise(aligned, from_repeats=False, criteria=criteria)
+            gauges = gauge_noise(aligned, from_repeats=False)
             uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     return gauges, uncertainty
+
+
+def _last_digit_um(aligned: AlignedRecording) -> FloatArray:
+    """(m,) uncertainty of the last digit of the reference as recorded; 0 of a ball plate, which is calibrated."""
+    recording = aligned.recording
+    recorded_mm = recording.reference_link_mm if aligned.of_links else recording.reference_mm
+    if recorded_mm is None or recording.plate is not None:
+        return np.zeros(len(aligned.labels))
+    return last_digit_um(recorded_mm * UM_PER_MM)
 
 
 def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:

@@ -24,8 +24,15 @@ class ComparisonCriteria:
     outlier_sigmas: float = threshold(
         5.0,
         unit="robust standard deviations",
-        meaning="a row with a coordinate farther from the median is an outlier and left out",
+        meaning="a row with a coordinate farther from the median is an outlier and left out, unless another row of "
+        "its visit lies within sqrt(2) times as many standard deviations of the repeats",
         reason="a normal error is as large once in two million: in no recording by chance",
+    )
+    fewest_pairs: int = threshold(
+        8,
+        unit="pairs of rows",
+        meaning="fewer pairs of repeats do not say what noise is",
+        reason="a choice: eight independent pairs know the noise within a quarter",
     )
     declared_dof: float = threshold(
         200.0,
@@ -39,6 +46,14 @@ class ComparisonCriteria:
         meaning="repeats and a declaration that differ with a smaller p-value (F test, two-sided) contradict each "
         "other, and the repeats alone count",
         reason="a choice: a hundred repeats then overrule a declaration that is wrong by a fifth",
+    )
+    contradiction_factor: float = threshold(
+        2.0,
+        unit="1",
+        meaning="repeats that contradict a declaration and scatter by more than so many times as much, or as little, "
+        "get a remark",
+        reason="a choice: less is a cautious or an optimistic declaration, more is a fault of the instrument, of the "
+        "unit or of the column `visit`",
     )
     at_floor_confidence: float = threshold(
         0.975,

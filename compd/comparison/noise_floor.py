@@ -2,10 +2,13 @@
 
 Three sources, in this order:
 
-repeats : pure error, the pooled standard deviation of replicates (rows of one visit) about their means,
-    s^2 = sum_v sum_{i in v} (r_i - mean_v)^2 / sum_v (n_v - 1). A declaration that agrees with it is pooled.
+repeats : pure error, the standard deviation of replicates (rows of one visit), from the differences of all pairs
+    within visits, s = trimmed_scale((r_i - r_j) / sqrt(2)). Without outliers it is the pooled standard deviation of
+    the visits about their means, and not less than the uncertainty of the reference's last digit. A declaration that
+    agrees with it is pooled.
 declared : the reference's standard uncertainty and the gauges' noise at the tip, sqrt(u_reference^2 + u_gauges^2).
-estimate : from differences of neighbouring rows, s = robust_sigma((r_{i+1} - r_i) / sqrt(2)).
+estimate : from differences of neighbouring rows, s = trimmed_scale((r_{i+1} - r_i) / sqrt(2)). What changes from row
+    to row counts as noise, be it noise or not: it is a unit to count in, and no floor.
 
 Sources: N. R. Draper, H. Smith, Applied Regression Analysis, Wiley 1998, section 2.1 (pure error); JCGM 100:2008
 (GUM), G.4.2 (degrees of freedom of a declared uncertainty); J. von Neumann, Ann. Math. Stat. 12 (1941) 367
@@ -22,8 +25,8 @@ from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.outliers import find_replicates
-from compd.comparison.robust import robust_sigma
+from compd.comparison.replicates import replicate_pairs
+from compd.comparison.robust import SCALE_EFFICIENCY, trimmed_scale
 
 # Variance of the estimate from N differences of neighbours, as a share of that of N independent values' (von
 # Neumann).
@@ -38,50 +41,45 @@ class NoiseFloor:
 
     by_axis_um : (m,) per coordinate.  source : where it is from.  how : the same in a sentence.
     dof : degrees of freedom, over all coordinates; inf for a declaration that nothing tests.
+    contradiction : a remark where repeats and the declaration are far apart; "" where they are not.
     """
 
     by_axis_um: FloatArray
     source: Source
     how: str
     dof: float
+    contradiction: str = ""
 
     @property
     def um(self) -> float:
         """Root mean square over the coordinates."""
         return rms(self.by_axis_um)
 
+    @property
+    def known(self) -> bool:
+        """Whether noise was measured or declared; an estimate is a unit to count in, and proves nothing."""
+        return self.source != "estimate"
+
 
 class Scatter(NamedTuple):
-    """Pure error of replicates: by_axis_um (m,), dof of each coordinate, number of visits left out for an outlier."""
+    """Pure error of replicates: by_axis_um (m,), degrees of freedom of each coordinate, number of pairs of rows."""
 
     by_axis_um: FloatArray
-    dof: int
-    outlier_visits: int
+    dof: float
+    pairs: int
 
 
-def repeat_scatter(
-    residual_um: FloatArray,
-    use: BoolArray,
-    visit: IntArray | None,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
-) -> Scatter | None:
-    """Pooled scatter of residual_um (N, m) within visits; None where no visit of the rows `use` (N,) is repeated.
+def repeat_scatter(residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> Scatter | None:
+    """Scatter of residual_um (N, m) within visits; None where no visit of the rows `use` (N,) is repeated.
 
     visit : (N,) number of the visit, negative for none.
     Of the residual, not of the reference: a change between two repeats that the model follows is no noise.
     """
-    replicates = None if visit is None else find_replicates(residual_um, use, visit)
-    if replicates is None:
+    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit)
+    if pairs is None:
         return None
-    outlier_visits = np.unique(replicates.visit[replicates.outlier(criteria)])
-    kept = ~np.isin(replicates.visit, outlier_visits)
-    if not kept.any():
-        return None
-    # a visit of n rows has n - 1 degrees of freedom, of which each row counts (n - 1) / n
-    dof_of_row = (replicates.size[kept] - 1.0) / replicates.size[kept]
-    squares = (replicates.deviation_um[kept] ** 2 * dof_of_row[:, None]).sum(axis=0)
-    dof = dof_of_row.sum()
-    return Scatter(np.sqrt(squares / dof), round(float(dof)), len(outlier_visits))
+    sigma_um = trimmed_scale(pairs.difference(residual_um), pairs.weight)
+    return Scatter(sigma_um, SCALE_EFFICIENCY * pairs.dof, len(pairs.weight))
 
 
 def noise_floor(
@@ -90,6 +88,7 @@ def noise_floor(
     visit: IntArray | None,
     declared_um: FloatArray,
     gauges_um: FloatArray,
+    digit_um: FloatArray,
     orders: tuple[FloatArray, ...],
     criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> NoiseFloor:
@@ -98,18 +97,31 @@ def noise_floor(
     residual_um : (N, m), of which the rows `use` (N,) count.  visit : as in `repeat_scatter`.
     declared_um : (m,) the reference's standard uncertainty, nan where nobody declared it.
     gauges_um : (m,) the gauges' noise at the tip, nan where unknown (then left out).
+    digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
     orders : quantities (N,) by which rows are sorted for an estimate.
     """
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
     is_declared = bool(np.isfinite(declared_um).all())
-    scatter = repeat_scatter(residual_um, use, visit, criteria)
-    if scatter is not None and (scatter.by_axis_um > 0).all():
-        return _from_repeats(scatter, expected_um if is_declared else None, criteria)
+    scatter = repeat_scatter(residual_um, use, visit)
+    if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
+        scatter = scatter._replace(by_axis_um=np.maximum(scatter.by_axis_um, digit_um))
+        if (scatter.by_axis_um > 0).all():
+            return _from_repeats(scatter, expected_um if is_declared else None, criteria)
+    no_repeats = _why_no_repeats(scatter, criteria)
     if is_declared:
         gauges = "" if np.isnan(gauges_um).any() else f" with the gauges' {rms(gauges_um):.3g} um at the tip"
-        how = f"declared: the reference's {rms(declared_um):.3g} um{gauges}; no visit is repeated, so nothing tests it"
+        how = f"declared: the reference's {rms(declared_um):.3g} um{gauges}; {no_repeats}, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
-    return _from_differences(residual_um[use], tuple(order[use] for order in orders))
+    return _from_differences(residual_um[use], tuple(order[use] for order in orders), no_repeats)
+
+
+def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> str:
+    """Why repeats do not say what noise is, as the part of a sentence."""
+    if scatter is None:
+        return "no visit is repeated"
+    if scatter.pairs < criteria.fewest_pairs:
+        return f"repeats make {scatter.pairs} pairs of rows, of {criteria.fewest_pairs} that are needed"
+    return "repeats are alike to the last digit"
 
 
 def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria) -> NoiseFloor:
@@ -118,17 +130,16 @@ def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: Co
     F test of the ratio of both variances, averaged over the coordinates, with `declared_dof` for the declaration.
     """
     axes = len(scatter.by_axis_um)
-    dof = float(scatter.dof * axes)
-    how = f"repeats of one visit scatter by {rms(scatter.by_axis_um):.3g} um ({scatter.dof} repeats)"
-    if scatter.outlier_visits:
-        how += f", {scatter.outlier_visits} visits with a gross row left out"
+    dof = scatter.dof * axes
+    how = f"repeats of one visit scatter by {rms(scatter.by_axis_um):.3g} um ({scatter.pairs} pairs of rows)"
     if expected_um is None:
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
     declared = f"declared noise of {rms(expected_um):.3g} um"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
     below = float(f_distribution.cdf(ratio, dof, criteria.declared_dof * axes))
     if min(below, 1 - below) < criteria.contradiction_p_value / 2:
-        return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof)
+        remark = _contradiction(float(np.sqrt(ratio)), criteria.contradiction_factor)
+        return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)
     pooled_dof = scatter.dof + criteria.declared_dof
     variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof
     return NoiseFloor(
@@ -136,16 +147,32 @@ def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: Co
     )
 
 
-def _from_differences(residual_um: FloatArray, orders: tuple[FloatArray, ...]) -> NoiseFloor:
+def _contradiction(factor: float, limit: float) -> str:
+    """What to check where repeats scatter `factor` times as much as declared; "" within a factor `limit`."""
+    if factor > limit:
+        return f"the repeats scatter {factor:.3g} times as much as declared: check the instrument, or `sigma_um`"
+    if factor < 1 / limit:
+        return (
+            f"the repeats scatter {1 / factor:.3g} times less than declared: check `sigma_um`; what it holds beside "
+            "noise, repeats do not show"
+        )
+    return ""
+
+
+def _from_differences(residual_um: FloatArray, orders: tuple[FloatArray, ...], no_repeats: str) -> NoiseFloor:
     """From differences of rows that are neighbours in time, place or temperature, in the order in which they differ
     least.
 
     residual_um : (R, m).  orders : (R,) each. What changes from row to row in every order counts as noise.
+    no_repeats : why repeats do not say what noise is.
     """
     smallest_um = np.full(residual_um.shape[1], np.inf)
     for order in orders:
         steps_um = np.diff(residual_um[np.argsort(order, kind="stable")], axis=0) / np.sqrt(2.0)
         if len(steps_um):
-            smallest_um = np.minimum(smallest_um, robust_sigma(steps_um))
-    how = "an estimate, from differences of neighbouring rows: no visit is repeated and no uncertainty is declared"
-    return NoiseFloor(smallest_um, "estimate", how, residual_um.size / DIFFERENCE_VARIANCE)
+            sigma_um = trimmed_scale(steps_um)
+            # 0 where a display shows most neighbours alike: then the few steps are all that there is
+            sigma_um = np.where(sigma_um > 0, sigma_um, np.sqrt(np.mean(steps_um**2, axis=0)))
+            smallest_um = np.minimum(smallest_um, sigma_um)
+    how = f"an estimate, from differences of neighbouring rows: {no_repeats} and no uncertainty is declared"
+    return NoiseFloor(smallest_um, "estimate", how, SCALE_EFFICIENCY * residual_um.size / DIFFERENCE_VARIANCE)

@@ -9,18 +9,13 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import repeat_scatter
 from compd.model.deltas import Deltas, split_by_port, sum_deltas
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import base_joints_by_distances
 from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, gauge_variance, parameter_variance
 from compd.units import UM_PER_MM
-
-# Standard deviation of an error spread evenly over one step (GUM, F.2.2.1).
-PER_STEP = 1.0 / np.sqrt(12.0)
-# Last digits of displays, from 50 um down to 0.1 nm.
-STEPS_UM = tuple(digit * 10.0**power for power in range(1, -5, -1) for digit in (5, 2, 1))
 
 
 class Uncertainty(NamedTuple):
@@ -35,11 +30,7 @@ class Uncertainty(NamedTuple):
         return np.asarray(np.hypot(self.gauges_um, self.parameters_um))
 
 
-def gauge_noise(
-    aligned: AlignedRecording,
-    from_repeats: bool = True,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
-) -> GaugeNoise:
+def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
     """Of each gauge: its scatter within visits, but at least the uncertainty of its last digit; else that alone.
 
     from_repeats : False where the machine moves within a visit, so that the gauges' scatter is no noise.
@@ -50,26 +41,14 @@ def gauge_noise(
     repeated = False
     for port in GAUGE_PORTS:
         values_um = {"scale": rows.scale_mm, "joint": rows.joint_mm, "frame": rows.frame_mm}[port] * UM_PER_MM
-        by_step = np.array([_step(column) for column in values_um[usable].T]) * PER_STEP
+        by_digit = last_digit_um(values_um[usable])
         scatter = None
         if from_repeats and values_um.size:
-            scatter = repeat_scatter(values_um, usable, recording.visit, criteria)
+            scatter = repeat_scatter(values_um, usable, recording.visit)
         repeated |= scatter is not None
-        noise_mm[port] = (by_step if scatter is None else np.maximum(scatter.by_axis_um, by_step)) / UM_PER_MM
+        noise_mm[port] = (by_digit if scatter is None else np.maximum(scatter.by_axis_um, by_digit)) / UM_PER_MM
     how = "scatter of the gauges within visits" if repeated else "the gauges' last digits alone: a lower bound"
     return GaugeNoise(noise_mm["scale"], noise_mm["joint"], noise_mm["frame"], how=how)
-
-
-def _step(values_um: FloatArray) -> float:
-    """The coarsest step, 1, 2 or 5 of any digit, of which all readings are multiples; 0 where they are all alike."""
-    values_um = values_um[np.isfinite(values_um)]
-    if not len(values_um) or np.ptp(values_um) == 0:
-        return 0.0
-    for step_um in STEPS_UM:
-        counts = values_um / step_um
-        if (np.abs(counts - np.round(counts)) < 1e-3).all():
-            return step_um
-    return 0.0
 
 
 def first_order_uncertainty(

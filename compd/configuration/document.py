@@ -77,11 +77,34 @@ def read_document(path: Path) -> Document:
 
     Raises ConfigurationError for a file that is missing, is not YAML, or has a key twice.
     """
+    data, lines = _read(path, "a configuration file")
+    if not isinstance(data, dict):
+        raise ConfigurationError(Problem(where=str(path), what="must hold `key: value` sections at its top"))
+    return Document(path, data, lines)
+
+
+def read_entries(path: Path, key: str) -> Document:
+    """Read a YAML file of entries: a list, a mapping that has the list under `key`, or a single entry by itself.
+
+    The document has the list under `key` in any case; a single entry is not a list: the mapping itself.
+    Raises ConfigurationError as `read_document` does, and for a file that is none of the three.
+    """
+    data, lines = _read(path, f"a file of {key}")
+    if isinstance(data, dict) and key in data:
+        return Document(path, data, lines)
+    if not isinstance(data, list | dict):
+        allowed = f"a list of {key}, `{key}:` with that list, or a single one"
+        raise ConfigurationError(Problem(where=str(path), what=f"holds no {key}", allowed=allowed))
+    return Document(path, {key: data}, {(key, *location): line for location, line in lines.items()})
+
+
+def _read(path: Path, kind: str) -> tuple[Any, dict[Location, int]]:
+    """The data of a YAML file, and the line of each part of it. kind : of file, for the message that there is none."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigurationError(
-            Problem(where=str(path), what=f"cannot be read: {error}", next_step="give the path of a configuration file")
+            Problem(where=str(path), what=f"cannot be read: {error}", next_step=f"give the path of {kind}")
         ) from error
     loader = _Loader(text)
     try:
@@ -100,11 +123,9 @@ def read_document(path: Path) -> Document:
         ) from error
     finally:
         loader.dispose()
-    if not isinstance(data, dict):
-        raise ConfigurationError(Problem(where=str(path), what="must hold `key: value` sections at its top"))
     if problems:
         raise ConfigurationError(problems)
-    return Document(path, data, lines)
+    return data, lines
 
 
 def _plain(

@@ -66,6 +66,11 @@ def shipped_names() -> list[str]:
     )
 
 
+def shipped_effects() -> dict[str, Path]:
+    """The files of effects that come with compd for kinds of machines, by name, such as "telescope"."""
+    return {path.stem: path for place in reversed(_PLACES) for path in sorted((place / "effects").glob("*.yaml"))}
+
+
 def shipped_configuration(name: str) -> Path:
     """The path of a shipped configuration, e.g. "tripod-cmm.yaml"; CompdError when the installation lacks it."""
     for place in _PLACES:

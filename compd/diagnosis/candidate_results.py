@@ -7,55 +7,68 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
+from compd.diagnosis.plausibility import estimate_parameters, is_undetermined
 from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.selection import estimate_parameters, explained_fraction, is_undetermined, penalty
-from compd.diagnosis.subset_search import Subset, SubsetSearch
+from compd.diagnosis.subset_losses import Subset, SubsetLosses
 
 
 def candidate_results(
-    problem: DiagnosisProblem, search: SubsetSearch, steps: Sequence[DiagnosisStep], p_values: Mapping[str, float]
+    problem: DiagnosisProblem, losses: SubsetLosses, steps: Sequence[DiagnosisStep], p_values: Mapping[str, float]
 ) -> tuple[CandidateResult, ...]:
     """One result per effect, tried alone at its best nonlinear constants: the best first, then those not testable.
 
     steps : the effects that were named.  p_values : by effect, corrected for all that were tried.
     """
     results = [
-        _result_alone(problem, search, subset, steps, p_values.get(name, float("nan")))
-        for name, subset in search.best_variants.items()
-        if not search.candidates[subset.members[0]].is_empirical
+        _result_alone(problem, losses, subset, steps, p_values.get(name, float("nan")))
+        for name, subset in losses.best_variants.items()
+        if losses.candidates[subset.members[0]].kind == "effect"
     ]
-    names = dict.fromkeys(candidate.name for candidate in search.candidates if not candidate.is_empirical)
+    names = dict.fromkeys(candidate.name for candidate in losses.candidates if candidate.kind == "effect")
     why = "acts in one session or sector only: what it does there predicts no other"
-    results += [CandidateResult(name, "not_testable", why) for name in names if name not in search.best_variants]
+    results += [CandidateResult(name, "not_testable", why) for name in names if name not in losses.best_variants]
+    why = "makes nothing on these rows but a constant, which is fitted along"
+    results += [CandidateResult(candidate.name, "not_testable", why) for candidate in problem.same_as_nuisance]
     results += [CandidateResult(name, "not_testable", reason) for name, reason in problem.pool.untestable.items()]
     return tuple(results)
 
 
+def explained_fraction(before: float, after: float, floor: float) -> float:
+    """phi = (SSE0 - SSE1) / (SSE0 - n sigma^2), from losses in squares of the noise floor; 0 where nothing is above.
+
+    floor : 1, or 0 where the noise is not known.
+    At most 1: the floor is known to some per cent only, so that more than what is above it can be explained::
+
+        explained_fraction(5.0, 2.0, 1.0)  # 0.75
+    """
+    return min((before - after) / (before - floor), 1.0) if before > floor else 0.0
+
+
 def _result_alone(
-    problem: DiagnosisProblem, search: SubsetSearch, subset: Subset, steps: Sequence[DiagnosisStep], p_value: float
+    problem: DiagnosisProblem, losses: SubsetLosses, subset: Subset, steps: Sequence[DiagnosisStep], p_value: float
 ) -> CandidateResult:
     """The result of one effect at its best nonlinear constants."""
-    candidate = search.candidates[subset.members[0]]
-    theta, covariance = search.estimates(subset.members)[0]
+    member = subset.members[0]
+    candidate = losses.candidates[member]
+    theta, covariance = losses.estimates(subset.members)[0]
     links = problem.aligned.rows.links
     parameters = tuple(estimate_parameters(candidate.effect, links, theta, covariance, problem.criteria))
-    fraction = explained_fraction(search.baseline, subset.cv_loss)
-    rms_um = problem.comparison.floor.um * float(np.sqrt(max(subset.cv_loss, 0.0)))
-    factor = candidate.penalty_factor(problem.criteria)
-    needed_gain = penalty(max(search.baseline - 1.0, 0.0), problem.criteria, factor)
+    fraction = explained_fraction(losses.baseline, subset.cv_loss, 1.0 if problem.floor_known else 0.0)
+    rms_um = problem.unit_um * float(np.sqrt(max(subset.cv_loss, 0.0)))
+    gain = losses.log_loss(losses.baseline) - losses.log_loss(subset.cv_loss)
     status: Status
     if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
         status, why = "explains", named
     elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
-    elif search.baseline - subset.cv_loss < needed_gain:
+    elif gain < losses.price(member):
         status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
     elif implausible := [parameter for parameter in parameters if not parameter.plausible]:
         status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
     elif steps:
         status, why = "partial", "nothing more beside what is named"
     else:
-        status, why = "partial", f"leaves {rms_um:.2g} um: a likeness, not the cause"
+        status, why = "partial", f"leaves {rms_um:.2g} um: others or descriptions do better"
     return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
 
 

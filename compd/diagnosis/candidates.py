@@ -1,9 +1,10 @@
-"""What may be missing from the model: effects of the library, or empirical terms, as columns of the prediction."""
+"""What may be missing from the model: effects of the library, a constant, descriptions, changes in time; as columns."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -14,15 +15,28 @@ from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
+Kind: TypeAlias = Literal["effect", "constant", "description", "change"]
+
+# Share of the rows in which an effect's quantities may be empty: only rows in which every candidate is known are used,
+# so that an effect that is known in fewer would cost all others those rows.
+MOST_EMPTY = 0.1
+# um; an effect that moves no row by more at the end of its plausible range does nothing: below every reference.
+LEAST_MOTION_UM = 1e-3
+# For how many parameters the search for a constant counts: the best of ten values fits noise about as two parameters do
+# (log 10 = 2.3), the better of two about as one (log 2 = 0.7).
+SEARCHED_CONSTANT, CHOICE = 2, 1
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """One effect at one choice of its nonlinear constants.
 
-    name : the effect's id, which variants of one effect share; of an empirical term, its covariate and form.
+    name : the effect's id, which variants of one effect share; of a description, its covariate and form.
     columns_um : (N, m, P) by how many um each parameter moves the prediction.
     limits : (P, 2) plausible range of each parameter; infinite where nothing is known of it.
     searched_parameters : for how many parameters the search for its nonlinear constants counts.
+    constants : values of its nonlinear constants.
+    kind : "effect" names a cause; "constant", "description" and "change" do not.
     """
 
     name: str
@@ -30,6 +44,8 @@ class Candidate:
     columns_um: FloatArray
     limits: FloatArray
     searched_parameters: int
+    constants: ConstantValues = field(default_factory=dict)
+    kind: Kind = "effect"
 
     @property
     def largest(self) -> FloatArray:
@@ -37,20 +53,14 @@ class Candidate:
         return np.asarray(np.abs(self.limits).max(axis=1))
 
     @property
-    def is_empirical(self) -> bool:
-        """Whether it describes without naming a cause: no parameter has a plausible range."""
-        return bool(np.isinf(self.limits).all())
-
-    @property
     def parameter_count(self) -> int:
         """Fitted parameters, and what the search for constants counts for."""
         return int(self.columns_um.shape[2]) + self.searched_parameters
 
-    def penalty_factor(self, criteria: Criteria) -> float:
-        """How many times the gain of another effect it must gain to be believed."""
-        if self.is_empirical:
-            return criteria.description_factor
-        return criteria.contradiction_factor if self.effect.registration else 1.0
+    def price(self, criteria: Criteria) -> float:
+        """By how much it must lower the logarithm of the loss, with the price of its further numbers."""
+        of_kind = criteria.description_price if self.kind in ("description", "change") else criteria.effect_price
+        return of_kind + criteria.number_price * (self.parameter_count - 1)
 
 
 @dataclass(frozen=True)
@@ -61,28 +71,25 @@ class CandidatePool:
     untestable: Mapping[str, str] = field(default_factory=dict)
 
 
-def library_pool(
-    aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str], criteria: Criteria
-) -> CandidatePool:
-    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
+def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> CandidatePool:
+    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model.
+
+    Of an external model the effects that act inside a machine are neither candidates nor untestable: they do not
+    concern it.
+    """
     candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
     usable = aligned.usable.mask
     for effect in effects:
-        if effect.id in present:
+        if effect.id in present or (aligned.model is None and effect.live):
             continue
         reason = _missing_inputs(effect, aligned)
         if reason:
             untestable[effect.id] = reason
             continue
         grid = effect.constant_grid(aligned.rows)
-        searched_parameters = sum(
-            criteria.choice_parameters if constant.choice else criteria.searched_constant_parameters
-            for constant in effect.constants
-            if len({constants[constant.name] for constants in grid}) > 1
-        )
-        variants = [_candidate(effect, constants, aligned, searched_parameters) for constants in grid]
-        reason = _reason_for_no_motion(variants, usable, criteria)
+        variants = [variant(effect, constants, aligned, searched_parameters(effect, grid)) for constants in grid]
+        reason = _reason_for_no_motion(variants, usable)
         if reason:
             untestable[effect.id] = reason
         else:
@@ -90,29 +97,35 @@ def library_pool(
     return CandidatePool(tuple(candidates), untestable)
 
 
-def _candidate(
-    effect: Effect, constants: ConstantValues, aligned: AlignedRecording, searched_parameters: int
-) -> Candidate:
+def searched_parameters(effect: Effect, grid: Sequence[ConstantValues]) -> int:
+    """For how many parameters the search of an effect's constants over a grid counts."""
+    return sum(
+        CHOICE if constant.choice else SEARCHED_CONSTANT
+        for constant in effect.constants
+        if len({constants[constant.name] for constants in grid}) > 1
+    )
+
+
+def variant(effect: Effect, constants: ConstantValues, aligned: AlignedRecording, searched: int) -> Candidate:
+    """The effect at one choice of its constants; searched : for how many parameters their search counts."""
     limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
     columns_um = aligned.columns(effect, constants) * UM_PER_MM
-    return Candidate(effect.id, effect, columns_um, limits, searched_parameters)
+    return Candidate(effect.id, effect, columns_um, limits, searched, constants)
 
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
     """What the effect needs and the recording has not, in words; "" where it has everything."""
     if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
-    if aligned.model is None and effect.live:
-        return "acts inside the machine, and of this machine only the model's prediction is known"
     return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
 
 
-def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray, criteria: Criteria) -> str:
+def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray) -> str:
     """Why none of an effect's variants moves the prediction on the usable rows; "" where one does."""
     columns_um = np.concatenate([variant.columns_um[usable] * variant.largest for variant in variants], axis=2)
     empty = float(np.mean(~np.isfinite(columns_um).all(axis=(1, 2))))
-    if empty > criteria.most_empty:
+    if empty > MOST_EMPTY:
         return f"what it needs is empty in {100 * empty:.0f} % of the rows"
-    if np.nanmax(np.abs(columns_um), initial=0.0) < criteria.least_motion_um:
+    if np.nanmax(np.abs(columns_um), initial=0.0) < LEAST_MOTION_UM:
         return "what drives it stayed at its reference value: vary it"
     return ""

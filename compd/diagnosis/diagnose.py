@@ -10,28 +10,28 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
+from compd.comparison.fit import fit, initial_effect
 from compd.comparison.shape_search import search_constants
-from compd.diagnosis.candidate_results import candidate_results
+from compd.diagnosis.candidate_results import candidate_results, explained_fraction
 from compd.diagnosis.candidates import library_pool
+from compd.diagnosis.constant import describe_constant
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.empirical_findings import Remainder, find_pair, rank_findings
-from compd.diagnosis.empirical_search import cv_losses_beside
+from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.explanation import Explanation, Progress, explain
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, UntestedEffect
+from compd.diagnosis.gross_rows import gross_rows
 from compd.diagnosis.measurement_programmes import recorded_limits
 from compd.diagnosis.next_measurement import plan_measurement
-from compd.diagnosis.problem import DiagnosisProblem, build_problem, screen_outliers
+from compd.diagnosis.plausibility import estimate_parameters
+from compd.diagnosis.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.rivals import find_rivals
-from compd.diagnosis.selection import estimate_parameters, explained_fraction, is_at_floor, penalty
 from compd.diagnosis.significance import OrthogonalComplement, p_values
-from compd.diagnosis.subset_search import SubsetSearch
+from compd.diagnosis.subset_losses import SubsetLosses
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 
-# Outliers and the best explanation depend on one another: so often both are determined at most.
-ROUNDS = 3
 # Rows of the next measurement that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
 NEXT_ROWS = 12
 # Covariates that the proposal of a next measurement names.
@@ -48,14 +48,15 @@ def diagnose(
 ) -> Diagnosis:
     """Learn which effects the model lacks on this recording.
 
-    The residual is explained by the fewest effects that predict rows which were left out; what no effect explains is
-    described by the covariates that it follows. Effects that are named are then fitted on the forward model.
+    The residual is explained by the effects that predict rows which were left out, each for its own evidence; what no
+    effect explains is described by the covariates that it follows. Effects that are named are then fitted on the
+    forward model.
 
     fitted, covariance : the model's effects and the joint covariance of their parameters, None where not known; they
         are refitted along.
     effects : the library.
     progress : called with a text when a stage begins.
-    criteria : thresholds of the verdict.
+    criteria : numbers of the verdict.
 
     Raises CompdError as `compare` does.
 
@@ -66,157 +67,148 @@ def diagnose(
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
     progress("comparing the model with the recording")
-    before = compare(aligned, fitted, covariance, criteria.comparison)
+    before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
-    pool = library_pool(aligned, effects, [effect.effect.id for effect in fitted], criteria)
+    pool = library_pool(aligned, effects, [effect.effect.id for effect in fitted])
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
-    for _ in range(ROUNDS - 1):
-        outlier = screen_outliers(problem, [explanation.search.candidates[k] for k in explanation.members])
-        if (outlier == problem.outlier).all():
-            break
-        problem = build_problem(before, pool, criteria, outlier)
-        explanation = explain(problem, progress)
+    # which rows are gross, and what explains the others, depend on one another: both are determined twice
+    weights = problem.weigh_beside([explanation.losses.candidates[k] for k in explanation.members])
+    problem = build_problem(before, pool, criteria, weights)
+    explanation = explain(problem, progress)
     progress("fitting on the real forward model")
     return _diagnosis(problem, explanation, covariance)
 
 
 def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
-    """Fit the effects that are worth naming, and state the verdict with its evidence."""
-    search, aligned, before, criteria = explanation.search, problem.aligned, problem.comparison, problem.criteria
-    effects = _effects_to_name(explanation, criteria)
-    p_value_by_effect = _p_values(search, effects)
-    fitted, joint_covariance = before.fitted, covariance
-    for number, k in enumerate(effects, start=1):
-        result = search_constants(aligned, fitted, search.candidates[k].effect, problem.sigma_um, criteria.comparison)
-        if number == len(effects):
-            result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
-        fitted, joint_covariance = result.fitted, result.covariance
-    after = compare(aligned, fitted, joint_covariance, criteria.comparison) if effects else before
-    explained = search.baseline - 1.0 if effects else 0.0
-    at_floor = not explanation.is_empirical and is_at_floor(after.floor_ratio, criteria, explained)
-    new = fitted[len(before.fitted) :]
-    steps = _steps(problem, search, effects, new, p_value_by_effect, with_rivals=at_floor)
-    candidates = candidate_results(problem, search, steps, p_value_by_effect)
-    depends_on = () if at_floor else _depends_on(problem, explanation, effects)
-    verdict = _verdict(steps, candidates, depends_on, at_floor)
-    diagnosis = Diagnosis(verdict, before, after, steps, candidates, depends_on)
-    return replace(diagnosis, next_measurement=_next_measurement(problem, diagnosis))
+    """Fit the effects that are named, and state the verdict with its evidence."""
+    losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
+    before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
+    before = replace(before, floor=problem.comparison.floor)
+    p_value_by_effect = _p_values(losses, explanation.effects)
+    after = before
+    if explanation.named:
+        links = aligned.rows.links
+        new = [losses.candidates[k] for k in explanation.named]
+        initial = [*before.fitted, *(initial_effect(c.effect, c.constants, links) for c in new)]
+        result = fit(aligned, initial, problem.sigma_um, outlier=problem.gross)
+        result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
+        after = compare(aligned, result.fitted, result.covariance, outlier=problem.gross)
+        after = replace(after, floor=before.floor)
+    named = dict(zip(explanation.named, after.fitted[len(before.fitted) :], strict=True))
+    steps = _steps(problem, explanation, named, p_value_by_effect)
+    candidates = candidate_results(problem, losses, steps, p_value_by_effect)
+    verdict = _verdict(problem, explanation, steps, candidates)
+    above = verdict in ("partial", "unexplained", "not_testable")
+    diagnosis = Diagnosis(
+        verdict,
+        before,
+        after,
+        steps,
+        candidates,
+        describe_remainder(problem, explanation) if above else (),
+        constant=describe_constant(problem, explanation, named),
+        gross=gross_rows(problem.gross, aligned.recording.row),
+        untested=_untested(problem),
+        heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
+        heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
+    )
+    return replace(diagnosis, next_measurement=_next_measurement(problem, losses, diagnosis))
 
 
 def _verdict(
+    problem: DiagnosisProblem,
+    explanation: Explanation,
     steps: Sequence[DiagnosisStep],
     candidates: Sequence[CandidateResult],
-    depends_on: Sequence[EmpiricalFinding],
-    at_floor: bool,
 ) -> Verdict:
-    """The verdict; at_floor : whether the model with the steps' effects leaves nothing worth a name."""
-    if at_floor:
+    """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
+
+    Where the noise is not known, whether something is missing can be told only by finding it.
+    """
+    found = bool(explanation.descriptions or explanation.changes)
+    if problem.floor_known and not found and explanation.loss <= problem.criteria.most_at_floor:
         if not steps:
             return "adequate"
         return "ambiguous" if any(step.rivals for step in steps) else "identified"
-    statuses = {candidate.status for candidate in candidates}
-    if not depends_on and not steps and statuses <= {"not_testable", "no_gain"} and "not_testable" in statuses:
+    if steps:
+        return "partial"
+    if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):
         return "not_testable"
     return "unexplained"
 
 
-def _effects_to_name(explanation: Explanation, criteria: Criteria) -> tuple[int, ...]:
-    """The effects of the best subset; none where they leave much that nothing describes: similarity, no cause."""
-    search, effects = explanation.search, explanation.effects
-    if not effects or explanation.is_empirical:
-        return effects
-    loss = search.evaluate([effects])[0].cv_loss
-    enough = explained_fraction(search.baseline, loss) >= 1 - criteria.most_unexplained
-    return effects if enough or is_at_floor(loss, criteria, search.baseline - 1.0) else ()
-
-
 def _steps(
     problem: DiagnosisProblem,
-    search: SubsetSearch,
-    effects: tuple[int, ...],
-    fitted: Sequence[FittedEffect],
+    explanation: Explanation,
+    named: Mapping[int, FittedEffect],
     p_value_by_effect: Mapping[str, float],
-    *,
-    with_rivals: bool,
 ) -> tuple[DiagnosisStep, ...]:
-    """One effect after another, with what each adds to those before it."""
-    steps, loss_before = [], search.baseline
-    for place, effect in enumerate(fitted):
-        loss = search.evaluate([effects[: place + 1]])[0].cv_loss
+    """One effect after another, with what each adds to those before it.
+
+    The constant, where it is a member, stands before all: what it takes is no effect's.
+    """
+    losses, floor = explanation.losses, 1.0 if problem.floor_known else 0.0
+    before = tuple(k for k in explanation.named if k not in explanation.effects)
+    steps = []
+    for k in explanation.effects:
+        loss_before, loss = losses.loss(before), losses.loss((*before, k))
+        before = (*before, k)
+        fitted = named[k]
         links = problem.aligned.rows.links
-        parameters = estimate_parameters(effect.effect, links, effect.theta, effect.covariance, problem.criteria)
+        parameters = estimate_parameters(fitted.effect, links, fitted.theta, fitted.covariance, problem.criteria)
         steps.append(
             DiagnosisStep(
-                fitted=effect,
-                rivals=find_rivals(search, effects, place) if with_rivals else (),
-                heldout_rms_um=problem.comparison.floor.um * float(np.sqrt(loss)),
-                explained_fraction=explained_fraction(loss_before, loss),
-                p_value=p_value_by_effect[effect.effect.id],
+                fitted=fitted,
+                rivals=find_rivals(losses, explanation.members, k),
+                heldout_rms_um=problem.unit_um * float(np.sqrt(loss)),
+                explained_fraction=explained_fraction(loss_before, loss, floor),
+                p_value=p_value_by_effect[fitted.effect.id],
                 parameters=tuple(parameters),
             )
         )
-        loss_before = loss
     return tuple(steps)
 
 
-def _depends_on(
-    problem: DiagnosisProblem, explanation: Explanation, effects: tuple[int, ...]
-) -> tuple[EmpiricalFinding, ...]:
-    """What the rest follows, one finding per covariate; first a pair of covariates where one is not enough."""
-    search, fits, criteria = explanation.search, explanation.fits, problem.criteria
-    if not fits:
-        return ()
-    nuisance = search.nuisance_with(effects)
-    remainder = Remainder(
-        data=replace(problem.data, nuisance=nuisance),
-        loss=search.evaluate([effects])[0].cv_loss if effects else search.baseline,
-        noise_um=problem.comparison.floor.um,
-        least_gain=penalty(search.baseline - 1.0, criteria),
-        links=problem.aligned.rows.links,
-    )
-    losses = cv_losses_beside(nuisance, problem.data, fits, criteria)
-    findings = rank_findings(remainder, fits, losses, criteria)
-    if not findings or is_at_floor(float(np.nanmin(losses)), criteria):
-        return findings
-    return (*find_pair(remainder, fits, float(np.nanmin(losses)), criteria), *findings)
-
-
-def _p_values(search: SubsetSearch, effects: tuple[int, ...]) -> dict[str, float]:
+def _p_values(losses: SubsetLosses, effects: tuple[int, ...]) -> dict[str, float]:
     """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
 
     The noise is what the named effects leave; where none is named, what the best candidate leaves.
     """
-    complement = OrthogonalComplement(search.data.nuisance.values)
-    columns = [complement(values) for values in search.values]
-    y = complement(search.data.y)
-    explaining = list(effects) or [subset.members[0] for subset in search.singles[:1]]
+    complement = OrthogonalComplement(losses.data.nuisance.values)
+    library = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "effect"]
+    columns = {k: complement(losses.values[k]) for k in library}
+    y = complement(losses.data.y)
+    alone = [subset.members[0] for subset in losses.best_variants.values() if subset.members[0] in columns]
+    explaining = list(effects) or alone[:1]
     noise = OrthogonalComplement(np.concatenate([columns[k] for k in explaining], axis=2))(y) if explaining else y
-    names = list(dict.fromkeys(candidate.name for candidate in search.candidates if not candidate.is_empirical))
-    families = [
-        [values for values, candidate in zip(columns, search.candidates, strict=True) if candidate.name == name]
-        for name in names
-    ]
-    return dict(zip(names, p_values(families, y, noise, search.data.block).tolist(), strict=True))
+    names = list(dict.fromkeys(losses.name(k) for k in library))
+    families = [[columns[k] for k in library if losses.name(k) == name] for name in names]
+    return dict(zip(names, p_values(families, y, noise, losses.data.block).tolist(), strict=True))
 
 
-def _next_measurement(problem: DiagnosisProblem, diagnosis: Diagnosis) -> list[dict[str, object]]:
+def _untested(problem: DiagnosisProblem) -> tuple[UntestedEffect, ...]:
+    return tuple(UntestedEffect(name, why) for name, why in problem.pool.untestable.items())
+
+
+def _next_measurement(problem: DiagnosisProblem, losses: SubsetLosses, diagnosis: Diagnosis) -> list[dict[str, object]]:
     """Rows that tell the first rivals apart; where nothing explains the residual, what to vary."""
-    aligned, model, criteria = problem.aligned, problem.comparison.fitted, problem.criteria.comparison
+    aligned, model = problem.aligned, problem.comparison.fitted
     for step in diagnosis.steps:
         if step.rivals and aligned.model is not None:
-            rival = problem.pool.candidates[step.rivals[0].member]
+            rival = losses.candidates[step.rivals[0].member]
             try:
-                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um, criteria).fitted[-1]
+                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um).fitted[-1]
                 pair = (step.fitted, fitted_rival)
                 limits = recorded_limits(aligned)
                 return list(plan_measurement(aligned, model, pair, problem.sigma_um, limits, NEXT_ROWS).rows)
             except CompdError as error:
                 return [{"measure": step.effect.separated_by, "why": str(error.problems[0].what)}]
-    return [
-        {
-            "measure": f"vary {finding.covariate} alone, everything else as it is, at three places and back again",
-            "why": f"the rest follows it ({finding.form}, at the {finding.port})",
-        }
-        for finding in diagnosis.depends_on[:NEXT_COVARIATES]
-    ]
+    return [_to_vary(finding) for finding in diagnosis.depends_on[:NEXT_COVARIATES] if not finding.effect]
+
+
+def _to_vary(finding: EmpiricalFinding) -> dict[str, object]:
+    return {
+        "measure": f"vary {finding.covariate} alone, everything else as it is, at three places and back again",
+        "why": f"the rest follows it ({finding.form}, at the {finding.port})",
+    }

@@ -1,132 +1,168 @@
-"""What a residual without a known cause follows: empirical terms that explain enough not to be chance."""
+"""What a residual without a known cause follows: descriptions that explain enough not to be chance."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.empirical_search import EmpiricalFit, best_by_covariate
+from compd.diagnosis.changes import ChangeCandidate
+from compd.diagnosis.empirical_search import EmpiricalFit
+from compd.diagnosis.explanation import Explanation
 from compd.diagnosis.findings import EmpiricalFinding
-from compd.diagnosis.regression import RegressionData, normal_equations
+from compd.diagnosis.problem import DiagnosisProblem
+from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.significance import OrthogonalComplement, p_values
 
+# A direction in which a term explains less than this share of its squares is left out of the proposed formulas: it
+# would be a formula for noise.
+DIRECTION_SHARE = 0.03
 
-class Remainder(NamedTuple):
-    """What is to be described.
 
-    data : the residual, its nuisance columns being those of the effects that were found as well.
-    loss : cross-validated, of the nuisance columns alone, in squares of the noise floor.
-    noise_um : the noise floor.  least_gain : what a term must explain, in squares of the floor.
-    links : of the machine.
+def describe_remainder(problem: DiagnosisProblem, explanation: Explanation) -> tuple[EmpiricalFinding, ...]:
+    """What the residual beside the effects that were found follows, the strongest first.
+
+    First the descriptions that were chosen together, as one finding; then changes in time; then each further covariate
+    alone, where it lowers the log loss by its price and is not chance.
     """
-
-    data: RegressionData
-    loss: float
-    noise_um: float
-    least_gain: float
-    links: int
-
-    def rms_um(self, loss: float) -> float:
-        """Error per coordinate at a loss."""
-        return self.noise_um * float(np.sqrt(max(loss, 0.0)))
-
-    def explained_fraction(self, loss: float) -> float:
-        """Share of what is above the noise floor that is explained at a loss, at most 1."""
-        return float(min((self.loss - loss) / max(self.loss - 1.0, self.loss - loss), 1.0))
+    remainder = _Remainder(problem, explanation)
+    findings = [remainder.change(k) for k in explanation.changes]
+    if explanation.descriptions:
+        chosen = [explanation.fit_of(k) for k in explanation.descriptions]
+        findings.insert(0, remainder.finding(chosen, remainder.p_values([chosen])[0], remainder.loss_with(chosen)))
+    first = [finding.covariate for finding in findings]
+    findings += [finding for finding in remainder.alone() if finding.covariate not in first]
+    return tuple(sorted(findings, key=lambda finding: finding.heldout_rms_um))
 
 
-def rank_findings(
-    remainder: Remainder, fits: Sequence[EmpiricalFit], losses: FloatArray, criteria: Criteria
-) -> tuple[EmpiricalFinding, ...]:
-    """The best term of each covariate, the one that explains most first, without those that may be chance.
+class _Remainder:
+    """The residual beside the effects that were found, the constant and the nuisance."""
 
-    losses : (K,) cross-validated, of each fit beside the nuisance columns.
-    """
-    first = best_by_covariate(losses, fits, remainder.loss, criteria)
-    if not first:
-        return ()
-    order = [*first, *(k for k in range(len(fits)) if np.isfinite(losses[k]) and k not in first)]
-    p_value_by_place = dict(zip(order, _p_values(remainder, [[fits[k]] for k in order]), strict=True))
-    return tuple(
-        _finding(remainder, [fits[k]], p_value_by_place[k], float(losses[k]), criteria)
-        for k in first
-        if remainder.loss - losses[k] >= remainder.least_gain and p_value_by_place[k] <= criteria.p_value
-    )
+    def __init__(self, problem: DiagnosisProblem, explanation: Explanation) -> None:
+        self._problem, self._explanation = problem, explanation
+        losses, named = explanation.losses, explanation.named
+        self._data = replace(problem.data, nuisance=losses.nuisance_with(named))
+        self._loss = losses.loss(named)
+
+    def loss_with(self, fits: Sequence[EmpiricalFit]) -> float:
+        """Cross-validated loss with some terms together."""
+        return float(self._losses([fits])[0])
+
+    def alone(self) -> list[EmpiricalFinding]:
+        """The best term of each covariate that is worth its price and not chance."""
+        criteria, losses = self._problem.criteria, self._explanation.losses
+        fits = self._explanation.fits
+        if not fits:
+            return []
+        by_fit = self._losses([[fit] for fit in fits])
+        scores = [losses.log_loss(loss) + fit.price(criteria) for fit, loss in zip(fits, by_fit, strict=True)]
+        best: dict[str, int] = {}
+        for k in sorted((k for k in range(len(fits)) if np.isfinite(by_fit[k])), key=lambda k: scores[k]):
+            best.setdefault(fits[k].term.covariate, k)
+        order = [*best.values(), *(k for k in range(len(fits)) if np.isfinite(by_fit[k]) and k not in best.values())]
+        p_value_by_fit = dict(zip(order, self.p_values([[fits[k]] for k in order]), strict=True))
+        return [
+            self.finding([fits[k]], p_value_by_fit[k], float(by_fit[k]))
+            for k in best.values()
+            if scores[k] <= losses.log_loss(self._loss) and p_value_by_fit[k] <= criteria.p_value
+        ]
+
+    def p_values(self, families: Sequence[Sequence[EmpiricalFit]]) -> list[float]:
+        """Of the columns of each family together; the first family is taken to be the explanation."""
+        if not families:
+            return []
+        complement = OrthogonalComplement(self._data.nuisance.values)
+        columns = [complement(np.concatenate([fit.values for fit in family], axis=2)) for family in families]
+        y = complement(self._data.y)
+        noise = OrthogonalComplement(columns[0])(y)
+        values: list[float] = p_values([[family] for family in columns], y, noise, self._data.block).tolist()
+        return values
+
+    def change(self, k: int) -> EmpiricalFinding:
+        """An effect that changes at a moment, as a finding."""
+        losses = self._explanation.losses
+        candidate = losses.candidates[k]
+        assert isinstance(candidate, ChangeCandidate)
+        theta, _ = losses.estimates(self._explanation.members)[self._explanation.members.index(k)]
+        names = [column.name for column in candidate.effect.columns(self._problem.aligned.rows.links)]
+        rest = [member for member in self._explanation.members if member != k]
+        columns = losses.values[k]
+        complement = OrthogonalComplement(losses.nuisance_with(rest).values)
+        y = complement(self._problem.data.y)
+        own = complement(columns)
+        p_value = float(p_values([[own]], y, OrthogonalComplement(own)(y), self._problem.data.block)[0])
+        loss, without = losses.loss(self._explanation.members), losses.loss(rest)
+        return EmpiricalFinding(
+            covariate="time_s",
+            form="change",
+            port=candidate.effect.port,
+            p_value=p_value,
+            explained_fraction=self._fraction(without, loss),
+            heldout_rms_um=self._rms_um(loss),
+            formula_effects=(),
+            parameters=(dict(zip(names, theta.tolist(), strict=True)),),
+            effect=candidate.effect.id,
+            time_s=candidate.time_s,
+        )
+
+    def finding(self, fits: Sequence[EmpiricalFit], p_value: float, loss: float) -> EmpiricalFinding:
+        """Terms together with their formulas, parameters fitted on all rows; the first covariate is the larger part."""
+        equations, indices = normal_equations(self._data, [fit.regressors for fit in fits])
+        theta, _, _ = equations.estimate(np.concatenate([np.arange(self._data.nuisance.values.shape[2]), *indices]))
+        parts: list[tuple[float, str, dict[str, Any], dict[str, float]]] = []
+        for fit, index in zip(fits, indices, strict=True):
+            names = [column.name for column in fit.effect.columns(self._problem.aligned.rows.links)]
+            for number, axis in enumerate(fit.term.axes):
+                of_axis = slice(number * len(names), (number + 1) * len(names))
+                values = theta[index][of_axis]
+                parameters = dict(zip(names, values.tolist(), strict=True))
+                sizes = {
+                    parameter.name: max(
+                        abs(v) for name, v in parameters.items() if name.split("_")[0] == parameter.name
+                    )
+                    for parameter in fit.effect.parameters
+                }
+                squares = float(((fit.values[:, :, of_axis] @ values) ** 2).sum())
+                declaration = fit.term.declaration(axis, fit.constant, sizes)
+                parts.append((squares, fit.term.covariate, declaration, parameters))
+        parts.sort(key=lambda part: -part[0])
+        least = DIRECTION_SHARE * sum(part[0] for part in parts)
+        kept = [part for part in parts if part[0] >= least]
+        main = next(fit for fit in fits if fit.term.covariate == parts[0][1]).term
+        return EmpiricalFinding(
+            covariate=main.covariate,
+            form=main.form,
+            port=main.port,
+            p_value=p_value,
+            explained_fraction=self._fraction(self._loss, loss),
+            heldout_rms_um=self._rms_um(loss),
+            formula_effects=tuple(part[2] for part in kept),
+            parameters=tuple(part[3] for part in kept),
+            beside=tuple(dict.fromkeys(f.term.covariate for f in fits if f.term.covariate != main.covariate)),
+        )
+
+    def _losses(self, families: Sequence[Sequence[EmpiricalFit]]) -> FloatArray:
+        """(K,) cross-validated loss with each family of terms; nan where no split can test it."""
+        return cv_losses_beside(self._data, families, self._problem.criteria.most_in_one_fold)
+
+    def _rms_um(self, loss: float) -> float:
+        return self._problem.unit_um * float(np.sqrt(max(loss, 0.0)))
+
+    def _fraction(self, before: float, after: float) -> float:
+        """Share of what is above the noise floor that is explained, at most 1."""
+        floor = 1.0 if self._problem.floor_known else 0.0
+        return float(min((before - after) / max(before - floor, before - after, 1e-300), 1.0))
 
 
-def find_pair(
-    remainder: Remainder, fits: Sequence[EmpiricalFit], best_loss: float, criteria: Criteria
-) -> tuple[EmpiricalFinding, ...]:
-    """The two terms of different covariates that explain most together; none where one nearly does as well.
-
-    best_loss : cross-validated, of the best term alone.
-    """
-    pairs = [(a, b) for a, b in combinations(range(len(fits)), 2) if fits[a].term.covariate != fits[b].term.covariate]
-    equations, indices = normal_equations(remainder.data, [fit.regressors for fit in fits])
-    nuisance_index = np.arange(remainder.data.nuisance.values.shape[2])
-    testable = np.array([equations.testable_splits(index, criteria.most_in_one_fold) for index in indices])
-    sets = [np.concatenate([nuisance_index, indices[a], indices[b]]) for a, b in pairs]
-    losses = equations.cv_losses(sets, np.array([testable[a] & testable[b] for a, b in pairs]))
-    if not np.isfinite(losses).any():
-        return ()
-    best = int(np.nanargmin(losses))
-    loss = float(losses[best])
-    pair = [fits[k] for k in pairs[best]]
-    excess = max(loss - 1.0, 0.0)
-    if best_loss - loss < remainder.least_gain or best_loss - 1.0 < excess / (1 - criteria.pair_share):
-        return ()
-    p_value = _p_values(remainder, [pair])[0]
-    return (_finding(remainder, pair, p_value, loss, criteria),) if p_value <= criteria.p_value else ()
-
-
-def _p_values(remainder: Remainder, families: Sequence[Sequence[EmpiricalFit]]) -> list[float]:
-    """Of the columns of each family together; the first family is taken to be the explanation."""
-    data = remainder.data
-    complement = OrthogonalComplement(data.nuisance.values)
-    columns = [complement(np.concatenate([fit.values for fit in family], axis=2)) for family in families]
-    y = complement(data.y)
-    noise = OrthogonalComplement(columns[0])(y)
-    values: list[float] = p_values([[family] for family in columns], y, noise, data.block).tolist()
-    return values
-
-
-def _finding(
-    remainder: Remainder, fits: Sequence[EmpiricalFit], p_value: float, loss: float, criteria: Criteria
-) -> EmpiricalFinding:
-    """The finding with its formulas, parameters fitted on all rows; the first covariate is the larger part."""
-    equations, indices = normal_equations(remainder.data, [fit.regressors for fit in fits])
-    theta, _, _ = equations.estimate(np.concatenate([np.arange(remainder.data.nuisance.values.shape[2]), *indices]))
-    parts: list[tuple[float, str, dict[str, Any], dict[str, float]]] = []
-    for fit, index in zip(fits, indices, strict=True):
-        names = [column.name for column in fit.effect.columns(remainder.links)]
-        for number, axis in enumerate(fit.term.axes):
-            of_axis = slice(number * len(names), (number + 1) * len(names))
-            values = theta[index][of_axis]
-            parameters = dict(zip(names, values.tolist(), strict=True))
-            sizes = {
-                parameter.name: max(abs(v) for name, v in parameters.items() if name.split("_")[0] == parameter.name)
-                for parameter in fit.effect.parameters
-            }
-            squares = float(((fit.values[:, :, of_axis] @ values) ** 2).sum())
-            declaration = fit.term.declaration(axis, fit.constant, sizes)
-            parts.append((squares, fit.term.covariate, declaration, parameters))
-    parts.sort(key=lambda part: -part[0])
-    least = criteria.direction_share * sum(part[0] for part in parts)
-    kept = [part for part in parts if part[0] >= least]
-    main = next(fit for fit in fits if fit.term.covariate == parts[0][1]).term
-    return EmpiricalFinding(
-        covariate=main.covariate,
-        form=main.form,
-        port=main.port,
-        p_value=p_value,
-        explained_fraction=remainder.explained_fraction(loss),
-        heldout_rms_um=remainder.rms_um(loss),
-        formula_effects=tuple(part[2] for part in kept),
-        parameters=tuple(part[3] for part in kept),
-        beside=tuple(fit.term.covariate for fit in fits if fit.term.covariate != main.covariate),
-    )
+def cv_losses_beside(
+    data: RegressionData, families: Sequence[Sequence[EmpiricalFit]], most_in_one_fold: float
+) -> FloatArray:
+    """(K,) cross-validated loss of the nuisance columns with each family of terms, in squares of the noise floor."""
+    columns = [np.concatenate([fit.values for fit in family], axis=2) for family in families]
+    equations, indices = normal_equations(data, [Regressors(v, np.full(v.shape[2], np.inf)) for v in columns])
+    nuisance_index = np.arange(data.nuisance.values.shape[2])
+    testable = np.array([equations.testable_splits(index, most_in_one_fold) for index in indices])
+    return equations.cv_losses([np.concatenate([nuisance_index, index]) for index in indices], testable)

@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.candidates import MOST_EMPTY
 from compd.model.effect import Effect
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
@@ -152,14 +152,14 @@ class EmpiricalTerm:
         return [float(refined) for refined in space(low, high, count)]
 
 
-def empirical_terms(aligned: AlignedRecording, criteria: Criteria) -> Iterator[EmpiricalTerm]:
+def empirical_terms(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     """Every term that can be tried on a recording."""
     usable = aligned.usable.mask
     time_s = aligned.rows.time_s[usable]
     ports = list(_ports(aligned))
     for name, values in _machine_covariates(aligned):
         column = values[usable]
-        if not _varies(column, criteria.most_empty):
+        if not _varies(column, MOST_EMPTY):
             continue
         middle = 0.0 if name.startswith("force_") else float(f"{np.nanmean(column):.3g}")
         for port in ports:

@@ -104,7 +104,7 @@ def _changed(
     aligned = before.aligned
     criteria = Criteria()
     fitted_ids = [fitted.effect.id for fitted in result.fitted]
-    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria)
+    others = library_pool(aligned, list(load_library().values()), fitted_ids)
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(

@@ -7,25 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import Comparison
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.outliers import outlier_rows
-from compd.comparison.robust import robust_regression
+from compd.comparison.robust import LEAST_SIGMA, trimmed_scale
 from compd.diagnosis.candidates import Candidate, CandidatePool
+from compd.diagnosis.constant import constant_candidate, split_constants
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.cross_validation import row_splits
+from compd.diagnosis.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.regression import RegressionData, Regressors
 from compd.units import UM_PER_MM
-
-# Ridge of the robust fit beside everything, as a share of each column's squared norm: there may be more columns than
-# rows determine.
-SCREENING_RIDGE = 1e-4
-# A larger exponent of Huber's weight than 1 and more rounds: all columns at once can follow outliers.
-SCREENING_EXPONENT = 2.0
-SCREENING_ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +27,28 @@ class DiagnosisProblem:
 
     N rows of the recording, R of which count; m coordinates.
 
-    comparison : of the recording with the model as it is.  pool : the candidates.  criteria : thresholds.
+    comparison : of the recording with the model as it is.  pool : effects of the library, and what cannot be tested.
+    candidates : those that compete, the constant among them.
+    same_as_nuisance : effects that do nothing on these rows but what is fitted along in any case.
+    criteria : numbers of the verdict.  sigma_um : (m,) standard deviation of the noise, or a unit where it is unknown.
     known : (N,) rows in which the residual and all candidates are known.
-    outlier : (N,) rows that no candidate explains; rows : (N,) those that count: known and no outliers.
+    gross : (N,) rows that nothing explains; rows : (N,) those that count: known and not gross.
+    root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
     residual : (N, m) whitened, 0 where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
-    data : residual and nuisance columns on the rows that count, and how these are divided.
-    values : (R, m, P) whitened columns of each candidate, on the rows that count.
+    data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
+    values : (R, m, P) whitened and weighted columns of each candidate, on the rows that count.
     """
 
     comparison: Comparison
     pool: CandidatePool
+    candidates: tuple[Candidate, ...]
+    same_as_nuisance: tuple[Candidate, ...]
     criteria: Criteria
+    sigma_um: FloatArray
     known: BoolArray
-    outlier: BoolArray
+    gross: BoolArray
     rows: BoolArray
+    root_weight: FloatArray
     residual: FloatArray
     nuisance: FloatArray
     data: RegressionData
@@ -59,76 +60,80 @@ class DiagnosisProblem:
         return self.comparison.aligned
 
     @property
-    def sigma_um(self) -> FloatArray:
-        """(m,) standard deviation of the noise of each coordinate."""
-        return self.comparison.floor.by_axis_um
+    def floor_known(self) -> bool:
+        """Whether the noise was measured or declared."""
+        return self.comparison.floor.known
+
+    @property
+    def unit_um(self) -> float:
+        """Error per coordinate at a loss of 1, um."""
+        return rms(self.sigma_um)
 
     def whiten(self, columns_um: FloatArray) -> FloatArray:
-        """(R, m, P) columns (N, m, P) in um, in standard deviations of the noise on the rows that count."""
-        return np.asarray(columns_um[self.rows] / self.sigma_um[:, None])
+        """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
+        return np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
+
+    def weigh_beside(self, candidates: Sequence[Candidate]) -> RowWeights:
+        """What each row counts beside some candidates alone."""
+        columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
+        visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
+        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria)
 
 
 def build_problem(
-    comparison: Comparison, pool: CandidatePool, criteria: Criteria, outlier: BoolArray | None = None
+    comparison: Comparison, pool: CandidatePool, criteria: Criteria, weights: RowWeights | None = None
 ) -> DiagnosisProblem:
     """Whiten the residual and the candidates of a comparison.
 
-    outlier : (N,) rows to leave out; None to screen for them beside everything that could explain a row. What a
-        candidate could explain does not make a row an outlier then, and hides no outlier either: behind an effect of
-        six times the noise an error of twenty times would be hidden.
+    weights : of the rows; None to weigh them beside everything that could explain a row. What a candidate could
+        explain does not make a row gross then, and hides no gross row either: behind an effect of six times the noise
+        an error of twenty times would be hidden.
     """
-    aligned, sigma_um = comparison.aligned, comparison.floor.by_axis_um
-    nuisance = _nuisance_um(comparison) / sigma_um[:, None]
+    aligned = comparison.aligned
+    sigma_um = _unit_um(comparison)
+    nuisance_um = _nuisance_um(comparison)
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    for columns in (nuisance, *(candidate.columns_um for candidate in pool.candidates)):
+    for columns in (nuisance_um, *(candidate.columns_um for candidate in pool.candidates)):
         known &= np.isfinite(columns).all(axis=(1, 2))
+    candidates, same = split_constants(pool.candidates, nuisance_um, known)
+    constant = constant_candidate(aligned)
+    if constant is not None:
+        candidates = (*candidates, constant)
     residual = np.where(known[:, None], comparison.residual_um, 0.0) / sigma_um
-    if outlier is None:
-        everything = [nuisance, *_everything(aligned, pool, sigma_um, known)]
-        outlier = _outliers_beside(everything, residual, known, aligned.recording.visit, criteria.comparison)
-    rows = known & ~outlier
+    nuisance = nuisance_um / sigma_um[:, None]
+    if weights is None:
+        everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
+        noise = 1.0 if comparison.floor.known else 0.0
+        weights = weigh_rows(everything, residual, known, aligned.recording.visit, noise, criteria)
+    rows = known & ~weights.gross
+    root = np.sqrt(weights.weight[rows])
     data = RegressionData(
-        residual[rows],
-        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned, criteria)),
+        residual[rows] * root[:, None],
+        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned)),
         _renumbered(neighbour_blocks(aligned.recording)[rows]),
-        Regressors(nuisance[rows], np.full(nuisance.shape[2], np.inf)),
+        Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
     )
-    values = tuple(candidate.columns_um[rows] / sigma_um[:, None] for candidate in pool.candidates)
-    return DiagnosisProblem(comparison, pool, criteria, known, outlier, rows, residual, nuisance, data, values)
+    values = tuple(candidate.columns_um[rows] / sigma_um[:, None] * root[:, None, None] for candidate in candidates)
+    return DiagnosisProblem(
+        comparison, pool, candidates, same, criteria, sigma_um, known, weights.gross, rows, root, residual, nuisance,
+        data, values,
+    )  # fmt: skip
 
 
-def screen_outliers(problem: DiagnosisProblem, candidates: Sequence[Candidate]) -> BoolArray:
-    """(N,) outliers beside some candidates alone."""
-    columns = [candidate.columns_um / problem.sigma_um[:, None] for candidate in candidates]
-    visit = problem.aligned.recording.visit
-    criteria = problem.criteria.comparison
-    return _outliers_beside([problem.nuisance, *columns], problem.residual, problem.known, visit, criteria)
-
-
-def _outliers_beside(
-    columns: Sequence[FloatArray],
-    residual: FloatArray,
-    known: BoolArray,
-    visit: IntArray | None,
-    criteria: ComparisonCriteria,
-) -> BoolArray:
-    """(N,) outliers of what a robust fit of all columns (N, m, P) at once and a constant leaves of residual (N, m)."""
-    constant = np.broadcast_to(np.eye(residual.shape[1]), (*residual.shape, residual.shape[1]))
-    G = np.concatenate([constant, *columns], axis=2)[known]
-    theta = robust_regression(
-        G, residual[known], ridge=SCREENING_RIDGE, exponent=SCREENING_EXPONENT, rounds=SCREENING_ROUNDS
-    )
-    left = np.full(residual.shape, np.nan)
-    left[known] = residual[known] - G @ theta
-    return outlier_rows(left, known, visit, criteria)
+def _unit_um(comparison: Comparison) -> FloatArray:
+    """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all: a unit only."""
+    if comparison.floor.known:
+        return comparison.floor.by_axis_um
+    size_um = rms(trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)]))
+    return np.full(len(comparison.aligned.labels), max(size_um, LEAST_SIGMA))
 
 
 def _everything(
-    aligned: AlignedRecording, pool: CandidatePool, sigma_um: FloatArray, known: BoolArray
+    aligned: AlignedRecording, candidates: Sequence[Candidate], sigma_um: FloatArray, known: BoolArray
 ) -> list[FloatArray]:
     """Whitened columns of one variant of each effect; time, its square and every quantity, along each coordinate."""
     first_variants: dict[str, Candidate] = {}
-    for candidate in pool.candidates:
+    for candidate in candidates:
         first_variants.setdefault(candidate.name, candidate)
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
@@ -141,7 +146,7 @@ def _everything(
 
 
 def _nuisance_um(comparison: Comparison) -> FloatArray:
-    """(N, m, Q) columns of the model's own parameters and of the instrument's frame."""
+    """(N, m, Q) columns of the model's own parameters and of what is fitted along: frame or constant."""
     aligned = comparison.aligned
     columns = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in comparison.fitted]
     return np.concatenate([*columns, aligned.registration_columns * UM_PER_MM], axis=2)

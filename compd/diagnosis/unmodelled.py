@@ -31,12 +31,12 @@ def with_disturbances(
 
     A residual at the noise floor still hides effects that are too small to be found. One that looks like a fitted
     effect moves its parameters, and the noise alone says nothing of that. An error of which only the size is known is
-    an uncertainty all the same (GUM, 4.3: type B). `disturbances` effects, each equally likely to be any of the K
-    that are not fitted, act with an rms of `disturbance` standard deviations of the noise, spread evenly and
-    independently over their own columns. With the whitened columns A of the fit and B_k of effect k, each of its p_k
+    an uncertainty all the same (GUM, 4.3: type B). Unnamed effects, equally likely to be any of the K that are not
+    fitted, act with an rms of `disturbance` standard deviations of the noise in all, spread evenly and independently
+    over their own columns. With the whitened columns A of the fit and B_k of effect k, each of its p_k
     columns scaled to an rms of 1, the added covariance is::
 
-        disturbances disturbance^2 / K  sum_k  A^+ B_k B_k^T A^+T / p_k
+        disturbance^2 / K  sum_k  A^+ B_k B_k^T A^+T / p_k
 
     where A^+ = (A^T A)^-1 A^T is what least squares makes of an error of the prediction (GUM, 5.1.2).
 
@@ -44,7 +44,7 @@ def with_disturbances(
     effect counts.
 
     Example: where the only other effect has the same form as the fitted one, the standard error grows by as much of
-    the parameter as moves the prediction by 0.2 sqrt(2) = 0.28 standard deviations of the noise (rms), however many
+    the parameter as moves the prediction by 0.28 standard deviations of the noise (rms), however many
     rows there are.
     """
     fitted_ids = {fitted.effect.id for fitted in result.fitted}
@@ -59,7 +59,7 @@ def with_disturbances(
     A = _whitened(np.concatenate([own, registration_beside(aligned, own, result.used)], axis=2), result, sigma_um)
     inverse = normal_inverse(A, RANK_CUT)
     added = np.zeros((A.shape[1], A.shape[1]))
-    variance = criteria.disturbance**2 * criteria.disturbances
+    variance = criteria.disturbance**2
     for columns in others.values():
         rms = np.sqrt(np.mean(columns**2, axis=0))
         unit_columns = columns[:, rms > 0] / rms[rms > 0]

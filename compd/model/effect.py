@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -180,6 +180,9 @@ class Effect:
         What it adds depends on its comparators' own readings.
     registration : bool
         A rigid motion of the reference's whole frame, as laying two frames over one another takes away.
+    declared : str or dict
+        What a model file names it by: the mapping that it was declared with as a formula, or
+        ``"/absolute/file.py:NAME"``; ``""`` for its id.
 
     Examples
     --------
@@ -214,6 +217,7 @@ class Effect:
     remembers: bool = False
     follows_reading: bool = False
     registration: bool = False
+    declared: str | Mapping[str, Any] = ""
 
     @property
     def port(self) -> str:

@@ -68,7 +68,7 @@ def write_comparison_page(path: Path, comparisons: Sequence[Comparison], shared_
     machine = comparisons[0].aligned.recording.machine
     effects = ", ".join(effect.effect.id for effect in comparisons[0].fitted) or "none"
     verdict = " ".join(
-        f"{name_of(comparison)}: {comparison.verdict}" if len(comparisons) > 1 else comparison.verdict
+        f"{name_of(comparison)}: {_verdict(comparison)}" if len(comparisons) > 1 else _verdict(comparison)
         for comparison in comparisons
     )
     panels = [
@@ -136,7 +136,7 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
         ),
         Panel(
             "Histogram against the noise floor",
-            f"{comparison.floor.how[0].upper()}{comparison.floor.how[1:]}.",
+            " ".join(_sentence(text) for text in (comparison.floor.how, comparison.floor.contradiction) if text),
             plot_histogram(comparison),
         ),
         Panel(
@@ -147,6 +147,16 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
         Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(comparison)),
     ]
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
+
+
+def _verdict(comparison: Comparison) -> str:
+    """The result, with the noise floor's remark: it says that the recording may be wrong."""
+    remark = comparison.floor.contradiction
+    return f"{comparison.verdict} {_sentence(remark)}" if remark else comparison.verdict
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _excluded(comparison: Comparison) -> PageTable:

@@ -81,6 +81,8 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
             console.print(f"[bold]{name_of(comparison)}[/]")
         console.print(comparison.verdict)
         console.print(f"Noise floor: {comparison.floor.how}.")
+        if comparison.floor.contradiction:
+            console.print(f"Check: {comparison.floor.contradiction}.")
         if not comparison.trends:
             console.print(f"Where it fails: {no_trend_text(comparison)}.")
         for trend in comparison.trends[:MOST_SENTENCES]:

@@ -1,224 +1,218 @@
-"""An effect declared in a file without code: a port, a formula, parameters with plausible ranges."""
+"""An effect declared in a file without code: a port, formulas or a sensitivity, parameters with plausible ranges."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
 
-from compd.arrays import FloatArray
 from compd.errors import ConfigurationError, Problem
-from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, Port
-from compd.model.formula.evaluator import Formula
-from compd.model.formula.parser import LARGEST_EXPONENT, LONGEST, parse
-from compd.model.observations import Observations
+from compd.model.effect import Constant, Effect, Parameter
+from compd.model.formula.basis import (
+    SENSITIVITY_PORTS,
+    VECTORS,
+    formula_basis,
+    sensitivity_basis,
+    sensitivity_columns,
+)
+from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, column_needs
+from compd.model.formula.evaluator import NUMBERS, Formula
+from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
+from compd.model.formula.parser import LARGEST_EXPONENT, parse_together
 
-PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
-VECTORS: tuple[Port, ...] = ("base_joint", "platform_joint", "plate", "tool", "reference")
 # How many values of a nonlinear parameter are tried within its plausible range.
 GRID = 9
 UM = 1e-3  # mm
 TO_MM: Mapping[str, float] = {"um": UM, "mm": 1.0}
 
-# Columns that every machine has: at ports with one value per link, at ports of readings, and at all ports.
-OF_LINK: Mapping[str, str] = {
-    "scale_mm": "reading of the link's scale since machine zero, mm",
-    "link_mm": "length of the link, mm",
-    "direction": "1 or -1 as the link last moved, 0 where that is not known",
-    "velocity_mm_per_s": "speed of the link, mm/s",
-    "axial_force_N": "axial force in the link, N, tension positive; needs the force on the tip",
-    "temperature_link": "temperature of the link, degC; any other quantity `NAME_link_<i>_UNIT` likewise as "
-    "`NAME_link_UNIT`",
-}
-OF_READING: Mapping[str, str] = {"reading_mm": "the comparator's or the scale's own reading since machine zero, mm"}
-ANYWHERE: Mapping[str, str] = {
-    "time_s": "time, s",
-    "tip_x_mm": "x of the tip in {M}, mm",
-    "tip_y_mm": "y of the tip in {M}, mm",
-    "tip_z_mm": "z of the tip in {M}, mm",
-}
-READING_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
-_PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
-_QUANTITY = re.compile(r"^[a-z][a-z0-9_]*_[A-Za-z0-9]+$")
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class FormulaParameter(BaseModel):
-    """A parameter of a formula."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    unit: str = Field(description="its unit, for people; the formula's numbers are not converted")
-    plausible: tuple[Finite, Finite] = Field(description="lowest and highest value that is plausible")
-    source: str = Field(description="where that range comes from")
-    per: Literal["machine", "link"] = Field(
-        default="machine", description="one value for the machine, or one for each link"
-    )
-
-
-class FormulaDeclaration(BaseModel):
-    """The keys of a declaration. The formula gives what is added at the port, in the unit `gives`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    id: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")] = Field(description="name of the effect")
-    port: Literal["scale", "joint", "frame", "link", "base_joint", "platform_joint", "plate", "tool", "reference"] = (
-        Field(description="where it acts")
-    )
-    formula: str = Field(description=f"what it adds there, in columns and parameters; at most {LONGEST} characters")
-    gives: Literal["um", "mm"] = Field(default="um", description="unit of the formula's value")
-    axis: Literal["x", "y", "z"] | None = Field(
-        default=None, description=f"along which axis; needed at the ports {', '.join(VECTORS)}, and only there"
-    )
-    parameters: Annotated[
-        dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], FormulaParameter], Field(min_length=1)
-    ] = Field(description="the parameters that the formula names; each term holds one that is fitted")
-    physics: str = Field(default="Written as a formula.", description="what happens, in a sentence")
-    mistaken_for: tuple[str, ...] = Field(default=(), description="ids of effects that look alike")
-    separated_by: str = Field(
-        default="rows in which the formula's columns change on their own",
-        description="measurements that tell it from others",
-    )
-
 
 def formula_effect(source: Mapping[str, Any], where: str) -> Effect:
     """An effect from its declaration, a mapping as YAML gives it.
 
-    The formula's value is in um, or in mm with `gives: mm`; at the ports of vectors `axis` says along which axis.
+    A formula's value is in um, or in mm with `gives: mm`; at the ports of vectors `axis` says along which axis, or
+    there is one formula for each axis.
     Raises ConfigurationError with every problem found, at `where`.
     """
+    declaration = read_declaration(source, where)
+    problems = _form_problems(declaration, where)
+    if not (declaration.formulas or declaration.sensitivity):
+        raise ConfigurationError(problems)
     try:
-        declaration = FormulaDeclaration.model_validate(dict(source))
-    except ValidationError as error:
-        raise ConfigurationError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
-    formula = parse(declaration.formula, tuple(declaration.parameters), f"{where}, formula of {declaration.id}")
-    problems = [*_port_problems(declaration, where), *_parameter_problems(declaration, formula, where)]
-    needs: list[str] = ["time", "order"] if formula.lags else []
-    for name in formula.columns:
-        needed = _needs_of_column(name, declaration.port)
-        if isinstance(needed, Problem):
-            problems.append(replace(needed, where=f"{where}, formula of {declaration.id}", value=name))
-        else:
-            needs += needed
+        effect = (_with_sensitivity if declaration.sensitivity else _with_formulas)(declaration, where)
+    except ConfigurationError as error:
+        raise ConfigurationError([*problems, *error.problems]) from error
     if problems:
         raise ConfigurationError(problems)
+    return replace(effect, declared=dict(source))
+
+
+def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
+    """Raises ConfigurationError with every problem of the formulas and their parameters."""
+    place = f"{where}, formula of {declaration.id}"
+    texts = declaration.formulas
+    places = [f"{place}, {axis}" if len(texts) > 1 else place for axis in texts]
+    parsed = parse_together(dict(zip(places, texts.values(), strict=True)), tuple(declaration.parameters), place)
+    constants = tuple(dict.fromkeys(name for formula in parsed for name in formula.constants))
+    problems = _parameter_problems(declaration, parsed, where)
+    needs: list[str] = ["time", "order"] if any(formula.lags for formula in parsed) else []
+    for text_place, formula in zip(places, parsed, strict=True):
+        for name in formula.columns:
+            needed = column_needs(name, declaration.port)
+            if isinstance(needed, Problem):
+                problems.append(replace(needed, where=text_place, value=name))
+            else:
+                needs += needed
+    if problems:
+        raise ConfigurationError(problems)
+    linear = [name for name in declaration.parameters if name not in constants]
+    per_link = [name for name in linear if declaration.parameters[name].per == "link"]
+    columns = dict.fromkeys(name for formula in parsed for name in formula.columns)
+    return _effect(
+        declaration,
+        equation=_equation(declaration),
+        columns=dict.fromkeys(columns, "as measured or modelled"),
+        needs=tuple(dict.fromkeys(needs)),
+        linear=linear,
+        basis=formula_basis(
+            dict(zip(texts, parsed, strict=True)), declaration.port, TO_MM[declaration.gives], linear, per_link
+        ),
+        constants=tuple(_constant(name, declaration.parameters[name]) for name in constants),
+        remembers=any(formula.lags for formula in parsed),
+    )
+
+
+def _with_sensitivity(declaration: FormulaDeclaration, where: str) -> Effect:
+    """Raises ConfigurationError with every key that does not belong to a sensitivity."""
+    assert declaration.sensitivity is not None
+    if problems := _sensitivity_problems(declaration, where):
+        raise ConfigurationError(problems)
+    (parameter,) = declaration.parameters
+    derivative = f"d_{declaration.sensitivity}"
+    return _effect(
+        declaration,
+        equation=f"delta = {parameter} {derivative}",
+        columns={derivative: f"recorded derivative of the prediction, mm per {declaration.parameters[parameter].unit}"},
+        needs=(sensitivity_columns(declaration.sensitivity, declaration.port),),
+        linear=[parameter],
+        basis=sensitivity_basis(declaration.sensitivity, declaration.port),
+    )
+
+
+def _effect(
+    declaration: FormulaDeclaration, *, equation: str, columns: Mapping[str, str], linear: list[str], **parts: Any
+) -> Effect:
+    """What all declared effects have in common. parts : further attributes of `Effect`."""
+    declared = declaration.parameters
     return Effect(
         id=declaration.id,
         ports=(declaration.port,),
         physics=declaration.physics,
-        equation=f"delta = {declaration.formula}" + (f", along {declaration.axis}" if declaration.axis else ""),
-        symbols={
-            **{name: f"parameter, {parameter.unit}" for name, parameter in declaration.parameters.items()},
-            **dict.fromkeys(formula.columns, "as measured or modelled"),
-        },
-        source="; ".join(dict.fromkeys(parameter.source for parameter in declaration.parameters.values())),
-        needs=tuple(dict.fromkeys(needs)),
+        equation=equation,
+        symbols={**{name: f"parameter, {parameter.unit}" for name, parameter in declared.items()}, **columns},
+        source="; ".join(dict.fromkeys(parameter.source for parameter in declared.values())),
         parameters=tuple(
-            Parameter(name, parameter.unit, *parameter.plausible, parameter.source, parameter.per)
-            for name, parameter in ((name, declaration.parameters[name]) for name in formula.linear)
+            Parameter(name, declared[name].unit, *declared[name].plausible, declared[name].source, declared[name].per)
+            for name in linear
         ),
         mistaken_for=declaration.mistaken_for,
         separated_by=declaration.separated_by,
-        basis=_basis(declaration, formula),
-        constants=tuple(_constant(name, declaration.parameters[name]) for name in formula.constants),
-        remembers=formula.lags > 0,
+        **parts,
     )
 
 
-def _problem(detail: ErrorDetails, where: str) -> Problem:
-    keys = ", ".join(FormulaDeclaration.model_fields) if detail["type"] == "extra_forbidden" else ""
-    place = ".".join(str(part) for part in detail["loc"])
-    return Problem(where=f"{where}, {place}", what=detail["msg"], value=str(detail["input"])[:80], allowed=keys)
+def _equation(declaration: FormulaDeclaration) -> str:
+    if isinstance(declaration.formula, str):
+        return f"delta = {declaration.formula}" + (f", along {declaration.axis}" if declaration.axis else "")
+    return "; ".join(f"delta_{axis} = {formula}" for axis, formula in declaration.formulas.items())
 
 
-def _port_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]:
-    if (declaration.axis is not None) == (declaration.port in VECTORS):
+def _form_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]:
+    """Of the keys that depend on one another: formula or sensitivity, port and axis."""
+    if (declaration.formula is None) == (declaration.sensitivity is None):
+        what = "is missing" if declaration.formula is None else "has a formula and a sensitivity"
+        return [Problem(where=f"{where}, formula", what=what, allowed="`formula:` or `sensitivity:`, one of them")]
+    if declaration.sensitivity is not None:
         return []
-    allowed = "x, y or z" if declaration.port in VECTORS else "none: this port has no direction"
-    return [
-        Problem(
-            where=f"{where}, axis",
-            what=f"does not fit the port {declaration.port}",
-            value=str(declaration.axis),
-            allowed=allowed,
-        )
-    ]
-
-
-def _parameter_problems(declaration: FormulaDeclaration, formula: Formula, where: str) -> list[Problem]:
+    if isinstance(declaration.formula, str):
+        if (declaration.axis is not None) == (declaration.port in VECTORS):
+            return []
+        allowed = "none: this port has no direction"
+        if declaration.port in VECTORS:
+            allowed = "x, y or z; or a formula for each axis, `formula: {x: ..., y: ...}`"
+        what, value = f"does not fit the port {declaration.port}", str(declaration.axis or "")
+        return [Problem(where=f"{where}, axis", what=what, value=value, allowed=allowed)]
     problems = []
-    for name, parameter in declaration.parameters.items():
-        place = f"{where}, parameters.{name}"
-        low, high = parameter.plausible
-        if not low < high:
-            problems.append(
-                Problem(
-                    where=place,
-                    what="the plausible range is empty",
-                    value=f"[{low:g}, {high:g}]",
-                    allowed="[low, high], low < high",
-                )
-            )
-        if name in (*OF_LINK, *OF_READING, *ANYWHERE, "pi"):
-            problems.append(
-                Problem(
-                    where=place, what="this name is a column's", value=name, next_step="call the parameter otherwise"
-                )
-            )
-        if parameter.per == "link" and (name in formula.constants or declaration.port not in PER_LINK):
-            allowed = f"a parameter that the formula is proportional to, at {', '.join(PER_LINK)}"
-            problems.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
-        is_exponent = re.search(rf"\*\*\s*{name}\b", declaration.formula)
-        if is_exponent and max(abs(low), abs(high)) > LARGEST_EXPONENT:
-            problems.append(
-                Problem(
-                    where=place,
-                    what="is an exponent",
-                    value=f"[{low:g}, {high:g}]",
-                    allowed=f"within +-{LARGEST_EXPONENT:g}",
-                )
-            )
-        is_time_constant = formula.lags and re.search(rf",\s*{name}\s*\)", declaration.formula)
-        if is_time_constant and low <= 0 and name in formula.constants:
-            problems.append(
-                Problem(
-                    where=place, what="is a time constant", value=f"[{low:g}, {high:g}]", allowed="a range above 0 s"
-                )
-            )
+    if declaration.axis is not None:
+        what, step = "is said twice: the formulas name their axes", "remove `axis:`"
+        problems.append(Problem(where=f"{where}, axis", what=what, value=declaration.axis, next_step=step))
+    if declaration.port not in VECTORS:
+        what, allowed = f"the port {declaration.port} has no axes", "one formula, or the ports " + ", ".join(VECTORS)
+        problems.append(Problem(where=f"{where}, formula", what=what, allowed=allowed))
     return problems
 
 
-def _needs_of_column(name: str, port: Port) -> list[str] | Problem:
-    """What has to be measured for a column of a formula."""
-    if name in ANYWHERE:
-        return ["time"] if name == "time_s" else []
-    if name in OF_READING and port in READING_PORTS:
-        return []
-    per_link = name in OF_LINK or _PER_LINK_COLUMN.match(name) is not None
-    if per_link and port not in PER_LINK:
-        return Problem(where="", what=f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))
-    if per_link:
-        words = {
-            "direction": ["direction"],
-            "velocity_mm_per_s": ["motion"],
-            "axial_force_N": ["force"],
-            "temperature_link": ["temperature_link_{link}_degC"],
-            "scale_mm": [],
-            "link_mm": [],
-        }
-        return words.get(name, [name.replace("_link_", "_link_{link}_", 1)])
-    if not _QUANTITY.match(name):
-        columns = ", ".join((*ANYWHERE, *(OF_LINK if port in PER_LINK else ())))
-        return Problem(
-            where="", what="is no column", allowed=f"a measured quantity with its unit (humidity_pct), {columns}"
+def _sensitivity_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]:
+    problems = []
+    if declaration.port not in SENSITIVITY_PORTS:
+        what, allowed = "has no sensitivity", ", ".join(SENSITIVITY_PORTS)
+        problems.append(Problem(where=f"{where}, port", what=what, value=declaration.port, allowed=allowed))
+    for key in ("axis", "gives"):
+        if key in declaration.model_fields_set:
+            what, step = "does not belong to a sensitivity, whose columns are in mm along their axes", "remove it"
+            problems.append(Problem(where=f"{where}, {key}", what=what, next_step=step))
+    parameters = declaration.parameters
+    if len(parameters) != 1:
+        what, allowed = "a sensitivity has one parameter", "one; write an effect for each"
+        problems.append(Problem(where=f"{where}, parameters", what=what, value=", ".join(parameters), allowed=allowed))
+    problems += [problem for name in parameters if (problem := _range_problem(declaration, name, where))]
+    for name, parameter in parameters.items():
+        if parameter.per == "link":
+            place = f"{where}, parameters.{name}.per"
+            problems.append(Problem(where=place, what="a sensitivity has one value", value="link", allowed="machine"))
+    return problems
+
+
+def _range_problem(declaration: FormulaDeclaration, name: str, where: str) -> Problem | None:
+    low, high = declaration.parameters[name].plausible
+    if low < high:
+        return None
+    return Problem(
+        where=f"{where}, parameters.{name}",
+        what="the plausible range is empty",
+        value=f"[{low:g}, {high:g}]",
+        allowed="[low, high], low < high",
+    )
+
+
+def _parameter_problems(declaration: FormulaDeclaration, formulas: tuple[Formula, ...], where: str) -> list[Problem]:
+    problems = []
+    texts = [formula.text for formula in formulas]
+    constants = {name for formula in formulas for name in formula.constants}
+    for name, parameter in declaration.parameters.items():
+        place = f"{where}, parameters.{name}"
+        low, high = parameter.plausible
+        if problem := _range_problem(declaration, name, where):
+            problems.append(problem)
+        if name in (*OF_LINK, *OF_READING, *ANYWHERE, *NUMBERS):
+            what = "this name is a number's" if name in NUMBERS else "this name is a column's"
+            problems.append(Problem(where=place, what=what, value=name, next_step="call the parameter otherwise"))
+        if parameter.per == "link" and (name in constants or declaration.port not in PER_LINK):
+            allowed = f"a parameter that the formula is proportional to, at {', '.join(PER_LINK)}"
+            problems.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
+        is_exponent = any(re.search(rf"\*\*\s*{name}\b", text) for text in texts)
+        if is_exponent and max(abs(low), abs(high)) > LARGEST_EXPONENT:
+            allowed = f"within +-{LARGEST_EXPONENT:g}"
+            problems.append(Problem(where=place, what="is an exponent", value=f"[{low:g}, {high:g}]", allowed=allowed))
+        is_time_constant = name in constants and any(
+            formula.lags and re.search(rf",\s*{name}\s*\)", formula.text) for formula in formulas
         )
-    return [name]
+        if is_time_constant and low <= 0:
+            value, allowed = f"[{low:g}, {high:g}]", "a range above 0 s"
+            problems.append(Problem(where=place, what="is a time constant", value=value, allowed=allowed))
+    return problems
 
 
 def _constant(name: str, parameter: FormulaParameter) -> Constant:
@@ -228,52 +222,3 @@ def _constant(name: str, parameter: FormulaParameter) -> Constant:
     wide = low > 0 and high / low >= 30
     grid = np.geomspace(low, high, GRID) if wide else np.linspace(low, high, GRID)
     return Constant(name, parameter.unit, low, high, parameter.source, tuple(float(value) for value in grid))
-
-
-def _basis(declaration: FormulaDeclaration, formula: Formula) -> Any:
-    axis = "xyz".index(declaration.axis) if declaration.axis else None
-    to_mm = TO_MM[declaration.gives]
-
-    def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
-        places = {"joint": rows.joint_mm.shape[1], "frame": 9, "plate": 3, "tool": 1, "reference": 1}.get(
-            declaration.port, rows.links
-        )
-        states = _lag_states(memory, formula.lags)
-        columns = {name: _column(rows, name, declaration.port) for name in formula.columns}
-        factors, after = formula.evaluate(columns, constants, rows.time_s, rows.session_start, states)
-        parts = []
-        for name, factor in factors.items():
-            column = to_mm * np.broadcast_to(factor, (len(rows), places))
-            single = declaration.parameters[name].per == "machine"
-            parts.append(column[:, :, None] if single else column[:, :, None] * np.eye(places))
-        values = np.concatenate(parts, axis=2)
-        if axis is not None:
-            directed = np.zeros((len(rows), places, 6 if declaration.port == "reference" else 3, values.shape[2]))
-            directed[:, :, axis] = values
-            values = directed.reshape(len(rows), -1, values.shape[2])
-        return values, tuple(array for state in after if state is not None for array in state) or None
-
-    return basis
-
-
-def _lag_states(memory: Memory, lags: int) -> tuple[tuple[FloatArray, ...] | None, ...]:
-    """The states of so many lags, three arrays each, from an effect's memory."""
-    return tuple(None if memory is None else memory[3 * i : 3 * i + 3] for i in range(lags))
-
-
-def _column(rows: Observations, name: str, port: Port) -> FloatArray:
-    """A column of the formula: (N, places) or (N, 1)."""
-    if name == "reading_mm":
-        return {"scale": rows.scale_mm, "joint": rows.joint_mm, "frame": rows.frame_mm}[port]
-    if name in ("scale_mm", "link_mm", "direction", "velocity_mm_per_s", "axial_force_N"):
-        return np.asarray(getattr(rows, name))
-    if name == "time_s":
-        return rows.time_s[:, None]
-    if name.startswith("tip_"):
-        return rows.tip_M_mm[:, ["xyz".index(name[4])]]
-    if name == "temperature_link":
-        name = "temperature_link_degC"
-    if _PER_LINK_COLUMN.match(name):
-        names = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(rows.links)]
-        return np.stack([rows.quantity(link_name) for link_name in names], axis=1)
-    return rows.quantity(name)[:, None]

@@ -24,8 +24,10 @@ class Function(NamedTuple):
 
 
 FUNCTIONS: Mapping[str, Function] = {
-    "sin": Function(1, np.sin, "sin(x)", "sine of x in radians"),
+    "sin": Function(1, np.sin, "sin(x)", "sine of x in radians; of an angle in degrees: sin(azimuth_deg * deg)"),
     "cos": Function(1, np.cos, "cos(x)", "cosine of x in radians"),
+    "tan": Function(1, np.tan, "tan(x)", "tangent of x in radians"),
+    "atan2": Function(2, np.arctan2, "atan2(y, x)", "angle of the point (x, y), -pi to pi radians"),
     "exp": Function(1, np.exp, "exp(x)", "e to the power of x"),
     "log": Function(1, np.log, "log(x)", "natural logarithm"),
     "sqrt": Function(1, np.sqrt, "sqrt(x)", "square root"),
@@ -34,6 +36,8 @@ FUNCTIONS: Mapping[str, Function] = {
     "minimum": Function(2, np.minimum, "minimum(x, y)", "the smaller of two values"),
     "maximum": Function(2, np.maximum, "maximum(x, y)", "the larger of two values"),
 }
+# Names that are numbers; deg turns degrees into radians.
+NUMBERS: Mapping[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 # Not one of FUNCTIONS, because it remembers: its call and meaning, for the reference.
 LAG = ("lag(x, tau)", "x as it arrives after a first-order lag with the time constant tau, s; x itself at the start")
 OPERATORS: Mapping[type[ast.operator], Callable[[FloatArray, FloatArray], FloatArray]] = {
@@ -130,7 +134,7 @@ class _Evaluation:
             return {name: np.ones((1, 1))}
         if name in self._constants:
             return {None: np.full((1, 1), self._constants[name])}
-        return {None: np.full((1, 1), math.pi) if name == "pi" else self._columns[name]}
+        return {None: np.full((1, 1), NUMBERS[name]) if name in NUMBERS else self._columns[name]}
 
     def _combine(self, left: Terms, op: ast.operator, right: Terms) -> Terms:
         function = OPERATORS[type(op)]

@@ -11,10 +11,10 @@ import ast
 import math
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from compd.errors import ConfigurationError, Problem
-from compd.model.formula.evaluator import FUNCTIONS, OPERATORS, Formula, to_float
+from compd.model.formula.evaluator import FUNCTIONS, NUMBERS, OPERATORS, Formula, to_float
 
 # A formula that a person reads at a glance; the bounds keep any text from taking time or stack.
 LONGEST = 300
@@ -22,22 +22,32 @@ DEEPEST = 20
 LARGEST_EXPONENT = 10.0
 
 CHARACTERS = re.compile(r"[A-Za-z0-9_ .,+\-*/()]*")
-ALLOWED = "numbers, columns, parameters, pi, + - * / **, sin cos exp log sqrt abs sign minimum maximum lag(x, tau)"
+ALLOWED = f"numbers, columns, parameters, {', '.join(NUMBERS)}, + - * / **, {' '.join(FUNCTIONS)} lag(x, tau)"
 
 
 def parse(text: str, parameters: tuple[str, ...], where: str) -> Formula:
     """Check a formula. Raises ConfigurationError that names the place in it and what is allowed."""
-    _check_text(text, where)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the parser's advice on style: "1if"
-            tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        column = getattr(error, "offset", None) or 1
-        raise _formula_error(where, text, column, "is not a formula", ALLOWED) from error
-    checker = _Checker(text.strip(), parameters, where)
-    checker.node(tree, 1)
-    unused = [name for name in parameters if name not in checker.names]
+    return parse_together({where: text}, parameters, where)[0]
+
+
+def parse_together(texts: Mapping[str, str], parameters: tuple[str, ...], where: str) -> tuple[Formula, ...]:
+    """Check formulas that share parameters, one for each axis.
+
+    A parameter in which one of them is not linear is a nonlinear constant of all.
+
+    texts : each formula by its place, for messages.  where : the place of all of them.
+    Raises ConfigurationError that names the place in each faulty one and what is allowed.
+    """
+    checkers: dict[str, _Checker] = {}
+    problems: list[Problem] = []
+    for place, text in texts.items():
+        try:
+            checkers[place] = _check(text, parameters, place)
+        except ConfigurationError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigurationError(problems)
+    unused = [name for name in parameters if not any(name in checker.names for checker in checkers.values())]
     if unused:
         raise ConfigurationError(
             Problem(
@@ -47,26 +57,37 @@ def parse(text: str, parameters: tuple[str, ...], where: str) -> Formula:
                 next_step="use it, or remove it",
             )
         )
-    nonlinear = _nonlinear_parameters(tree, set(parameters))
-    factors = _linear_factors(tree, set(parameters) - nonlinear)
-    if None in factors:
-        raise ConfigurationError(
-            Problem(
-                where=where,
-                what="a term of the formula holds no parameter that could be fitted",
-                value=text,
-                allowed="every term is a parameter times something",
-                next_step="multiply it by a parameter with a plausible range",
-            )
+    nonlinear = _nonlinear_parameters([checker.tree for checker in checkers.values()], set(parameters))
+    linear = tuple(name for name in parameters if name not in nonlinear)
+    problems = [
+        Problem(
+            where=place,
+            what="a term of the formula holds no parameter that could be fitted",
+            value=texts[place],
+            allowed="every term is a parameter times something",
+            next_step="multiply it by a parameter with a plausible range",
         )
-    return Formula(
-        text,
-        tree,
-        tuple(name for name in parameters if name not in nonlinear),
-        tuple(name for name in parameters if name in nonlinear),
-        tuple(name for name in checker.names if name not in parameters and name != "pi"),
-        checker.lags,
-    )
+        for place, checker in checkers.items()
+        if None in _linear_factors(checker.tree, set(linear))
+    ]
+    if problems:
+        raise ConfigurationError(problems)
+    return tuple(checker.formula(linear) for checker in checkers.values())
+
+
+def _check(text: str, parameters: tuple[str, ...], where: str) -> _Checker:
+    """The checked syntax tree of a formula, with the names in it."""
+    _check_text(text, where)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the parser's advice on style: "1if"
+            tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        column = getattr(error, "offset", None) or 1
+        raise _formula_error(where, text, column, "is not a formula", ALLOWED) from error
+    checker = _Checker(text.strip(), tree, parameters, where)
+    checker.node(tree, 1)
+    return checker
 
 
 def _formula_error(where: str, text: str, column: int, what: str, allowed: str) -> ConfigurationError:
@@ -87,10 +108,24 @@ def _check_text(text: str, where: str) -> None:
 class _Checker:
     """Walks the tree once and raises ConfigurationError for whatever is not allowed; collects the names in it."""
 
-    def __init__(self, text: str, parameters: tuple[str, ...], where: str) -> None:
+    def __init__(self, text: str, tree: ast.expr, parameters: tuple[str, ...], where: str) -> None:
         self._text, self._parameters, self._where = text, parameters, where
+        self.tree = tree
         self.names: dict[str, None] = {}
         self.lags = 0
+
+    def formula(self, linear: tuple[str, ...]) -> Formula:
+        """The formula whose fitted parameters are those of `linear` that it names."""
+        named = tuple(name for name in self._parameters if name in self.names)
+        columns = tuple(name for name in self.names if name not in self._parameters and name not in NUMBERS)
+        return Formula(
+            self._text,
+            self.tree,
+            tuple(name for name in named if name in linear),
+            tuple(name for name in named if name not in linear),
+            columns,
+            self.lags,
+        )
 
     def node(self, node: ast.AST, depth: int) -> None:
         if depth > DEEPEST:
@@ -165,11 +200,11 @@ class _Checker:
         return _formula_error(self._where, self._text, column + 1, error, allowed)
 
 
-def _nonlinear_parameters(tree: ast.expr, parameters: set[str]) -> set[str]:
-    """The parameters in which the formula is not linear; of two that are multiplied, those in the second factor."""
+def _nonlinear_parameters(trees: Sequence[ast.expr], parameters: set[str]) -> set[str]:
+    """The parameters in which a formula is not linear; of two that are multiplied, those in the second factor."""
     nonlinear: set[str] = set()
     while True:
-        more = next(_find_nonlinear(tree, parameters - nonlinear), None)
+        more = next((found for tree in trees for found in _find_nonlinear(tree, parameters - nonlinear)), None)
         if more is None:
             return nonlinear
         nonlinear |= more

@@ -2,14 +2,15 @@
 
 To add an effect, write its entry into the file of its port (PORT.py, a new one where it has none yet), a test of its
 physics (tests/unit/library/test_physics.py), and a hidden cause of the same id in compd/simulation/causes; nothing else
-names it. Effects of other people are found as drivers are: by entry point (`compd.effects`), by path, or written as a
-formula.
+names it. Effects of other people are found as drivers are, by entry point (`compd.effects`) or by path, or written as
+formulas (`effects_file.py`).
 """
 
 from __future__ import annotations
 
 import pkgutil
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -49,16 +50,20 @@ def load_library() -> dict[str, Effect]:
     return effects
 
 
-def find_effect(declaration: str | Mapping[str, Any], where: str) -> Effect:
+def find_effect(
+    declaration: str | Mapping[str, Any], where: str, given: Mapping[str, Effect] | None = None
+) -> Effect:
     """An effect by its id, as /absolute/file.py:NAME, or written out as a formula.
 
-    where : the place in the person's file, for errors.  Raises PluginError, or ConfigurationError for a formula.
+    where : the place in the person's file, for errors.  given : effects beside those of the library, by id.
+    Raises PluginError, or ConfigurationError for a formula.
     """
     if not isinstance(declaration, str):
         return formula_effect(declaration, where)
     if ":" in declaration:
-        return _require_effect(load(EFFECTS, declaration, where), where)
-    effects = load_library()
+        effect = _require_effect(load(EFFECTS, declaration, where), where)
+        return effect if effect.declared else replace(effect, declared=declaration)
+    effects = {**load_library(), **(given or {})}
     if declaration not in effects:
         raise PluginError(
             Problem(
@@ -66,7 +71,7 @@ def find_effect(declaration: str | Mapping[str, Any], where: str) -> Effect:
                 what="no such effect",
                 value=declaration,
                 allowed=", ".join(effects),
-                next_step="choose one of these, write /absolute/file.py:NAME, or write a formula",
+                next_step="choose one of these, name a file of your own (FILE.yaml:ID), or write a formula",
             )
         )
     return effects[declaration]

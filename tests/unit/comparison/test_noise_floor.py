@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import gauge_noise
+from compd.comparison.replicates import replicate_pairs
+from compd.comparison.robust import SCALE_EFFICIENCY
 from tests.support.measured import GAUGE_SIGMA_UM, aligned, gauges, record
 
 Floats = NDArray[np.float64]
@@ -34,7 +37,8 @@ def test_repeats_see_noise_and_not_what_changes_from_visit_to_visit() -> None:
     scatter = repeat_scatter(values, everything(values), pairs(2000))
     assert scatter is not None
     np.testing.assert_allclose(scatter.by_axis_um, 0.2, rtol=0.06)
-    assert scatter.dof == 1000
+    assert scatter.pairs == 1000
+    assert scatter.dof == pytest.approx(1000 * SCALE_EFFICIENCY)
 
 
 def test_a_gross_repeat_does_not_raise_the_floor() -> None:
@@ -42,8 +46,40 @@ def test_a_gross_repeat_does_not_raise_the_floor() -> None:
     values[7, 1] += 50
     scatter = repeat_scatter(values, everything(values), pairs(400))
     assert scatter is not None
-    assert scatter.outlier_visits == 1
     np.testing.assert_allclose(scatter.by_axis_um, 0.2, rtol=0.15)
+
+
+def test_gross_rows_in_visits_of_three_do_not_raise_the_floor() -> None:
+    """About its visit's mean, one gross row of three makes three."""
+    values = noisy(900)
+    values[::37] += np.random.default_rng(4).normal(0, 500, values[::37].shape)
+    scatter = repeat_scatter(values, everything(values), np.arange(900) // 3)
+    assert scatter is not None
+    np.testing.assert_allclose(scatter.by_axis_um, 0.2, rtol=0.1)
+
+
+def test_rows_that_are_not_used_are_no_repeats() -> None:
+    values = noisy(400)
+    values[200:260] *= 50
+    use = everything(values)
+    use[200:260] = False
+    scatter = repeat_scatter(values, use, pairs(400))
+    assert scatter is not None
+    assert scatter.pairs == 170
+    np.testing.assert_allclose(scatter.by_axis_um, 0.2, rtol=0.15)
+
+
+def test_all_pairs_have_the_degrees_of_freedom_of_their_visits() -> None:
+    visit = np.repeat([3, -1, 7, 8], [4, 5, 2, 100])
+    found = replicate_pairs(np.ones(len(visit), dtype=bool), visit)
+    assert found is not None
+    assert found.dof == pytest.approx(3 + 1 + 11)
+    assert (visit[found.first] == visit[found.second]).all()
+    assert len(found.weight) == 6 + 1 + 66
+    values = np.random.default_rng(0).normal(size=(len(visit), 1))
+    of_four, of_two = values[:4, 0], values[9:11, 0]
+    squares = (found.difference(values)[:, 0] ** 2 * found.weight)[:7].sum()
+    assert squares == pytest.approx(3 * of_four.var(ddof=1) + of_two.var(ddof=1))
 
 
 def test_visits_of_one_row_are_no_repeats() -> None:
@@ -62,7 +98,8 @@ def test_visits_of_different_size_are_pooled() -> None:
 
 
 def floor(values: Floats, visit: NDArray[np.int64] | None, declared: Floats = UNKNOWN, gauge: Floats = UNKNOWN):  # type: ignore[no-untyped-def]
-    return noise_floor(values, everything(values), visit, declared, gauge, (np.arange(len(values), dtype=float),))
+    digit, order = np.zeros(values.shape[1]), np.arange(len(values), dtype=float)
+    return noise_floor(values, everything(values), visit, declared, gauge, digit, (order,))
 
 
 def test_repeats_come_first_and_agree_with_a_right_declaration() -> None:
@@ -73,10 +110,42 @@ def test_repeats_come_first_and_agree_with_a_right_declaration() -> None:
 
 
 def test_repeats_overrule_a_wrong_declaration() -> None:
-    found = floor(noisy(400), pairs(400), np.full(3, 0.4))
+    found = floor(noisy(400), pairs(400), np.full(3, 0.3))
     assert found.source == "repeats"
     assert "contradict" in found.how
     assert found.um == pytest.approx(0.2, rel=0.08)
+    assert found.contradiction == ""  # less than a factor 2
+
+
+@pytest.mark.parametrize(("declared", "factor"), [(0.001, "times as much"), (3.0, "times less")])
+def test_repeats_far_from_the_declaration_get_a_remark(declared: float, factor: str) -> None:
+    found = floor(noisy(400), pairs(400), np.full(3, declared))
+    assert factor in found.contradiction
+    assert "sigma_um" in found.contradiction
+    assert found.um == pytest.approx(0.2, rel=0.08)
+
+
+def test_few_repeats_that_differ_by_chance_get_no_remark() -> None:
+    values = noisy(16)[:, :1]
+    assert floor(values, pairs(16), np.full(1, 0.3)).contradiction == ""
+
+
+def test_too_few_repeats_leave_the_declaration() -> None:
+    visit = np.where(np.arange(100) < 14, pairs(100), -1)
+    assert floor(noisy(100), visit, np.full(3, 0.3)).source == "declared"
+    undeclared = floor(noisy(100), visit)
+    assert undeclared.source == "estimate"
+    assert "7 pairs" in undeclared.how
+
+
+def test_repeats_that_are_alike_have_the_uncertainty_of_the_last_digit() -> None:
+    place = np.round(np.random.default_rng(5).uniform(-50, 50, (30, 1)), 1)
+    values, visit = np.repeat(place, 3, axis=0), np.repeat(np.arange(30), 3)
+    found = noise_floor(
+        values, everything(values), visit, UNKNOWN[:1], UNKNOWN[:1], last_digit_um(values), (np.arange(90.0),)
+    )
+    assert found.source == "repeats"
+    assert found.um == pytest.approx(0.1 / np.sqrt(12))
 
 
 def test_a_declaration_counts_with_the_gauges_noise_where_nothing_is_repeated() -> None:
@@ -89,7 +158,14 @@ def test_the_last_resort_is_an_estimate_and_called_so() -> None:
     slow = np.linspace(0, 30, 1000)[:, None]
     found = floor(noisy(1000) + slow, None)
     assert found.source == "estimate"
+    assert not found.known
     assert found.um == pytest.approx(0.2, rel=0.08)
+
+
+def test_an_estimate_is_not_moved_by_gross_rows() -> None:
+    values = noisy(1000)
+    values[::25] += 1e3 * np.random.default_rng(6).normal(size=(40, 3))
+    assert floor(values, None).um == pytest.approx(0.2, rel=0.1)
 
 
 def test_rows_beyond_all_noise_are_found_and_others_are_not() -> None:
@@ -103,6 +179,20 @@ def test_what_a_repeat_confirms_is_not_gross() -> None:
     values[10:12, 0] += 5  # both rows of one visit
     values[21, 0] += 5  # one row of another
     assert np.flatnonzero(outlier_rows(values, everything(values), pairs(400))).tolist() == [21]
+
+
+def test_a_gross_row_does_not_make_its_repeats_gross_nor_another_gross_row_right() -> None:
+    values = noisy(600)
+    visit = np.arange(600) // 3
+    values[[30, 33, 34]] += [[4000.0, 0, 0], [900.0, 0, 0], [-700.0, 0, 0]]
+    assert np.flatnonzero(outlier_rows(values, everything(values), visit)).tolist() == [30, 33, 34]
+
+
+def test_one_repeat_does_not_vouch_for_itself() -> None:
+    values = noisy(200)
+    values[10, 1] = 60.0
+    visit = np.where(np.arange(200) // 2 == 5, 5, -1)
+    assert np.flatnonzero(outlier_rows(values, everything(values), visit)).tolist() == [10]
 
 
 def test_rounded_values_have_no_gross_rows() -> None:

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from compd.comparison.registration import register
-from compd.comparison.robust import HUBER, huber_weights, robust_regression, robust_sigma
+from compd.comparison.robust import (
+    HUBER,
+    SCALE_EFFICIENCY,
+    huber_weights,
+    robust_regression,
+    robust_sigma,
+    trimmed_scale,
+)
 
 RNG = np.random.default_rng(12)
 
@@ -21,6 +29,44 @@ def test_sigma_of_values_that_a_display_rounds_to_zero() -> None:
     values = np.round(RNG.normal(0, 0.4, (1000, 1)))
     assert np.median(np.abs(values)) == 0
     assert robust_sigma(values)[0] > 0.4
+
+
+@pytest.mark.parametrize("count", [20, 200])
+def test_trimmed_scale_is_unbiased_for_normal_noise(count: int) -> None:
+    scales = trimmed_scale(np.random.default_rng(20).normal(0, 1, (count, 4000)))
+    assert scales.mean() == pytest.approx(1.0, abs=0.02)
+    # its variance tells the efficiency: 1 / (2 N) of a standard deviation
+    if count == 200:
+        assert 1 / (2 * count * scales.var()) == pytest.approx(SCALE_EFFICIENCY, rel=0.06)
+
+
+@pytest.mark.parametrize("count", [20, 200])
+@pytest.mark.parametrize("size", [10.0, 1e4])
+def test_trimmed_scale_stands_eight_per_cent_of_garbage(count: int, size: float) -> None:
+    rng = np.random.default_rng(21)
+    values = rng.normal(0, 1, (count, 2000))
+    gross = round(0.08 * count)
+    values[:gross] = rng.normal(0, size, (gross, 2000))
+    assert trimmed_scale(values).mean() == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("count", [20, 200])
+def test_trimmed_scale_of_rounded_noise_holds_the_rounding(count: int) -> None:
+    rng = np.random.default_rng(22)
+    step = 2.0
+    place = rng.uniform(0, step, (count, 2000))
+    first, second = (np.round((place + rng.normal(0, 1, place.shape)) / step) * step for _ in range(2))
+    right = np.sqrt(1 + step**2 / 12)
+    assert trimmed_scale((first - second) / np.sqrt(2)).mean() == pytest.approx(right, rel=0.03)
+    assert (np.median(np.abs(first - second), axis=0) == 0).mean() > 0.3  # what a median would say
+
+
+def test_trimmed_scale_by_weight_and_of_nothing_but_zeros() -> None:
+    values = RNG.normal(0, 1.0, (300, 2))
+    whole = np.concatenate([values, values[:100]])
+    weight = np.where(np.arange(300) < 100, 2.0, 1.0)
+    np.testing.assert_allclose(trimmed_scale(values, weight), trimmed_scale(whole))
+    assert trimmed_scale(np.zeros((50, 1))).tolist() == [0.0]
 
 
 def test_weights_hold_back_the_worst_coordinate() -> None:

@@ -396,7 +396,7 @@ def test_one_parameter_per_link() -> None:
     ("change", "said"),
     [
         ({"port": "engine"}, "port"),
-        ({"colour": "red"}, "Extra inputs"),
+        ({"colour": "red"}, "unknown key"),
         ({"parameters": {}}, "at least 1"),
         ({"parameters": {"k": {"unit": "um", "plausible": [1, -1], "source": "s"}}}, "range is empty"),
         ({"parameters": {"k": {"unit": "um", "plausible": [-1, math.inf], "source": "s"}}}, "finite"),

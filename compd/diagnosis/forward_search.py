@@ -1,0 +1,118 @@
+"""Forward search: the set of candidates that predicts rows left out best for its price, member by member."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from compd.diagnosis.subset_losses import Subset, SubsetLosses
+
+# Members of a set: more causes at once than this no recording can prove.
+MOST_MEMBERS = 7
+# The search goes on while the score falls, and for so many members more: two effects may gain only together.
+FURTHER = 2
+# Sets that are looked at, the best first, for one that is plausible.
+MOST_RANKED = 400
+
+
+def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
+    """The set with the best score of which every member is needed and every number plausible.
+
+    From `start` the candidate is added with which the set scores best; then each member is exchanged for any other
+    candidate as long as that gains; then the next is added. Of all sets that were seen the best one counts that is
+    plausible. (Forward stepwise selection with exchange: Miller, Subset Selection in Regression (2002), chapter 3;
+    the loss by cross-validation: Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009),
+    3.3.2 and 7.10.)
+
+    start : places of candidates to begin with; the empty set is always among those that are compared.
+    """
+    current = _best(losses, [tuple(start)]) or Subset((), losses.baseline)
+    best_score, stale = losses.score(current), 0
+    while len(current.members) < MOST_MEMBERS and stale < FURTHER:
+        grown = _best(losses, ((*current.members, k) for k in _others(losses, current.members)))
+        if grown is None:
+            break
+        current = _exchanged(losses, grown)
+        score = losses.score(current)
+        stale = 0 if score < best_score else stale + 1
+        best_score = min(best_score, score)
+    return best_acceptable(losses)
+
+
+def best_acceptable(losses: SubsetLosses) -> Subset:
+    """Of all sets that were evaluated the best plausible one, without the members that it does not need.
+
+    A description is no cause where effects do about as well: of sets that score alike, within an effect's price, the
+    one counts of which the effects alone score best.
+    """
+    best = Subset((), losses.baseline)
+    best_score = effects_score = float("inf")
+    ranked: dict[frozenset[str], Subset] = {}
+    for subset in losses.scored:
+        ranked.setdefault(frozenset(losses.name(k) for k in subset.members), subset)
+        if len(ranked) >= MOST_RANKED:
+            break
+    for subset in ranked.values():
+        if losses.score(subset) > best_score + losses.criteria.effect_price:
+            break
+        needed = _pruned(losses, subset) if losses.is_plausible(subset.members) else None
+        if needed is None or not losses.is_plausible(needed.members):
+            continue
+        best_score = min(best_score, losses.score(needed))
+        effects = Subset(*_without_descriptions(losses, needed))
+        if losses.score(effects) < effects_score:
+            best, effects_score = needed, losses.score(effects)
+        if not needed.members or not losses.describes:
+            break
+    return best
+
+
+def _without_descriptions(losses: SubsetLosses, subset: Subset) -> tuple[tuple[int, ...], float]:
+    effects = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
+    return effects, losses.loss(effects)
+
+
+def _exchanged(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set after exchanging members one by one while that lowers the score."""
+    gained = True
+    while gained:
+        gained = False
+        for member in subset.members:
+            rest = tuple(k for k in subset.members if k != member)
+            other = _best(losses, ((*rest, k) for k in _others(losses, rest) if k != member))
+            if other is not None and losses.score(other) < losses.score(subset) - 1e-9:
+                subset, gained = other, True
+                break
+    return subset
+
+
+def _pruned(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set without the members of which the gain is not worth their price or may be chance, the weakest first."""
+    criteria = losses.criteria
+    while subset.members:
+        weakest: tuple[float, Subset] | None = None
+        for member in subset.members:
+            rest = Subset(*_rest(losses, subset, member))
+            worth = losses.log_loss(rest.cv_loss) - losses.log_loss(subset.cv_loss) - losses.price(member)
+            gain, std = losses.gain(subset.members, rest.members)
+            if (worth < 0 or gain < criteria.least_sigmas * std) and (weakest is None or worth < weakest[0]):
+                weakest = worth, rest
+        if weakest is None:
+            break
+        subset = weakest[1]
+    return subset
+
+
+def _rest(losses: SubsetLosses, subset: Subset, member: int) -> tuple[tuple[int, ...], float]:
+    rest = tuple(k for k in subset.members if k != member)
+    return rest, losses.loss(rest)
+
+
+def _others(losses: SubsetLosses, members: Collection[int]) -> list[int]:
+    """Candidates that can be added: no two choices of one effect's constants."""
+    names = {losses.name(k) for k in members}
+    return [k for k in range(len(losses.candidates)) if losses.name(k) not in names]
+
+
+def _best(losses: SubsetLosses, sets: Iterable[tuple[int, ...]]) -> Subset | None:
+    subsets = losses.evaluate(sets)
+    return min(subsets, key=losses.score) if subsets else None

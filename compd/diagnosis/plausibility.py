@@ -1,0 +1,42 @@
+"""Which fitted parameters are plausible, and which the rows determine at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.findings import ParameterEstimate
+from compd.model.effect import Effect
+
+
+def estimate_parameters(
+    effect: Effect, links: int, theta: FloatArray, covariance: FloatArray, criteria: Criteria
+) -> list[ParameterEstimate]:
+    """The parameters theta (P,) of an effect in the units that people read, from their covariance (P, P).
+
+    A standard error is nan where the covariance has no row for the parameter.
+    """
+    estimates = []
+    for k, column in enumerate(effect.columns(links)):
+        std = float(np.sqrt(covariance[k, k])) if k < len(covariance) else float("nan")
+        value, shown_std = column.parameter.from_theta(float(theta[k]), std)
+        plausible = is_plausible(column.parameter.theta_range, float(theta[k]), std, criteria)
+        estimates.append(ParameterEstimate(column.name, value, shown_std, column.parameter.unit, plausible))
+    return estimates
+
+
+def is_plausible(limits: tuple[float, float], theta: float, std: float, criteria: Criteria) -> bool:
+    """Whether a fitted parameter may be inside its range (low, high), given its standard error.
+
+    It may be outside by `range_sigmas` standard errors. A cause may be weaker than is usual: every range reaches to
+    nought. An unknown standard error (nan) excuses nothing.
+    """
+    low, high = min(limits[0], 0.0), max(limits[1], 0.0)
+    margin = criteria.range_sigmas * float(np.nan_to_num(std))
+    return bool(low - margin <= theta <= high + margin)
+
+
+def is_undetermined(limits: FloatArray, std: FloatArray) -> bool:
+    """Whether no parameter (P,) of an effect has a standard error below the width of its range (P, 2)."""
+    return bool((~(std < limits[:, 1] - limits[:, 0])).all())

@@ -1,0 +1,81 @@
+"""The columns that a formula may name: what every machine has, what each link has, and every measured quantity."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.errors import Problem
+from compd.model.effect import Port
+from compd.model.observations import Observations
+
+PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
+READING_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
+
+# Columns that every machine has: at ports with one value per link, at ports of readings, and at all ports.
+OF_LINK: Mapping[str, str] = {
+    "scale_mm": "reading of the link's scale since machine zero, mm",
+    "link_mm": "length of the link, mm",
+    "direction": "1 or -1 as the link last moved, 0 where that is not known",
+    "velocity_mm_per_s": "speed of the link, mm/s",
+    "axial_force_N": "axial force in the link, N, tension positive; needs the force on the tip",
+    "temperature_link": "temperature of the link, degC; any other quantity `NAME_link_<i>_UNIT` likewise as "
+    "`NAME_link_UNIT`",
+}
+OF_READING: Mapping[str, str] = {"reading_mm": "the comparator's or the scale's own reading since machine zero, mm"}
+ANYWHERE: Mapping[str, str] = {
+    "time_s": "time, s",
+    "tip_x_mm": "x of the tip in {M}, mm",
+    "tip_y_mm": "y of the tip in {M}, mm",
+    "tip_z_mm": "z of the tip in {M}, mm",
+}
+_NEEDS_OF_LINK: Mapping[str, tuple[str, ...]] = {
+    "direction": ("direction",),
+    "velocity_mm_per_s": ("motion",),
+    "axial_force_N": ("force",),
+    "temperature_link": ("temperature_link_{link}_degC",),
+    "scale_mm": (),
+    "link_mm": (),
+}
+_PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
+_QUANTITY = re.compile(r"^[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+$")
+
+
+def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
+    """What has to be measured for a column of a formula at this port, or why there is no such column."""
+    if name in ANYWHERE:
+        return ("time",) if name == "time_s" else ()
+    if name in OF_READING and port in READING_PORTS:
+        return ()
+    per_link = name in OF_LINK or _PER_LINK_COLUMN.match(name) is not None
+    if per_link and port not in PER_LINK:
+        return Problem(where="", what=f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))
+    if per_link:
+        return _NEEDS_OF_LINK.get(name, (name.replace("_link_", "_link_{link}_", 1),))
+    if not _QUANTITY.match(name):
+        columns = ", ".join((*ANYWHERE, *(OF_LINK if port in PER_LINK else ())))
+        return Problem(
+            where="", what="is no column", allowed=f"a measured quantity with its unit (humidity_pct), {columns}"
+        )
+    return (name,)
+
+
+def column_values(rows: Observations, name: str, port: Port) -> FloatArray:
+    """The values of a column: (N, places of the port), or (N, 1) where all places have the same."""
+    if name == "reading_mm":
+        return {"scale": rows.scale_mm, "joint": rows.joint_mm, "frame": rows.frame_mm}[port]
+    if name in ("scale_mm", "link_mm", "direction", "velocity_mm_per_s", "axial_force_N"):
+        return np.asarray(getattr(rows, name))
+    if name == "time_s":
+        return rows.time_s[:, None]
+    if name in ANYWHERE:
+        return rows.tip_M_mm[:, ["xyz".index(name[4])]]
+    if name == "temperature_link":
+        name = "temperature_link_degC"
+    if _PER_LINK_COLUMN.match(name):
+        names = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(rows.links)]
+        return np.stack([rows.quantity(link_name) for link_name in names], axis=1)
+    return rows.quantity(name)[:, None]
