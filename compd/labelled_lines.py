@@ -2,7 +2,7 @@
 
 Example::
 
-    texts = [LabelledText("Found", ("backlash: play in the screw",), names=("backlash",)), LabelledText("Next", ("add it",))]
+    texts = [LabelledText("Found", ("backlash: play in the screw",)), LabelledText("Next", ("add it",))]
     fit_lines(texts, most=12, width=80)  # ["Found: backlash: play in the screw", "Next:  add it"]
 """
 

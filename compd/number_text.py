@@ -45,12 +45,12 @@ def estimate_text(value: float, std: float, unit: str = "") -> str:
     return f"{value:.{decimals}f} +- {std:.{decimals}f}{_behind(unit)}"
 
 
-def estimates_text(values: Sequence[float], std: float, unit: str = "") -> str:
-    """Several numbers with one standard error: "0.884, 1.103, 0.795 (+- 0.020) um"."""
+def estimates_text(values: Sequence[float], std: float, unit: str = "", between: str = ", ") -> str:
+    """Several numbers with one standard error: "0.884, 1.103, 0.795 (+- 0.020) um".  between : what stands there."""
     if not math.isfinite(std) or not SMALLEST <= std < LARGEST:
-        return ", ".join(_digits(value, DIGITS + 1) for value in values) + _behind(unit)
+        return between.join(_digits(value, DIGITS + 1) for value in values) + _behind(unit)
     decimals = max(0, DIGITS - 1 - math.floor(math.log10(std)))
-    shown = ", ".join(f"{value:.{decimals}f}" for value in values)
+    shown = between.join(f"{value:.{decimals}f}" for value in values)
     return f"{shown} (+- {std:.{decimals}f}){_behind(unit)}"
 
 

@@ -51,7 +51,9 @@ class ErrorFall:
 
     def share_text(self, left: float) -> str:
         """ "73 % of the squared error above noise"."""
-        return f"{percent_text(self.share_of(left))} of the squared error" + (" above noise" if self.noise_known else "")
+        return f"{percent_text(self.share_of(left))} of the squared error" + (
+            " above noise" if self.noise_known else ""
+        )
 
     def text(self, left: float) -> str:
         """ "105 -> 55 um", from the error as it was."""

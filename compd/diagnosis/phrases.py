@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compd.comparison.compare import Comparison
-from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows
+from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
 from compd.model.effect import Effect
-from compd.model.formula.declaration import FormulaDeclaration
+from compd.model.formula.keys import FormulaDeclaration
+from compd.model.library import BUNDLED
 from compd.number_text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
 
 if TYPE_CHECKING:
@@ -19,13 +20,17 @@ if TYPE_CHECKING:
 
 # What a formula says of its physics where the person who wrote it said nothing.
 _NO_PHYSICS = FormulaDeclaration.model_fields["physics"].default
+_BUNDLED = frozenset(effect.id for effect in BUNDLED)
 # Effects that people know by another name than their id.
 _PLAIN_NAMES = {"reference_registration": "the instrument's frame"}
 # A parameter that has more values than this is said by its smallest and its largest.
 MOST_VALUES = 3
+# Rivals of one effect that are named.
+MOST_RIVALS = 3
 # Single gross rows that are named.
 MOST_ROWS = 6
 
+IMPLAUSIBLE = "IMPLAUSIBLE"
 HOW_TO_KNOW_NOISE = "measure one point twice (two rows with the same number in a `visit` column)"
 
 
@@ -33,16 +38,16 @@ def physics_clause(effect: Effect) -> str:
     """The first clause of what an effect does: "balls flatten where they touch"; of a formula without words, itself."""
     if effect.physics == _NO_PHYSICS:
         return effect.equation
-    clause = re.split(r"[,;:.](?:\s|$)", effect.physics.strip(), maxsplit=1)[0]
+    clause = re.split(r"[;:.](?:\s|$)|,\s(?!but\b)", effect.physics.strip(), maxsplit=1)[0]
     return clause if clause[1:2].isupper() else clause[:1].lower() + clause[1:]
 
 
-def parameter_texts(step: DiagnosisStep, links: int) -> list[str]:
-    """Each parameter with its standard error: "a = 1.113 +- 0.021 ppm/K"; one text for what there is one per link.
+def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
+    """Name -> number with its standard error: "a" -> "1.113 +- 0.021 ppm/K"; one entry for what there is one per link.
 
-    An implausible number says so beside the range that its effect calls plausible.
+    An implausible number says so beside the range that its effect calls plausible; a searched constant, that it was.
     """
-    texts = []
+    texts = {}
     columns = step.effect.columns(links)
     for parameter in step.effect.parameters:
         values = [
@@ -50,18 +55,20 @@ def parameter_texts(step: DiagnosisStep, links: int) -> list[str]:
         ]
         if not values:
             continue
-        numbers = sorted(value.value for value in values)
-        std = max(value.std for value in values)
+        numbers, std = [value.value for value in values], max(value.std for value in values)
         name = values[0].name if len(values) == 1 else f"{values[0].name} to {values[-1].name}"
         if len(values) == 1:
             text = estimate_text(numbers[0], std, values[0].unit)
         elif len(values) <= MOST_VALUES:
-            text = estimates_text([value.value for value in values], std, values[0].unit)
+            text = estimates_text(numbers, std, values[0].unit)
         else:
-            text = "between " + estimates_text([numbers[0], numbers[-1]], std, values[0].unit)
+            text = estimates_text([min(numbers), max(numbers)], std, values[0].unit, " to ")
         if not all(value.plausible for value in values):
-            text += f", IMPLAUSIBLE: {parameter.low:g} to {parameter.high:g} is usual"
-        texts.append(f"{name} = {text}")
+            text += f", {IMPLAUSIBLE}: {parameter.low:g} to {parameter.high:g} is usual"
+        texts[name] = text
+    units = {constant.name: constant.unit for constant in step.effect.constants}
+    for name, value in step.fitted.constants.items():
+        texts[name] = f"{number_text(value, units.get(name, ''), 3)}, searched"
     return texts
 
 
@@ -70,7 +77,11 @@ def chance_clause(p_values: Sequence[float]) -> str:
     known = [p_value for p_value in p_values if p_value > 0]
     if not known:
         return ""
-    return f"by chance {chance_text(max(known))}" if len(known) == 1 else f"each by chance {chance_text(max(known))} at most"
+    return (
+        f"by chance {chance_text(max(known))}"
+        if len(known) == 1
+        else f"each by chance {chance_text(max(known))} at most"
+    )
 
 
 def followed_text(finding: EmpiricalFinding) -> str:
@@ -81,7 +92,9 @@ def followed_text(finding: EmpiricalFinding) -> str:
 
 def rivals_text(step: DiagnosisStep) -> str:
     """An effect and those that do as well in its place: "link_elasticity or joint_contact (99 % alike)"."""
-    names = join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or")
+    rivals = [rival.name for rival in step.rivals[:MOST_RIVALS]]
+    others = [f"{len(step.rivals) - MOST_RIVALS} more"] if len(step.rivals) > MOST_RIVALS else []
+    names = join_words([step.effect.id, *rivals, *others], "or")
     return f"{names} ({percent_text(max(rival.cosine for rival in step.rivals))} alike)"
 
 
@@ -124,18 +137,29 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str) -> list[str
     recording = comparison.aligned.recording
     size = np.abs(comparison.residual_um[np.isin(recording.row, gross.rows)])
     largest = float(np.nanmax(size)) if np.isfinite(size).any() else float("nan")
-    off = f", off by up to {number_text(largest, unit)}" if np.isfinite(largest) else ""
+    off = f" (up to {number_text(largest, unit)} off)" if np.isfinite(largest) else ""
     in_runs = {row for first, last in gross.runs for row in gross.rows if first <= row <= last}
-    single = [row for row in gross.rows if row not in in_runs]
-    texts = [f"{len(gross.rows)} of {recording.rows} rows do not count{off}"]
-    if gross.runs:
-        runs = join_words([f"{first} to {last}" for first, last in gross.runs])
-        texts.append(f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)")
-    if single:
-        rows = [str(row) for row in single[:MOST_ROWS]]
-        others = [f"{len(single) - MOST_ROWS} more"] if len(single) > MOST_ROWS else []
-        texts.append(f"single bad readings in row{'s' if len(single) > 1 else ''} {join_words([*rows, *others])}")
-    return texts
+    single = [str(row) for row in gross.rows if row not in in_runs]
+    others = [f"{len(single) - MOST_ROWS} more"] if len(single) > MOST_ROWS else []
+    rows = join_words([*single[:MOST_ROWS], *others])
+    count = f"{len(gross.rows)} of {recording.rows} rows do not count{off}"
+    if not gross.runs:
+        return [f"{count}: {rows}"]
+    runs = join_words([f"{first} to {last}" for first, last in gross.runs])
+    texts = [count, f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)"]
+    return [*texts, f"single bad readings: {rows}"] if single else texts
+
+
+def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:
+    """Effects that could not be tried and that concern this machine, first those that may be behind what was found.
+
+    What acts inside a machine that compd knows is nothing to one with a model of its own.
+    """
+    external = diagnosis.before.aligned.model is None
+    concerning = [
+        effect for effect in diagnosis.untested if effect.likely or not (external and effect.effect in _BUNDLED)
+    ]
+    return sorted(concerning, key=lambda effect: not effect.likely)
 
 
 def session_count(comparison: Comparison) -> int:

@@ -6,11 +6,10 @@ error down to the noise; above it an effect is a share of the error; what a resi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from compd.diagnosis.error_fall import error_fall
-from compd.diagnosis.phrases import followed_text, rivals_text
+from compd.diagnosis.phrases import change_text, followed_text, rivals_text
 from compd.number_text import join_words, number_text
 
 if TYPE_CHECKING:
@@ -26,32 +25,34 @@ def summary(diagnosis: Diagnosis) -> str:
     noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
     names = join_words([step.effect.id for step in diagnosis.steps])
     match diagnosis.verdict:
-        case "adequate":
+        case "adequate" if fall.noise_known:
             but = " but for a constant" if diagnosis.constant else ""
-            return f"Nothing is missing{but}: the error is {before}, {noise}."
+            own = number_text(fall.noise, fall.unit)
+            return f"Nothing is missing{but}: the error of {before} is the measurement's own noise ({own})."
         case "identified":
             them = "it" if len(diagnosis.steps) == 1 else "them"
             return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."
         case "ambiguous":
             pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
-            return (
-                f"With {names} the error of {before} falls to {after}, {noise}. But these rows cannot tell apart: {pairs}."
-            )
-        case "not_testable":
+            falls = f"With {names} the error of {before} falls to {after}, {noise}."
+            return f"{falls} But these rows cannot tell apart: {pairs}."
+        case "adequate" | "not_testable":
             return f"The error is {before}, {noise}. No effect can be tested on this recording."
-    first = next((finding for finding in diagnosis.depends_on if not finding.effect), None)
-    follows = "" if first is None else followed_text(first)
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"
         rest = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
         share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {rest}."
-        return share + (f" The rest follows {follows}." if follows else "")
-    if first is None:
-        return f"No effect that was tried explains the error of {before}, {noise}. It follows nothing that was measured."
-    left = number_text(first.heldout_rms_um, fall.unit)
-    return (
-        f"No effect that was tried explains the error of {before}. It follows {follows}, a description and no cause, "
-        f"which leaves {left}, {noise}."
-    )
+        return " ".join([share, *_rest(diagnosis, "The rest")])
+    unexplained = f"No effect that was tried explains the error of {before}, {noise}."
+    return " ".join([unexplained, *(_rest(diagnosis, "It") or ["It follows nothing that was measured."])])
 
 
+def _rest(diagnosis: Diagnosis, what: str) -> list[str]:
+    """What follows or changes, as a sentence; empty where nothing does.  what : its subject."""
+    if not diagnosis.depends_on:
+        return []
+    fall, finding = error_fall(diagnosis), diagnosis.depends_on[0]
+    left = f"to describe that leaves {number_text(finding.heldout_rms_um, fall.unit)}, and names no cause"
+    if finding.effect:
+        return [f"Something changed: {change_text(finding, diagnosis)}; {left}."]
+    return [f"{what} follows {followed_text(finding)}: {left}."]

@@ -9,6 +9,7 @@ from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.phrases import (
     HOW_TO_KNOW_NOISE,
+    IMPLAUSIBLE,
     chance_clause,
     change_text,
     constant_text,
@@ -19,10 +20,11 @@ from compd.diagnosis.phrases import (
     physics_clause,
     rivals_text,
     session_count,
+    untested_here,
 )
 from compd.diagnosis.summary import CANNOT_KNOW
 from compd.labelled_lines import LabelledText, fit_lines
-from compd.number_text import fall_text, join_words, number_text
+from compd.number_text import fall_text, join_words, number_text, percent_text
 
 if TYPE_CHECKING:
     from compd.diagnosis.verdict import Diagnosis
@@ -34,13 +36,15 @@ WIDTH = 80
 MOST_NAMED = 3
 # A mean square up to so many times that of the noise is called noise.
 NOISE_RATIO = 1.25
-ANOTHER_DAY = "seen in one session only: measure on another day"
+NO_RIVAL = "no other effect that was tried does as well"
+# With so many other texts the one is left out that says nothing.
+CROWDED = 7
 
 
 def summary_lines(diagnosis: Diagnosis) -> list[str]:
     """The verdict in at most 12 lines of at most 80 columns.
 
-    A heading, then lines with labels; a label that has nothing to say is left out. What does not fit is in the evidence.
+    A heading, then lines with labels; a label that has nothing to say is left out. What has no room is in the evidence.
     """
     fall = error_fall(diagnosis)
     found = tuple(_found(diagnosis, fall))
@@ -57,6 +61,8 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Next", tuple(_next(diagnosis, fall))),
     ]
     others = [text for text in others if text.clauses]
+    if len(others) >= CROWDED:
+        others = [text for text in others if text.clauses != (NO_RIVAL,)]
     room = MOST_LINES - 1 - len(others)
     label = "Shares" if diagnosis.verdict in ("partial", "unexplained") else "Found"
     texts = [LabelledText(label, found, names, least=min(len(found), MOST_NAMED, room))] if found else []
@@ -67,7 +73,7 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     """The verdict's word and what it means here, on one line; effects are counted where their names are too long."""
     ids = [step.effect.id for step in diagnosis.steps]
     verb, be = ("explains", "is") if len(ids) == 1 else ("explain", "are")
-    before = number_text(fall.before, fall.unit)
+    before, share = number_text(fall.before, fall.unit), percent_text(fall.share_of(fall.after))
     match diagnosis.verdict:
         case "adequate" if diagnosis.constant is not None:
             text = "nothing is missing but a constant; what varies is noise"
@@ -76,21 +82,23 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
         case "ambiguous":
-            ids = [join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps]
+            ids = [
+                join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps
+            ]
             text = f"{{}} {be} missing; these rows cannot tell"
         case "partial" if fall.noise_known:
-            text = f"{{}} {verb} a part; something else acts as well"
+            text = f"{{}} {verb} {share}; something else acts as well"
         case "partial":
-            text = f"{{}} {verb} a part; the noise is not known"
+            text = f"{{}} {verb} {share}; the noise is not known"
         case "not_testable":
             text = "no effect can be tested; nothing that drives one was varied"
         case _ if ids:
-            text = f"{{}} {verb} a part; the rest has no known cause"
+            text = f"{{}} {verb} {share}; the rest has no known cause"
         case _:
             text = f"no effect that was tried explains the error of {before}"
     count = f"{len(ids)} effects" if len(ids) > 1 else "one effect"
     if diagnosis.verdict == "ambiguous":
-        count += " or a rival"
+        count = f"{count} or {'rivals' if len(ids) > 1 else 'a rival'}"
     headings = [f"{diagnosis.verdict}: {text.format(names)}" for names in (join_words(ids), count)]
     return headings[len(headings[0]) > WIDTH]
 
@@ -128,7 +136,8 @@ def _follows(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 
 
 def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
-    return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}"] if diagnosis.steps else []
+    rows = ", rows left out" if fall.left_out else ""
+    return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}{rows}"] if diagnosis.steps else []
 
 
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
@@ -136,20 +145,17 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     described = None if diagnosis.steps else _description(diagnosis)
     contradiction = getattr(diagnosis.before.floor, "contradiction", "")
     remarks = [contradiction] if contradiction else []
-    if described is None:
-        left, rows = fall.after, " on rows left out" if fall.left_out else ""
-    else:
-        left, rows = described.heldout_rms_um, " with it"
-    text = f"{number_text(left, fall.unit)}{rows}"
+    left = fall.after if described is None else described.heldout_rms_um
+    text = number_text(left, fall.unit) + (" with it" if described else "")
     if not fall.noise_known:
         return [f"{text}; {CANNOT_KNOW}", *remarks]
     if diagnosis.verdict in ("adequate", "identified", "ambiguous") or left**2 <= NOISE_RATIO * fall.noise**2:
         meaning = "only noise is left"
     elif diagnosis.steps or described:
-        meaning = "something else acts too"
+        meaning = "something else acts as well"
     else:
         meaning = "these rows do not show what acts"
-    return [f"{text}, noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
+    return [f"{text}; noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
 
 
 def _sure(diagnosis: Diagnosis) -> list[str]:
@@ -157,13 +163,20 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     links = diagnosis.after.aligned.rows.links
     steps, finding = diagnosis.steps, _description(diagnosis)
     numbers = [
-        f"{step.effect.id} {text}" if len(steps) > 1 else text for step in steps for text in parameter_texts(step, links)
+        f"{step.effect.id} {name} = {text}" if len(steps) > 1 else f"{name} = {text}"
+        for step in steps
+        for name, text in parameter_texts(step, links).items()
     ]
-    implausible = [text for text in numbers if "IMPLAUSIBLE" in text]
+    implausible = [text for text in numbers if IMPLAUSIBLE in text]
     names = _of_one_session(diagnosis)
     session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
     chance = chance_clause([step.p_value for step in steps] or ([] if finding is None else [finding.p_value]))
-    return [*implausible, *session, *([chance] if chance else []), *(text for text in numbers if text not in implausible)]
+    return [
+        *implausible,
+        *session,
+        *([chance] if chance else []),
+        *(text for text in numbers if text not in implausible),
+    ]
 
 
 def _of_one_session(diagnosis: Diagnosis) -> list[str]:
@@ -182,13 +195,14 @@ def _of_one_session(diagnosis: Diagnosis) -> list[str]:
 def _or_else(diagnosis: Diagnosis) -> list[str]:
     """Rivals, then effects that could not be tried and are likely; where there are none, that there are none."""
     clauses = [f"{rivals_text(step)}: these rows cannot tell" for step in diagnosis.steps if step.rivals]
-    likely = [effect for effect in diagnosis.untested if effect.likely]
+    untested = untested_here(diagnosis)
+    likely = [effect for effect in untested if effect.likely]
     clauses += [f"{effect.effect} may be behind it and could not be tried: {effect.why}" for effect in likely]
     if not clauses and diagnosis.steps:
-        clauses.append("no other effect that was tried does as well")
-    others = [effect.effect for effect in diagnosis.untested if not effect.likely]
+        clauses.append(NO_RIVAL)
+    others = [effect.effect for effect in untested if not effect.likely]
     if diagnosis.verdict == "not_testable":
-        clauses += [f"{effect.effect} {effect.why}" for effect in diagnosis.untested if not effect.likely][:MOST_NAMED]
+        clauses += [f"{effect.effect} {effect.why}" for effect in untested if not effect.likely][:MOST_NAMED]
     elif others:
         shown = others[:MOST_NAMED] + ([f"{len(others) - MOST_NAMED} more"] if len(others) > MOST_NAMED else [])
         clauses.append(f"could not be tried: {join_words(shown)}")
@@ -203,10 +217,15 @@ def _next(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """What to do: first what would change the verdict, then what may be done with it as it is."""
     ids = [step.effect.id for step in diagnosis.steps]
     recording = diagnosis.before.aligned.recording.path.name
-    measurements = [str(row["measure"]) for row in diagnosis.next_measurement if "measure" in row]
+    described = _description(diagnosis)
+    to_vary = [str(row["measure"]) for row in diagnosis.next_measurement if "measure" in row][:1]
+    if described is not None and described.covariate.startswith("time"):
+        to_vary = ["measure again on another day, in another order: time alone is no driver"]
     changes = [finding.time_s for finding in diagnosis.depends_on if finding.effect]
     clauses = [] if fall.noise_known else [HOW_TO_KNOW_NOISE]
-    clauses += [f"find out what happened at {time_s:.0f} s: the machine was another one before" for time_s in changes[:1]]
+    clauses += [
+        f"find out what happened at {time_s:.0f} s: the machine was another one before" for time_s in changes[:1]
+    ]
     match diagnosis.verdict:
         case "identified":
             clauses += ["measure on another day first"] if _of_one_session(diagnosis) else []
@@ -218,7 +237,7 @@ def _next(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
             clauses += _how_to_tell(diagnosis)
         case "partial":
             clauses += _how_to_tell(diagnosis)
-            clauses += measurements or ["record what may drive the rest: temperatures, loads, directions"]
+            clauses += to_vary or ["record what may drive the rest: temperatures, loads, directions"]
             doubtful = [step.effect.id for step in diagnosis.steps if not all(n.plausible for n in step.parameters)]
             if doubtful:
                 clauses.append(f"do not add {join_words(doubtful)}: something else looks like it")
@@ -229,11 +248,11 @@ def _next(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
                 clauses.append(f"to tell where the constant is from: {diagnosis.constant.separated_by}")
             clauses.append("nothing to mend or to add; other loads, temperatures or speeds may show more")
         case "not_testable":
-            clauses += measurements or ["vary one thing after the other: place, direction, load, temperature"]
+            clauses += to_vary or ["vary one thing after the other: place, direction, load, temperature"]
         case _:
             clauses.append("change nothing on the machine yet")
-            clauses += measurements or ["record what may drive it: temperatures, loads, directions, humidity"]
-            clauses += ["until the cause is known, the formulas below lower the error"] if _description(diagnosis) else []
+            clauses += to_vary or ["record what may drive it: temperatures, loads, directions, humidity"]
+            clauses += ["until the cause is known, the formulas below lower the error"] if described else []
     return clauses
 
 

@@ -48,7 +48,10 @@ def external_recording(axes: str = "x", session: bool = False, quantities: tuple
     for axis in axes:
         columns[f"model_{axis}_mm"] = np.zeros(ROWS * 2)
         columns[f"reference_{axis}_mm"] = rng.normal(0, 1e-3, ROWS * 2)
-    lines = [",".join(columns), *(",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True))]
+    lines = [
+        ",".join(columns),
+        *(",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True)),
+    ]
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "stage.csv"
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
