@@ -15,7 +15,7 @@ from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_needs import unmet_needs
 from compd.units import UM_PER_MM
 
-Kind: TypeAlias = Literal["effect", "constant", "description", "change"]
+Kind: TypeAlias = Literal["effect", "proxy", "constant", "description", "change"]
 
 # Share of the rows in which an effect's quantities may be empty: only rows in which every candidate is known are used,
 # so that an effect that is known in fewer would cost all others those rows.
@@ -36,7 +36,7 @@ class Candidate:
     limits : (P, 2) plausible range of each parameter; infinite where nothing is known of it.
     searched_parameters : for how many parameters the search for its nonlinear constants counts.
     constants : values of its nonlinear constants.
-    kind : "effect" names a cause; "constant", "description" and "change" do not.
+    kind : "effect" names a cause; "proxy" stands for one that was not measured; the others name none.
     """
 
     name: str
@@ -65,10 +65,11 @@ class Candidate:
 
 @dataclass(frozen=True)
 class CandidatePool:
-    """Candidates, and the effects that this recording cannot test: id -> why."""
+    """Candidates, and the effects that this recording cannot test: id -> why; some of them with a proxy."""
 
     candidates: tuple[Candidate, ...]
     untestable: Mapping[str, str] = field(default_factory=dict)
+    proxies: tuple[Candidate, ...] = ()
 
 
 def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> CandidatePool:

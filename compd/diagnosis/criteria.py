@@ -70,7 +70,7 @@ class Criteria:
     full_weight_sigmas: float = threshold(
         2.0,
         unit="robust standard deviations of the residual",
-        meaning="up to this, rms over the coordinates, a row counts in full; beyond it its weight falls as 1 / distance",
+        meaning="up to this, rms over the coordinates, a row counts in full; beyond it its weight falls as 1 / d",
         reason="Huber, Robust Statistics (1981), chapter 7: 98 % efficient for a normal error of one coordinate",
     )
     range_sigmas: float = threshold(

@@ -17,13 +17,14 @@ from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.constant import describe_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.explanation import Explanation, Progress, explain
+from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, UntestedEffect
 from compd.diagnosis.gross_rows import gross_rows
 from compd.diagnosis.measurement_programmes import recorded_limits
 from compd.diagnosis.next_measurement import plan_measurement
 from compd.diagnosis.plausibility import estimate_parameters
 from compd.diagnosis.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.proxies import proxy_candidates
 from compd.diagnosis.rivals import find_rivals
 from compd.diagnosis.significance import OrthogonalComplement, p_values
 from compd.diagnosis.subset_losses import SubsetLosses
@@ -69,13 +70,14 @@ def diagnose(
     progress("comparing the model with the recording")
     before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
-    pool = library_pool(aligned, effects, [effect.effect.id for effect in fitted])
+    present = [effect.effect.id for effect in fitted]
+    pool = replace(library_pool(aligned, effects, present), proxies=proxy_candidates(aligned, effects, present))
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
     weights = problem.weigh_beside([explanation.losses.candidates[k] for k in explanation.members])
     problem = build_problem(before, pool, criteria, weights)
-    explanation = explain(problem, progress)
+    explanation = explain_again(problem, explanation, progress)
     progress("fitting on the real forward model")
     return _diagnosis(problem, explanation, covariance)
 
@@ -109,7 +111,7 @@ def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: 
         describe_remainder(problem, explanation) if above else (),
         constant=describe_constant(problem, explanation, named),
         gross=gross_rows(problem.gross, aligned.recording.row),
-        untested=_untested(problem),
+        untested=_untested(problem, explanation, steps),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
     )
@@ -126,7 +128,7 @@ def _verdict(
 
     Where the noise is not known, whether something is missing can be told only by finding it.
     """
-    found = bool(explanation.descriptions or explanation.changes)
+    found = bool(explanation.described)
     if problem.floor_known and not found and explanation.loss <= problem.criteria.most_at_floor:
         if not steps:
             return "adequate"
@@ -187,8 +189,14 @@ def _p_values(losses: SubsetLosses, effects: tuple[int, ...]) -> dict[str, float
     return dict(zip(names, p_values(families, y, noise, losses.data.block).tolist(), strict=True))
 
 
-def _untested(problem: DiagnosisProblem) -> tuple[UntestedEffect, ...]:
-    return tuple(UntestedEffect(name, why) for name, why in problem.pool.untestable.items())
+def _untested(
+    problem: DiagnosisProblem, explanation: Explanation, steps: Sequence[DiagnosisStep]
+) -> tuple[UntestedEffect, ...]:
+    """Effects that cannot be tried, first those that may be what was found: by a proxy, or as a rival."""
+    likely = {explanation.losses.candidates[k].effect.id for k in explanation.proxies}
+    likely |= {rival.name for step in steps for rival in step.rivals}
+    untested = [UntestedEffect(name, why, name in likely) for name, why in problem.pool.untestable.items()]
+    return tuple(sorted(untested, key=lambda effect: not effect.likely))
 
 
 def _next_measurement(problem: DiagnosisProblem, losses: SubsetLosses, diagnosis: Diagnosis) -> list[dict[str, object]]:

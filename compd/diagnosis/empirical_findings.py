@@ -14,6 +14,7 @@ from compd.diagnosis.empirical_search import EmpiricalFit
 from compd.diagnosis.explanation import Explanation
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.problem import DiagnosisProblem
+from compd.diagnosis.proxies import ProxyCandidate
 from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.significance import OrthogonalComplement, p_values
 
@@ -29,7 +30,7 @@ def describe_remainder(problem: DiagnosisProblem, explanation: Explanation) -> t
     alone, where it lowers the log loss by its price and is not chance.
     """
     remainder = _Remainder(problem, explanation)
-    findings = [remainder.change(k) for k in explanation.changes]
+    findings = [remainder.member(k) for k in (*explanation.proxies, *explanation.changes)]
     if explanation.descriptions:
         chosen = [explanation.fit_of(k) for k in explanation.descriptions]
         findings.insert(0, remainder.finding(chosen, remainder.p_values([chosen])[0], remainder.loss_with(chosen)))
@@ -81,11 +82,10 @@ class _Remainder:
         values: list[float] = p_values([[family] for family in columns], y, noise, self._data.block).tolist()
         return values
 
-    def change(self, k: int) -> EmpiricalFinding:
-        """An effect that changes at a moment, as a finding."""
+    def member(self, k: int) -> EmpiricalFinding:
+        """An effect that changes at a moment, or that another quantity stands for, as a finding."""
         losses = self._explanation.losses
         candidate = losses.candidates[k]
-        assert isinstance(candidate, ChangeCandidate)
         theta, _ = losses.estimates(self._explanation.members)[self._explanation.members.index(k)]
         names = [column.name for column in candidate.effect.columns(self._problem.aligned.rows.links)]
         rest = [member for member in self._explanation.members if member != k]
@@ -96,8 +96,8 @@ class _Remainder:
         p_value = float(p_values([[own]], y, OrthogonalComplement(own)(y), self._problem.data.block)[0])
         loss, without = losses.loss(self._explanation.members), losses.loss(rest)
         return EmpiricalFinding(
-            covariate="time_s",
-            form="change",
+            covariate=candidate.quantity if isinstance(candidate, ProxyCandidate) else "time_s",
+            form=candidate.kind,
             port=candidate.effect.port,
             p_value=p_value,
             explained_fraction=self._fraction(without, loss),
@@ -105,7 +105,7 @@ class _Remainder:
             formula_effects=(),
             parameters=(dict(zip(names, theta.tolist(), strict=True)),),
             effect=candidate.effect.id,
-            time_s=candidate.time_s,
+            time_s=candidate.time_s if isinstance(candidate, ChangeCandidate) else float("nan"),
         )
 
     def finding(self, fits: Sequence[EmpiricalFit], p_value: float, loss: float) -> EmpiricalFinding:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates import SEARCHED_CONSTANT, Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_terms import EmpiricalTerm, empirical_terms
@@ -49,6 +50,10 @@ class EmpiricalFit:
         """Fitted parameters, and what the search for the constant counts for."""
         return int(self.values.shape[2]) + self.searched_parameters
 
+    def columns_um(self, aligned: AlignedRecording) -> FloatArray:
+        """(N, m, P) by how many um each parameter moves the prediction, on all rows."""
+        return self.term.columns_um(aligned, self.effect, self.constant)
+
     def price(self, criteria: Criteria) -> float:
         """By how much it must lower the logarithm of the loss."""
         return criteria.description_price + criteria.number_price * (self.parameter_count - 1)
@@ -77,15 +82,14 @@ class EmpiricalSearch:
 
     def __init__(self, problem: DiagnosisProblem) -> None:
         self._problem = problem
-        self._fits_by_size: dict[int, list[EmpiricalFit]] = {}
+        self._fits: list[EmpiricalFit] = []
         for term in empirical_terms(problem.aligned):
             effect = term.effect()
             searched = SEARCHED_CONSTANT if term.constant else 0
             for constant in term.grid or (None,):
                 values = self._columns(term, effect, constant)
                 if np.isfinite(values).all() and values.any():
-                    fit = EmpiricalFit(term, effect, constant, values, searched)
-                    self._fits_by_size.setdefault(values.shape[2], []).append(fit)
+                    self._fits.append(EmpiricalFit(term, effect, constant, values, searched))
 
     def best_fits(self, nuisance: FloatArray) -> list[EmpiricalFit]:
         """The PROMISING terms that explain most of the residual beside nuisance columns (R, m, Q), the best first.
@@ -96,12 +100,10 @@ class EmpiricalSearch:
         complement = OrthogonalComplement(nuisance)
         residual = complement(self._problem.data.y)
         best: dict[EmpiricalTerm, tuple[float, EmpiricalFit]] = {}
-        for fits in self._fits_by_size.values():
-            for fit, explained in zip(
-                fits, explained_squares([fit.values for fit in fits], residual, complement).tolist(), strict=True
-            ):
-                if fit.term not in best or explained > best[fit.term][0]:
-                    best[fit.term] = explained, fit
+        squares = explained_squares([fit.values for fit in self._fits], residual, complement).tolist()
+        for fit, explained in zip(self._fits, squares, strict=True):
+            if fit.term not in best or explained > best[fit.term][0]:
+                best[fit.term] = explained, fit
         taken: Counter[str] = Counter()
         promising: list[EmpiricalFit] = []
         for _, fit in sorted(best.values(), key=lambda pair: SQUARES_PER_NUMBER * pair[1].parameter_count - pair[0]):
@@ -127,19 +129,22 @@ class EmpiricalSearch:
 def explained_squares(
     values: Sequence[FloatArray], residual: FloatArray, complement: OrthogonalComplement
 ) -> FloatArray:
-    """(K,) sum of squares of a residual (R, m) that each set of columns (R, m, P) explains; all have the same P.
+    """(K,) sum of squares of a residual (R, m) that each set of columns (R, m, P) explains.
 
     What the nuisance columns explain of a set to one part in 1e6 is held by a ridge and explains nothing.
     """
-    explained = []
-    size = values[0].shape[2]
-    for begin in range(0, len(values), BATCH):
-        columns = np.concatenate(values[begin : begin + BATCH], axis=2)
-        squares = (columns**2).sum(axis=(0, 1)).reshape(-1, size)
-        flat = complement(columns).reshape(residual.size, -1)
-        score = (flat.T @ residual.ravel()).reshape(-1, size)
-        by_set = flat.reshape(residual.size, -1, size).transpose(1, 0, 2)
-        gram = by_set.transpose(0, 2, 1) @ by_set
-        gram += np.eye(size) * (1e-6 * squares[:, :, None] + 1e-12)
-        explained.append((score * np.linalg.solve(gram, score[:, :, None])[:, :, 0]).sum(axis=1))
-    return np.concatenate(explained)
+    explained = np.zeros(len(values))
+    sizes = np.array([columns.shape[2] for columns in values], dtype=np.int64)
+    for size in np.unique(sizes):
+        places = np.flatnonzero(sizes == size)
+        for begin in range(0, len(places), BATCH):
+            batch = places[begin : begin + BATCH]
+            columns = np.concatenate([values[k] for k in batch], axis=2)
+            squares = (columns**2).sum(axis=(0, 1)).reshape(-1, size)
+            flat = complement(columns).reshape(residual.size, -1)
+            score = (flat.T @ residual.ravel()).reshape(-1, size)
+            by_set = np.ascontiguousarray(flat.T).reshape(-1, size, residual.size)
+            gram = by_set @ by_set.transpose(0, 2, 1)
+            gram += np.eye(size) * (1e-6 * squares[:, :, None] + 1e-12)
+            explained[batch] = (score * np.linalg.solve(gram, score[:, :, None])[:, :, 0]).sum(axis=1)
+    return explained

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from compd.arrays import FloatArray
+import numpy as np
+
 from compd.diagnosis.candidates import Candidate
 from compd.diagnosis.changes import change_candidates, moments_s
 from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
@@ -29,13 +30,14 @@ class Explanation:
 
     losses : over the library and what competed with it.
     members : the set: effects, the one that explains most first, then the constant, then descriptions and changes.
-    fits : the promising descriptions beside the effects; empty where none was needed.
+    fits : the promising descriptions; empty where none was needed.
+    fit_by_place : of the candidates that are descriptions, the term by the candidate's place.
     """
 
     losses: SubsetLosses
     members: tuple[int, ...]
     fits: tuple[EmpiricalFit, ...] = ()
-    _fit_by_place: dict[int, EmpiricalFit] = field(default_factory=dict)
+    fit_by_place: Mapping[int, EmpiricalFit] = field(default_factory=dict)
 
     def _of_kind(self, *kinds: str) -> tuple[int, ...]:
         return tuple(k for k in self.members if self.losses.candidates[k].kind in kinds)
@@ -49,6 +51,16 @@ class Explanation:
     def named(self) -> tuple[int, ...]:
         """The effects and the constant."""
         return self._of_kind("effect", "constant")
+
+    @property
+    def proxies(self) -> tuple[int, ...]:
+        """Effects that were not measured, by what stands for their temperature."""
+        return self._of_kind("proxy")
+
+    @property
+    def described(self) -> tuple[int, ...]:
+        """Everything in the set that names no cause, but for the constant."""
+        return self._of_kind("proxy", "description", "change")
 
     @property
     def descriptions(self) -> tuple[int, ...]:
@@ -67,7 +79,7 @@ class Explanation:
 
     def fit_of(self, member: int) -> EmpiricalFit:
         """The term that a description is."""
-        return self._fit_by_place[member]
+        return self.fit_by_place[member]
 
 
 def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
@@ -80,86 +92,78 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     if problem.floor_known and best.cv_loss <= problem.criteria.most_at_floor:
         return Explanation(library, _ordered(library, best.members))
     progress("every covariate, lag, direction and time")
-    empirical = EmpiricalSearch(problem)
-    bases: list[tuple[int, ...]] = [(), best.members[:1], best.members]
-    pool = _Competitors(problem, library, empirical)
-    for basis in dict.fromkeys(bases):
-        pool.screen_beside(library, basis)
+    competitors = _Competitors(problem, library)
+    for basis in dict.fromkeys([(), best.members]):
+        competitors.screen_beside(library, basis)
     progress("effects against descriptions")
-    losses = pool.losses()
+    losses = problem.losses(competitors.candidates)
     forward_search(losses)
     best = forward_search(losses, best.members)
-    if pool.screen_beside(losses, best.members):
-        losses = pool.losses()
+    fits = competitors.screen_beside(losses, best.members)
+    if len(competitors.candidates) > len(losses.candidates):
+        losses = problem.losses(competitors.candidates)
         best = forward_search(losses, best.members)
-    members = _ordered(losses, best.members)
-    named = tuple(k for k in members if losses.candidates[k].kind in ("effect", "constant"))
-    fits = empirical.best_fits(losses.nuisance_with(named).values)
-    return Explanation(losses, members, tuple(fits), pool.fit_by_place)
+    return Explanation(losses, _ordered(losses, best.members), fits, competitors.fit_by_place)
+
+
+def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Progress) -> Explanation:
+    """The same search on rows that are weighed anew, among the candidates that were promising before."""
+    losses = problem.losses(before.losses.candidates)
+    forward_search(losses)
+    best = forward_search(losses, before.members)
+    if not losses.describes and not (problem.floor_known and best.cv_loss <= problem.criteria.most_at_floor):
+        return explain(problem, progress)
+
+    def weighed(fit: EmpiricalFit) -> EmpiricalFit:
+        return replace(fit, values=problem.whiten(fit.columns_um(problem.aligned)))
+
+    fit_by_place = {k: replace(fit, values=losses.values[k]) for k, fit in before.fit_by_place.items()}
+    fits = tuple(weighed(fit) for fit in before.fits)
+    return Explanation(losses, _ordered(losses, best.members), fits, fit_by_place)
 
 
 def _search_library(problem: DiagnosisProblem) -> tuple[SubsetLosses, Subset]:
     """The library's best set, constants refined between the values of their grids."""
-    candidates, values = list(problem.candidates), list(problem.values)
-    losses = _losses(problem, candidates, values)
+    losses = problem.losses(problem.candidates)
     best = forward_search(losses)
     for _ in range(REFINEMENTS):
-        refined = refined_variants(candidates, best.members, problem.aligned)
+        refined = refined_variants(losses.candidates, best.members, problem.aligned)
         if not refined:
             break
-        candidates += refined
-        values += [problem.whiten(candidate.columns_um) for candidate in refined]
-        losses = _losses(problem, candidates, values)
+        losses = problem.losses([*losses.candidates, *refined])
         best = forward_search(losses, best.members)
     return losses, best
-
-
-def _losses(problem: DiagnosisProblem, candidates: Sequence[Candidate], values: Sequence[FloatArray]) -> SubsetLosses:
-    return SubsetLosses(problem.data, candidates, values, problem.criteria, 1.0 if problem.floor_known else 0.0)
 
 
 class _Competitors:
     """The library's candidates, and the descriptions and changes that compete with them, by their place."""
 
-    def __init__(self, problem: DiagnosisProblem, library: SubsetLosses, empirical: EmpiricalSearch) -> None:
-        self._problem, self._empirical = problem, empirical
-        self._candidates, self._values = list(library.candidates), list(library.values)
+    def __init__(self, problem: DiagnosisProblem, library: SubsetLosses) -> None:
+        self._problem, self._empirical = problem, EmpiricalSearch(problem)
+        self.candidates: list[Candidate] = list(library.candidates)
         self.fit_by_place: dict[int, EmpiricalFit] = {}
         self._taken: set[object] = set()
         best = [library.candidates[subset.members[0]] for subset in library.best_variants.values()]
         effects = [candidate for candidate in best if candidate.kind == "effect"]
-        self._changes = [
-            (change, problem.whiten(change.columns_um))
-            for change in change_candidates(effects, problem.aligned, moments_s(problem.aligned))
-        ]
+        self._changes = change_candidates(effects, problem.aligned, moments_s(problem.aligned))
+        self._change_values = [problem.whiten(change.columns_um) for change in self._changes]
 
-    def losses(self) -> SubsetLosses:
-        """Of all candidates so far."""
-        return _losses(self._problem, self._candidates, self._values)
-
-    def screen_beside(self, losses: SubsetLosses, basis: tuple[int, ...]) -> bool:
-        """Add what explains most beside some members; whether anything is new."""
+    def screen_beside(self, losses: SubsetLosses, basis: tuple[int, ...]) -> tuple[EmpiricalFit, ...]:
+        """Add what explains most beside some members; returns the descriptions that do."""
         nuisance = losses.nuisance_with(basis).values
-        new = False
-        for fit in self._empirical.best_fits(nuisance):
+        fits = tuple(self._empirical.best_fits(nuisance))
+        for fit in fits:
             term = fit.term
             if self._is_new((term.covariate, term.form, term.port, term.per_link, fit.constant)):
-                self.fit_by_place[len(self._candidates)] = fit
-                columns_um = term.columns_um(self._problem.aligned, fit.effect, fit.constant)
-                self._candidates.append(fit.candidate(columns_um))
-                self._values.append(fit.values)
-                new = True
+                self.fit_by_place[len(self.candidates)] = fit
+                self.candidates.append(fit.candidate(fit.columns_um(self._problem.aligned)))
         complement = OrthogonalComplement(nuisance)
-        residual = complement(self._problem.data.y)
-        squares = [explained_squares([values], residual, complement)[0] for _, values in self._changes]
-        order = sorted(range(len(squares)), key=lambda k: -squares[k])[:PROMISING_CHANGES]
-        for k in order:
-            change, values = self._changes[k]
+        squares = explained_squares(self._change_values, complement(self._problem.data.y), complement)
+        for k in np.argsort(-squares)[:PROMISING_CHANGES]:
+            change = self._changes[k]
             if self._is_new((change.name, change.time_s)):
-                self._candidates.append(change)
-                self._values.append(values)
-                new = True
-        return new
+                self.candidates.append(change)
+        return fits
 
     def _is_new(self, key: object) -> bool:
         if key in self._taken:
@@ -171,7 +175,7 @@ class _Competitors:
 def _ordered(losses: SubsetLosses, members: Sequence[int]) -> tuple[int, ...]:
     """Effects, then the constant, then the rest; of each, first the one that beside those before it leaves least."""
     order: tuple[int, ...] = ()
-    for kinds in (("effect",), ("constant",), ("description", "change")):
+    for kinds in (("effect",), ("constant",), ("proxy", "description", "change")):
         left = [k for k in members if losses.candidates[k].kind in kinds]
         while left:
             best = min(left, key=lambda k: losses.loss((*order, k)))

@@ -91,7 +91,8 @@ class EmpiricalFinding:
     beside : tuple of str
         Other covariates that are needed along with it.
     effect : str
-        Of a ``"change"``, the effect of the library that begins or changes; ``""`` for every other form.
+        Of a ``"change"``, the effect of the library that begins or changes; of a ``"proxy"``, the effect whose own
+        temperature was not measured and that `covariate` stands for; ``""`` for every other form.
     time_s : float
         Of a ``"change"``, when, on the recording's clock, s; nan for every other form.
     """
@@ -117,7 +118,7 @@ class EmpiricalFinding:
             "p_adjusted": self.p_value,
             "explained_fraction": self.explained_fraction,
             "heldout_rms_um": self.heldout_rms_um,
-            "formula_effect": self.formula_effects[0],
+            "formula_effect": self.formula_effects[0] if self.formula_effects else None,
             "formula_effects": list(self.formula_effects),
             "fitted": list(self.parameters),
             "beside": list(self.beside),

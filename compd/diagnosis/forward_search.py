@@ -41,34 +41,56 @@ def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
 def best_acceptable(losses: SubsetLosses) -> Subset:
     """Of all sets that were evaluated the best plausible one, without the members that it does not need.
 
-    A description is no cause where effects do about as well: of sets that score alike, within an effect's price, the
-    one counts of which the effects alone score best.
+    A description is no cause where effects do about as well: a set of effects alone counts if it scores within an
+    effect's price of the best one. In a set with descriptions, in turn, an effect is no cause where a description does
+    better in its place, at the same price and by more than may be chance.
     """
-    best = Subset((), losses.baseline)
-    best_score = effects_score = float("inf")
+    best: Subset | None = None
     ranked: dict[frozenset[str], Subset] = {}
     for subset in losses.scored:
         ranked.setdefault(frozenset(losses.name(k) for k in subset.members), subset)
         if len(ranked) >= MOST_RANKED:
             break
     for subset in ranked.values():
-        if losses.score(subset) > best_score + losses.criteria.effect_price:
+        if best is not None and losses.score(subset) > losses.score(best) + losses.criteria.effect_price:
             break
+        if best is not None and losses.described(subset.members):
+            continue
         needed = _pruned(losses, subset) if losses.is_plausible(subset.members) else None
         if needed is None or not losses.is_plausible(needed.members):
             continue
-        best_score = min(best_score, losses.score(needed))
-        effects = Subset(*_without_descriptions(losses, needed))
-        if losses.score(effects) < effects_score:
-            best, effects_score = needed, losses.score(effects)
-        if not needed.members or not losses.describes:
-            break
-    return best
+        if not losses.described(needed.members):
+            return needed
+        best = best or needed
+    return _proven(losses, best) if best else Subset((), losses.baseline)
 
 
-def _without_descriptions(losses: SubsetLosses, subset: Subset) -> tuple[tuple[int, ...], float]:
-    effects = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
-    return effects, losses.loss(effects)
+def _proven(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set with each effect replaced by a description that does better in its place."""
+    substitutes = losses.described(range(len(losses.candidates)))
+
+    def worth(member: int, loss: float) -> float:
+        """Score of a set but for the prices of kinds."""
+        return losses.log_loss(loss) + losses.number_price(member)
+
+    replaced = True
+    while replaced:
+        replaced = False
+        for member in subset.members:
+            if losses.candidates[member].kind != "effect":
+                continue
+            rest = tuple(k for k in subset.members if k != member)
+            names = {losses.name(k) for k in rest}
+            sets = {tuple(sorted((*rest, k))): k for k in substitutes if losses.name(k) not in names}
+            others = [(worth(sets[other.members], other.cv_loss), other) for other in losses.evaluate(sets)]
+            best_worth, best = min(others, key=lambda pair: pair[0], default=(float("inf"), subset))
+            if best_worth >= worth(member, subset.cv_loss) or not losses.is_plausible(best.members):
+                continue
+            gain, std = losses.gain(best.members, subset.members)
+            if gain >= losses.criteria.least_sigmas * std:
+                subset, replaced = _pruned(losses, best), True
+                break
+    return subset
 
 
 def _exchanged(losses: SubsetLosses, subset: Subset) -> Subset:

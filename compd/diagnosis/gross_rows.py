@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -97,7 +98,7 @@ def _confirmed(left: FloatArray, known: BoolArray, visit: IntArray | None, limit
     rows = np.flatnonzero(known & (visit >= 0))
     rows = rows[np.argsort(visit[rows], kind="stable")]
     bounds = np.flatnonzero(np.diff(visit[rows], prepend=-1, append=-1))
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in pairwise(bounds):
         of_visit = rows[begin:end]
         if len(of_visit) < 2:
             continue

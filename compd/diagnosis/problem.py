@@ -18,6 +18,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.regression import RegressionData, Regressors
+from compd.diagnosis.subset_losses import SubsetLosses
 from compd.units import UM_PER_MM
 
 
@@ -28,7 +29,7 @@ class DiagnosisProblem:
     N rows of the recording, R of which count; m coordinates.
 
     comparison : of the recording with the model as it is.  pool : effects of the library, and what cannot be tested.
-    candidates : those that compete, the constant among them.
+    candidates : the library's that compete, and the constant.
     same_as_nuisance : effects that do nothing on these rows but what is fitted along in any case.
     criteria : numbers of the verdict.  sigma_um : (m,) standard deviation of the noise, or a unit where it is unknown.
     known : (N,) rows in which the residual and all candidates are known.
@@ -36,7 +37,6 @@ class DiagnosisProblem:
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
     residual : (N, m) whitened, 0 where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
-    values : (R, m, P) whitened and weighted columns of each candidate, on the rows that count.
     """
 
     comparison: Comparison
@@ -52,7 +52,6 @@ class DiagnosisProblem:
     residual: FloatArray
     nuisance: FloatArray
     data: RegressionData
-    values: tuple[FloatArray, ...]
 
     @property
     def aligned(self) -> AlignedRecording:
@@ -72,6 +71,11 @@ class DiagnosisProblem:
     def whiten(self, columns_um: FloatArray) -> FloatArray:
         """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
         return np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
+
+    def losses(self, candidates: Sequence[Candidate]) -> SubsetLosses:
+        """Of all sets of these candidates."""
+        values = [self.whiten(candidate.columns_um) for candidate in candidates]
+        return SubsetLosses(self.data, candidates, values, self.criteria, 1.0 if self.floor_known else 0.0)
 
     def weigh_beside(self, candidates: Sequence[Candidate]) -> RowWeights:
         """What each row counts beside some candidates alone."""
@@ -93,9 +97,10 @@ def build_problem(
     sigma_um = _unit_um(comparison)
     nuisance_um = _nuisance_um(comparison)
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    for columns in (nuisance_um, *(candidate.columns_um for candidate in pool.candidates)):
+    for columns in (nuisance_um, *(candidate.columns_um for candidate in (*pool.candidates, *pool.proxies))):
         known &= np.isfinite(columns).all(axis=(1, 2))
     candidates, same = split_constants(pool.candidates, nuisance_um, known)
+    candidates += pool.proxies
     constant = constant_candidate(aligned)
     if constant is not None:
         candidates = (*candidates, constant)
@@ -113,11 +118,21 @@ def build_problem(
         _renumbered(neighbour_blocks(aligned.recording)[rows]),
         Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
     )
-    values = tuple(candidate.columns_um[rows] / sigma_um[:, None] * root[:, None, None] for candidate in candidates)
     return DiagnosisProblem(
-        comparison, pool, candidates, same, criteria, sigma_um, known, weights.gross, rows, root, residual, nuisance,
-        data, values,
-    )  # fmt: skip
+        comparison=comparison,
+        pool=pool,
+        candidates=candidates,
+        same_as_nuisance=same,
+        criteria=criteria,
+        sigma_um=sigma_um,
+        known=known,
+        gross=weights.gross,
+        rows=rows,
+        root_weight=root,
+        residual=residual,
+        nuisance=nuisance,
+        data=data,
+    )
 
 
 def _unit_um(comparison: Comparison) -> FloatArray:

@@ -36,7 +36,8 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
     rivals: list[Rival] = []
     for subset in sorted(losses.evaluate(sets), key=losses.score):
         key, k = by_key[subset.members]
-        if losses.name(k) in [rival.name for rival in rivals]:
+        name = losses.candidates[k].effect.id
+        if name in [rival.name for rival in rivals]:
             continue
         if subset.cv_loss - loss > criteria.rival_share * (without - loss):
             continue
@@ -44,7 +45,7 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         excess, std = losses.gain(members, key)
         near = losses.log_loss(subset.cv_loss) - losses.log_loss(loss) <= criteria.effect_price and not more_general
         if (near or excess <= criteria.least_sigmas * std) and losses.is_plausible(key):
-            rivals.append(Rival(k, losses.name(k), collinearity(losses, rest, member, k), excess, std))
+            rivals.append(Rival(k, name, collinearity(losses, rest, member, k), excess, std))
     return tuple(rivals)
 
 
@@ -68,5 +69,7 @@ def _substitutes(losses: SubsetLosses, rest: Collection[int], member: int) -> li
     """Effects of the library that are not in the set."""
     names = {losses.name(k) for k in (*rest, member)}
     return [
-        k for k, candidate in enumerate(losses.candidates) if candidate.name not in names and candidate.kind == "effect"
+        k
+        for k, candidate in enumerate(losses.candidates)
+        if candidate.name not in names and candidate.kind in ("effect", "proxy")
     ]

@@ -78,6 +78,14 @@ class SubsetLosses:
         """Whether descriptions are among the candidates."""
         return any(candidate.kind in ("description", "change") for candidate in self.candidates)
 
+    def described(self, members: Iterable[int]) -> tuple[int, ...]:
+        """Those of some members that name no cause, but for the constant."""
+        return tuple(k for k in members if self.candidates[k].kind not in ("effect", "constant"))
+
+    def number_price(self, member: int) -> float:
+        """The price of a member's numbers beyond its first."""
+        return self.criteria.number_price * (self.candidates[member].parameter_count - 1)
+
     def name(self, member: int) -> str:
         """The id of a candidate's effect."""
         return self.candidates[member].name
@@ -145,7 +153,7 @@ class SubsetLosses:
         """
         for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
             candidate = self.candidates[k]
-            if candidate.kind != "effect":
+            if candidate.kind not in ("effect", "proxy"):
                 continue
             std = np.sqrt(np.diag(covariance))
             for (low, high), value, error in zip(candidate.limits, theta, std, strict=True):

@@ -50,9 +50,7 @@ def load_library() -> dict[str, Effect]:
     return effects
 
 
-def find_effect(
-    declaration: str | Mapping[str, Any], where: str, given: Mapping[str, Effect] | None = None
-) -> Effect:
+def find_effect(declaration: str | Mapping[str, Any], where: str, given: Mapping[str, Effect] | None = None) -> Effect:
     """An effect by its id, as /absolute/file.py:NAME, or written out as a formula.
 
     where : the place in the person's file, for errors.  given : effects beside those of the library, by id.
