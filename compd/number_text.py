@@ -3,7 +3,7 @@
 Example::
 
     >>> number_text(0.1234, "um"), fall_text([105.0, 55.2], "um"), percent_text(0.9984)
-    ('0.12 um', '105 -> 55 um', '99.8 %')
+    ('0.12 um', '105 -> 55 um', '99 %')
 """
 
 from __future__ import annotations
@@ -55,20 +55,20 @@ def estimates_text(values: Sequence[float], std: float, unit: str = "", between:
 
 
 def percent_text(share: float) -> str:
-    """A share, 0 to 1, in per cent; never rounded up to all or down to nothing: "99.8 %", "below 1 %"."""
+    """A share, 0 to 1, in per cent; never rounded up to all or down to nothing: "99 %", "below 1 %"."""
     if math.isnan(share):
         return "not known"
     percent = 100 * min(max(share, 0.0), 1.0)
-    if 99.5 <= percent < 100:
-        return f"{math.floor(10 * percent) / 10:.1f} %" if percent < 99.95 else "99.9 %"
-    return "below 1 %" if 0 < percent < 1 else f"{percent:.0f} %"
+    if 0 < percent < 1:
+        return "below 1 %"
+    return f"{99 if 99 < percent < 100 else percent:.0f} %"
 
 
 def chance_text(p_value: float) -> str:
-    """A probability as people bet: 0.001 is "1 in 1000"; "" where it is not known."""
+    """A probability as people bet: 0.001 is "1 time in 1000"; "" where it is not known."""
     if not p_value > 0:
         return ""
-    return f"1 in {number_text(1 / p_value, digits=1 if p_value > 0.05 else DIGITS)}"
+    return f"1 time in {number_text(1 / p_value, digits=1 if p_value > 0.05 else DIGITS)}"
 
 
 def join_words(words: Sequence[str], word: str = "and") -> str:

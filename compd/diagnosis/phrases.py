@@ -28,10 +28,9 @@ MOST_VALUES = 3
 # Rivals of one effect that are named.
 MOST_RIVALS = 3
 # Single gross rows that are named.
-MOST_ROWS = 6
+MOST_ROWS = 4
 
 IMPLAUSIBLE = "IMPLAUSIBLE"
-HOW_TO_KNOW_NOISE = "measure one point twice (two rows with the same number in a `visit` column)"
 
 
 def physics_clause(effect: Effect) -> str:
@@ -73,19 +72,34 @@ def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
 
 
 def chance_clause(p_values: Sequence[float]) -> str:
-    """How probable the least sure of so many results is by noise alone; "" where it is not known."""
+    """How often noise alone would do as well as the least sure of some results; "" where it is not known."""
     known = [p_value for p_value in p_values if p_value > 0]
     if not known:
         return ""
-    return (
-        f"by chance {chance_text(max(known))}"
-        if len(known) == 1
-        else f"each by chance {chance_text(max(known))} at most"
-    )
+    each = " each at most" if len(known) > 1 else " this"
+    return f"noise alone does{each} {chance_text(max(known))}"
+
+
+def is_change(finding: EmpiricalFinding) -> bool:
+    """Whether something changed in the middle of the recording."""
+    return finding.form == "change"
+
+
+def short_name(finding: EmpiricalFinding) -> str:
+    """A finding by a name, for tables and bars: its covariates, or the effect that changes or that it stands for."""
+    if is_change(finding):
+        return f"a change of {finding.effect}"
+    names = " with ".join([finding.covariate, *finding.beside])
+    return f"{names}, as {finding.effect}" if finding.effect else names
 
 
 def followed_text(finding: EmpiricalFinding) -> str:
-    """What a residual follows: "temperature_frame_degC (linear) together with humidity_pct"."""
+    """What a residual follows: "temperature_frame_degC (linear) together with humidity_pct".
+
+    Of a thermometer that stands for another's: "temperature_room_degC, as link_expansion would".
+    """
+    if finding.form == "proxy":
+        return f"{finding.covariate}, as {finding.effect} would, whose own temperature was not measured"
     beside = f" together with {join_words(finding.beside)}" if finding.beside else ""
     return f"{finding.covariate} ({finding.form}){beside}"
 
@@ -130,8 +144,11 @@ def constant_text(constant: ConstantFinding, unit: str) -> str:
     return f"a constant of {size}: {join_words(names, 'or')}; these rows cannot tell"
 
 
-def gross_texts(gross: GrossRows, comparison: Comparison, unit: str) -> list[str]:
-    """How many rows nothing explains, how far off they are, where they lie, and what to look at."""
+def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: int = MOST_ROWS) -> list[str]:
+    """How many rows nothing explains, how far off they are, where they lie, and what to look at.
+
+    most_rows : single rows that are named.
+    """
     if not gross.rows:
         return []
     recording = comparison.aligned.recording
@@ -140,8 +157,9 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str) -> list[str
     off = f" (up to {number_text(largest, unit)} off)" if np.isfinite(largest) else ""
     in_runs = {row for first, last in gross.runs for row in gross.rows if first <= row <= last}
     single = [str(row) for row in gross.rows if row not in in_runs]
-    others = [f"{len(single) - MOST_ROWS} more"] if len(single) > MOST_ROWS else []
-    rows = join_words([*single[:MOST_ROWS], *others])
+    if len(single) > most_rows:
+        single = [*single[: most_rows - 1], f"{len(single) - most_rows + 1} more"]
+    rows = join_words(single)
     count = f"{len(gross.rows)} of {recording.rows} rows do not count{off}"
     if not gross.runs:
         return [f"{count}: {rows}"]
@@ -162,14 +180,30 @@ def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:
     return sorted(concerning, key=lambda effect: not effect.likely)
 
 
-def session_count(comparison: Comparison) -> int:
-    """In how many sessions the rows that count were measured; 1 without a `session` column."""
-    session = comparison.aligned.recording.session
-    if session is None:
-        return 1
-    return len(np.unique(session[comparison.used & (session >= 0)]))
+def was_any_tried(diagnosis: Diagnosis) -> bool:
+    """Whether the recording tests any effect of the library."""
+    return any(candidate.status != "not_testable" for candidate in diagnosis.candidates)
 
 
-def is_thermal(effect: Effect) -> bool:
+def best_description(diagnosis: Diagnosis) -> EmpiricalFinding | None:
+    """What the rest follows best, changes apart."""
+    return next((finding for finding in diagnosis.depends_on if not is_change(finding)), None)
+
+
+def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:
+    """Thermal effects that were found, or where none was what the error follows, where all rows are of one session.
+
+    All that warms up in a session rises together, and with time: one session alone proves no thermal cause.
+    """
+    session = diagnosis.after.aligned.recording.session
+    if session is not None and len(np.unique(session[diagnosis.after.used & (session >= 0)])) > 1:
+        return []
+    finding = best_description(diagnosis)
+    if diagnosis.steps or finding is None:
+        return [step.effect.id for step in diagnosis.steps if _is_thermal(step.effect)]
+    return [name for name in (finding.covariate, *finding.beside) if name.startswith(("temperature", "time"))]
+
+
+def _is_thermal(effect: Effect) -> bool:
     """Whether a temperature, or time as its stand-in, drives the effect."""
     return any(need.startswith("temperature") for need in effect.needs) or effect.needs == ("time",)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compd.diagnosis.error_fall import error_fall
-from compd.diagnosis.phrases import change_text, followed_text, rivals_text
+from compd.diagnosis.phrases import change_text, followed_text, is_change, rivals_text, was_any_tried
 from compd.number_text import join_words, number_text
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def summary(diagnosis: Diagnosis) -> str:
             falls = f"With {names} the error of {before} falls to {after}, {noise}."
             return f"{falls} But these rows cannot tell apart: {pairs}."
         case "adequate" | "not_testable":
-            return f"The error is {before}, {noise}. No effect can be tested on this recording."
+            tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
+            return f"The error is {before}, {noise}. No effect {tried}."
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"
         rest = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
@@ -53,6 +54,6 @@ def _rest(diagnosis: Diagnosis, what: str) -> list[str]:
         return []
     fall, finding = error_fall(diagnosis), diagnosis.depends_on[0]
     left = f"to describe that leaves {number_text(finding.heldout_rms_um, fall.unit)}, and names no cause"
-    if finding.effect:
+    if is_change(finding):
         return [f"Something changed: {change_text(finding, diagnosis)}; {left}."]
     return [f"{what} follows {followed_text(finding)}: {left}."]

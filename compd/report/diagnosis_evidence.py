@@ -10,7 +10,7 @@ import yaml
 
 from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
-from compd.diagnosis.phrases import change_text, parameter_texts, untested_here
+from compd.diagnosis.phrases import change_text, is_change, parameter_texts, short_name, untested_here
 from compd.diagnosis.verdict import Diagnosis
 from compd.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
 from compd.report.page_table import PageTable
@@ -29,7 +29,7 @@ def step_rows(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> list[tuple[
     rows += [
         ("error, rows left out", fall_text([before, step.heldout_rms_um], fall.unit)),
         ("explains", f"{percent_text(step.explained_fraction)} of the squared error that was left{_above(fall)}"),
-        ("by chance", f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"),
+        ("by noise alone", f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"),
         ("rivals", _rivals(step)),
         ("told apart by", step.effect.separated_by),
     ]
@@ -64,7 +64,7 @@ def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
     """What the rest follows, and what changed, the strongest first."""
     rows = [
         (
-            change_text(finding, diagnosis) if finding.effect else " with ".join([finding.covariate, *finding.beside]),
+            change_text(finding, diagnosis) if is_change(finding) else short_name(finding),
             finding.form,
             finding.port,
             percent_text(finding.explained_fraction),
@@ -73,7 +73,7 @@ def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
         )
         for finding in diagnosis.depends_on
     ]
-    return PageTable(("follows", "form", "port", "explains", f"left, {fall.unit}", "by chance"), rows)
+    return PageTable(("follows", "form", "port", "explains", f"left, {fall.unit}", "by noise alone"), rows)
 
 
 def candidates_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:

@@ -12,7 +12,7 @@ import numpy as np
 from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.phrases import gross_texts
+from compd.diagnosis.phrases import gross_texts, is_change
 from compd.diagnosis.summary_lines import summary_lines
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect import FittedEffect
@@ -70,7 +70,7 @@ def _step_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
 
 def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     """Gross rows and changes in time, where there are any."""
-    if not diagnosis.gross.rows and not any(finding.effect for finding in diagnosis.depends_on):
+    if not diagnosis.gross.rows and not any(map(is_change, diagnosis.depends_on)):
         return []
     said = gross_texts(diagnosis.gross, diagnosis.after, fall.unit)
     caption = ". ".join(

@@ -11,6 +11,7 @@ from plotly.graph_objects import Bar, Figure, Scatter
 
 from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.holdout import Holdout
+from compd.diagnosis.phrases import short_name
 from compd.diagnosis.verdict import Diagnosis
 from compd.number_text import number_text
 from compd.report.page import COLOURS, style_figure
@@ -86,11 +87,10 @@ def _falls(diagnosis: Diagnosis, holdouts: Sequence[Holdout], fall: ErrorFall) -
         colour = COLOURS["best" if last else "middle"]
         word = "with" if number == 0 else "and"
         falls.append(_Fall(f"{word} {step.effect.id}", errors[number], errors[number + 1], colour))
-    for finding in diagnosis.depends_on[:1]:
-        what = (
-            f"a change of {finding.effect}" if finding.effect else " with ".join([finding.covariate, *finding.beside])
-        )
-        falls.append(_Fall(f"described by {what}", fall.after, finding.heldout_rms_um, COLOURS["quiet"]))
+    if diagnosis.depends_on:
+        first = diagnosis.depends_on[0]
+        name = f"described by {short_name(first)}"
+        falls.append(_Fall(name, fall.after, first.heldout_rms_um, COLOURS["quiet"]))
     for holdout in holdouts:
         name = holdout.after.aligned.recording.path.name
         if diagnosis.steps:

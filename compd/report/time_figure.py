@@ -7,7 +7,7 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.diagnosis.error_fall import ErrorFall
-from compd.diagnosis.phrases import change_text
+from compd.diagnosis.phrases import change_text, is_change
 from compd.diagnosis.verdict import Diagnosis
 from compd.report.page import COLOURS, style_figure
 from compd.report.small_multiples import SERIES_COLOURS, dot_style, thin
@@ -61,7 +61,7 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
         )
         figure.update_yaxes(title_text=f"error in {label}, {fall.unit}", range=[-1.08 * edge, 1.08 * edge], **place)
     for finding in diagnosis.depends_on:
-        if finding.effect:
+        if is_change(finding):
             moment_h = finding.time_s / SECONDS_PER_HOUR
             figure.add_vline(moment_h, line={"dash": "dash", "color": "black"})
             text = change_text(finding, diagnosis)

@@ -38,13 +38,16 @@ def tripod_recording(sessions: int = 4) -> AlignedRecording:
 
 
 @cache
-def external_recording(axes: str = "x", session: bool = False, quantities: tuple[str, ...] = ()) -> AlignedRecording:
-    """`stage.csv` of a machine with a model of its own; a row every 100 s, that is row 62 at 6000 s."""
+def external_recording(axes: str = "x", quantities: tuple[str, ...] = (), direction: bool = False) -> AlignedRecording:
+    """`stage.csv` of a machine with a model of its own; a row every 100 s, that is row 62 at 6000 s.
+
+    direction : whether `moved_1` is -1 or 1.
+    """
     rng = np.random.default_rng(5)
     columns: dict[str, Any] = {"time_s": np.arange(ROWS * 2) * 100.0}
-    if session:
-        columns["session"] = 1 + np.arange(ROWS * 2) // ROWS
     columns |= {name: rng.uniform(-1, 1, ROWS * 2) for name in ("position_mm", "moved_1", *quantities)}
+    if direction:
+        columns["moved_1"] = rng.choice([-1.0, 1.0], ROWS * 2)
     for axis in axes:
         columns[f"model_{axis}_mm"] = np.zeros(ROWS * 2)
         columns[f"reference_{axis}_mm"] = rng.normal(0, 1e-3, ROWS * 2)
