@@ -77,6 +77,6 @@ def error_fall(diagnosis: Diagnosis) -> ErrorFall:
         after=after if left_out else diagnosis.after.rms_um,
         noise=math.nan if floor.source == "estimate" else floor.um,
         source=_SOURCES.get(floor.source, ""),
-        unit=getattr(diagnosis.before.aligned, "unit", "um"),
+        unit=diagnosis.before.aligned.unit,
         left_out=left_out,
     )

@@ -140,7 +140,7 @@ def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """The error that is left beside the noise, and what the difference means."""
     described = None if diagnosis.steps else best_description(diagnosis)
-    contradiction = getattr(diagnosis.before.floor, "contradiction", "")
+    contradiction = diagnosis.before.floor.contradiction
     remarks = [contradiction] if contradiction else []
     left = fall.after if described is None else described.heldout_rms_um
     text = number_text(left, fall.unit) + (" with it" if described else "")

@@ -28,7 +28,7 @@ class Driver:
 
     title : of an axis, with the unit.  values : (N,).
     one_line : whether the part is a single line over it.
-    ends : words for -1 and +1 of a link's direction; empty for all else.
+    ends : words for -1 and +1 of a direction of travel; empty for all else.
     """
 
     title: str
@@ -60,7 +60,7 @@ def _needed(
     """What the effects say that they need: at a link its own, else each column."""
     rows = aligned.rows
     needs = {need for fitted in effects for need in fitted.effect.needs}
-    if part.at_links:
+    if part.at_links and aligned.model is not None:
         link = aligned.axes[series] if aligned.of_links else series
         yield from _of_link(link, needs, effects, aligned)
     names = {name for fitted in effects for name in needed_quantities(fitted.effect, rows.links)}
@@ -86,7 +86,7 @@ def _of_link(
     if "force" in needs:
         yield Driver(f"axial force in {name}, N", rows.axial_force_N[:, link])
     if "direction" in needs:
-        yield _direction(name, rows.direction[:, link])
+        yield _direction(f"direction of {name}", rows.direction[:, link])
     if "motion" in needs:
         yield Driver(f"speed of {name}, mm/s", rows.velocity_mm_per_s[:, link])
     yield from _phases(effects, f"reading of scale {link + 1}", "mm", rows.scale_mm[:, link])
@@ -111,12 +111,13 @@ def _phases(effects: Sequence[FittedEffect], name: str, unit: str, values: Float
 
 def _driver(covariate: Covariate) -> Driver:
     if covariate.name.startswith("direction of "):
-        return _direction(covariate.name.removeprefix("direction of "), covariate.values)
+        return _direction(covariate.name, covariate.values)
     return Driver(axis_title(covariate), covariate.values)
 
 
-def _direction(link: str, values: FloatArray) -> Driver:
-    return Driver(f"direction of {link}", np.where(values == 0, np.nan, values), ends=("shortening", "lengthening"))
+def _direction(title: str, values: FloatArray) -> Driver:
+    ends = ("shortening", "lengthening") if "link" in title else ("backwards", "forwards")
+    return Driver(title, np.where(values == 0, np.nan, values), ends=ends)
 
 
 def _column(covariate: Covariate) -> str:

@@ -134,9 +134,8 @@ def diagnosis(
 ) -> Diagnosis:
     """A diagnosis whose errors on rows left out are before_um and after_um; other fields as `Diagnosis` has them."""
     recording = tripod_recording() if recording is None else recording
-    floor = NoiseFloor(np.full(len(recording.labels), noise.um), noise.source, f"by {noise.source}", 100.0)
-    if noise.contradiction:
-        object.__setattr__(floor, "contradiction", noise.contradiction)
+    by_axis_um = np.full(len(recording.labels), noise.um)
+    floor = NoiseFloor(by_axis_um, noise.source, f"by {noise.source}", 100.0, noise.contradiction)
     comparison = replace(compare(recording), floor=floor)
     before, after = _scaled(comparison, before_um), _scaled(comparison, after_um)
     after = replace(after, fitted=tuple(found.fitted for found in fields.get("steps", ())))
