@@ -63,10 +63,15 @@ def _what_may_be_added(diagnosis: Diagnosis) -> list[str]:
 
 def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
     """What tells the effects that have rivals from these: planned rows, else the effects' own words."""
-    rows = sum("measure" not in row for row in diagnosis.next_measurement)
-    if rows:
+    if not any(step.rivals for step in diagnosis.steps):
+        return []
+    if rows := _planned_rows(diagnosis):
         return [f"measure the {rows} rows below, which tell the rivals apart"]
     return [f"to tell {step.effect.id}: {step.effect.separated_by}" for step in diagnosis.steps if step.rivals]
+
+
+def _planned_rows(diagnosis: Diagnosis) -> int:
+    return sum("measure" not in row for row in diagnosis.next_measurement)
 
 
 def _what_to_measure(diagnosis: Diagnosis) -> list[str]:
@@ -80,7 +85,10 @@ def _what_to_measure(diagnosis: Diagnosis) -> list[str]:
 
 
 def _proposed(diagnosis: Diagnosis) -> list[str]:
-    """The first of the proposed measurements, in words."""
+    """The planned rows, or the first of the measurements that are proposed in words."""
+    if rows := _planned_rows(diagnosis):
+        told = any(step.rivals for step in diagnosis.steps)
+        return [] if told else [f"measure the {rows} rows below"]
     finding = best_description(diagnosis)
     if finding is not None and finding.covariate.startswith("time"):
         return ["measure again on another day, in another order: time itself drives nothing"]

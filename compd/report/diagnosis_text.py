@@ -36,10 +36,10 @@ FORMULA_FILE = "described.yaml"
 def print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> None:
     """Print the twelve lines, a line, then each effect, what the rest follows, every candidate, and what comes next."""
     heading, *lines = summary_lines(diagnosis)
-    console.print(Text(heading, style="bold"))
+    console.print(Text(heading, style="bold"), soft_wrap=True)
     for line in lines:
         console.print(Text(line), soft_wrap=True)
-    console.print("-" * WIDTH)
+    console.print("-" * WIDTH, soft_wrap=True)
     fall = error_fall(diagnosis)
     for holdout in holdouts:
         _paragraph(console, holdout.summary)
