@@ -5,20 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compd.diagnosis.error_fall import ErrorFall
-from compd.diagnosis.phrases import best_description, is_change, thermal_in_one_session, untested_here
+from compd.diagnosis.phrases import best_description, is_change, moment_text, thermal_in_one_session, untested_here
+from compd.model.formula.keys import FormulaDeclaration
 from compd.number_text import join_words
 
 if TYPE_CHECKING:
     from compd.diagnosis.verdict import Diagnosis
 
+# What a formula says of telling it from others where the person who wrote it said nothing.
+NO_WORDS = FormulaDeclaration.model_fields["separated_by"].default
 MEASURE_TWICE = "measure one point twice (two rows with the same number in a `visit` column)"
 
 
 def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """Clauses, the most urgent first."""
     clauses = [] if fall.noise_known else [MEASURE_TWICE]
-    changes = [finding.time_s for finding in diagnosis.depends_on if is_change(finding)]
-    clauses += [f"find out what happened at {time_s:.0f} s: before, it was another machine" for time_s in changes[:1]]
+    changes = [moment_text(finding, diagnosis) for finding in diagnosis.depends_on if is_change(finding)]
+    clauses += [f"find out what changed from {moment}" for moment in changes[:1]]
     match diagnosis.verdict:
         case "identified":
             return [*clauses, *_how_to_add(diagnosis)]
@@ -67,7 +70,14 @@ def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
         return []
     if rows := _planned_rows(diagnosis):
         return [f"measure the {rows} rows below, which tell the rivals apart"]
-    return [f"to tell {step.effect.id}: {step.effect.separated_by}" for step in diagnosis.steps if step.rivals]
+    recording = diagnosis.before.aligned.recording.path.name
+    return [
+        f"to tell {step.effect.id}: {step.effect.separated_by}"
+        if step.effect.separated_by != NO_WORDS
+        else f"compd plan {recording} --rivals {step.effect.id},{step.rivals[0].name} says what tells them apart"
+        for step in diagnosis.steps
+        if step.rivals
+    ]
 
 
 def _planned_rows(diagnosis: Diagnosis) -> int:

@@ -114,10 +114,14 @@ def rivals_text(step: DiagnosisStep) -> str:
 
 def change_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
     """A change in the middle of a recording: "from 6000 s on (row 410) backlash is larger"."""
+    return f"from {moment_text(finding, diagnosis)} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+
+
+def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
+    """When something changed: "6000 s on (row 410)"; "row 410 on" in a recording without time."""
     recording = diagnosis.after.aligned.recording
-    place = int(np.searchsorted(recording.time_s, finding.time_s))
-    row = f" (row {recording.row[place]})" if place < recording.rows else ""
-    return f"from {finding.time_s:.0f} s on{row} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+    row = recording.row[min(int(np.searchsorted(recording.time_s, finding.time_s)), recording.rows - 1)]
+    return f"{finding.time_s:.0f} s on (row {row})" if recording.has_time else f"row {row} on"
 
 
 def _how_it_changed(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
@@ -171,9 +175,10 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
 def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:
     """Effects that could not be tried and that concern this machine, first those that may be behind what was found.
 
-    What acts inside a machine that compd knows is nothing to one with a model of its own.
+    The library's effects are nothing to a machine with a model of its own, but where its links were measured.
     """
-    external = diagnosis.before.aligned.model is None
+    aligned = diagnosis.before.aligned
+    external = aligned.model is None and not aligned.of_links
     concerning = [
         effect for effect in diagnosis.untested if effect.likely or not (external and effect.effect in _BUNDLED)
     ]

@@ -49,7 +49,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     """
     fall = error_fall(diagnosis)
     found = tuple(_found(diagnosis, fall))
-    names = tuple(step.effect.id for step in diagnosis.steps)
+    names = tuple(clause.partition(": ")[0] for clause in found)
     others = [
         LabelledText("Changed", tuple(_changed(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),

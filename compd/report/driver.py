@@ -60,8 +60,8 @@ def _needed(
     """What the effects say that they need: at a link its own, else each column."""
     rows = aligned.rows
     needs = {need for fitted in effects for need in fitted.effect.needs}
-    if part.at_links and aligned.model is not None:
-        link = aligned.axes[series] if aligned.of_links else series
+    link = aligned.axes[series] if aligned.of_links else series
+    if part.at_links and link < rows.links:
         yield from _of_link(link, needs, effects, aligned)
     names = {name for fitted in effects for name in needed_quantities(fitted.effect, rows.links)}
     names |= {name for fitted in effects for name in fitted.effect.symbols if name.startswith("tip_")}

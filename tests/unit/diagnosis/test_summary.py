@@ -247,10 +247,9 @@ Explains: 91 % of the squared error above noise: 2.6 -> 0.90 um, rows left out
 Left:     0.90 um; noise 0.50 um (repeats): something else acts as well
 Sure:     noise alone does this 1 time in 1000; b = 3.10 +- 0.10 um
 Or else:  no other effect that was tried does as well
-Next:     find out what happened at 6000 s: before, it was another machine;
-          record what may drive the rest: temperatures, loads, directions; what
-          was found may be added (compd effect add): it lowers the error, the
-          rest stays
+Next:     find out what changed from 6000 s on (row 62); record what may drive
+          the rest: temperatures, loads, directions; what was found may be added
+          (compd effect add): it lowers the error, the rest stays
 """,
     nothing_missing: """
 adequate: nothing is missing; the error of 0.17 um is noise
@@ -384,6 +383,13 @@ def test_rows_are_promised_only_where_there_are_any() -> None:
     text = " ".join(" ".join(summary_lines(replace(rivals(), next_measurement=()))).split())
     assert "rows below" not in text
     assert "to tell link_elasticity: loads of 20, 60 and 120 N at one place" in text
+
+
+def test_a_formula_without_words_is_told_from_its_rival_by_a_plan() -> None:
+    steps = [step(BACKLASH, [0.6], 0.02, 0.2, links=0, rivals={"stage_windup": 1.0})]
+    made = diagnosis("ambiguous", 1.4, 0.2, Noise(0.2), external_recording(), steps=steps)
+    text = " ".join(" ".join(summary_lines(made)).split())
+    assert "compd plan stage.csv --rivals stage_backlash,stage_windup says what tells them apart" in text
 
 
 def test_effects_inside_a_machine_are_not_said_to_one_with_a_model_of_its_own() -> None:
