@@ -38,6 +38,8 @@ MOST_NAMED = 3
 # A mean square up to so many times that of the noise is called noise.
 NOISE_RATIO = 1.25
 NO_RIVAL = "no other effect that was tried does as well"
+# A probability above this is said before the numbers.
+DOUBTFUL = 0.01
 # With so many other texts the one is left out that says nothing.
 CROWDED = 7
 
@@ -156,7 +158,7 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 
 
 def _sure(diagnosis: Diagnosis) -> list[str]:
-    """Implausible numbers first, whether one session is all that there is, then chance and the other numbers."""
+    """First what is doubtful: implausible numbers, chance, a single session. Then the other numbers."""
     links = diagnosis.after.aligned.rows.links
     steps, finding = diagnosis.steps, best_description(diagnosis)
     numbers = [
@@ -167,13 +169,11 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     implausible = [text for text in numbers if IMPLAUSIBLE in text]
     names = thermal_in_one_session(diagnosis)
     session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
-    chance = chance_clause([step.p_value for step in steps] or ([] if finding is None else [finding.p_value]))
-    return [
-        *implausible,
-        *session,
-        *([chance] if chance else []),
-        *(text for text in numbers if text not in implausible),
-    ]
+    p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
+    chance = [clause for clause in (chance_clause(p_values),) if clause]
+    doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []
+    others = [text for text in numbers if text not in implausible]
+    return [*implausible, *doubtful, *session, *others, *(chance if not doubtful else [])]
 
 
 def _or_else(diagnosis: Diagnosis) -> list[str]:

@@ -10,13 +10,15 @@ import yaml
 
 from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
-from compd.diagnosis.phrases import change_text, is_change, parameter_texts, short_name, untested_here
+from compd.diagnosis.phrases import change_text, gross_texts, is_change, parameter_texts, short_name, untested_here
 from compd.diagnosis.verdict import Diagnosis
 from compd.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
 from compd.report.page_table import PageTable
 
 # Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
 YAML_WIDTH = 76
+# Single gross rows that are listed.
+GROSS_ROWS = 40
 
 
 def step_rows(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> list[tuple[str, str]]:
@@ -58,6 +60,11 @@ def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
     if constant.separated_by:
         rows.append(("told apart by", constant.separated_by))
     return PageTable(("", "a constant in every row"), rows)
+
+
+def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """How many rows nothing explains, and which."""
+    return "; ".join(gross_texts(diagnosis.gross, diagnosis.after, fall.unit, GROSS_ROWS))
 
 
 def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
@@ -102,8 +109,9 @@ def untested_table(diagnosis: Diagnosis) -> PageTable:
     behind = "; it may be behind what was found"
     rows = {effect.effect: effect.why + behind * effect.likely for effect in untested_here(diagnosis)}
     named = {effect.effect for effect in diagnosis.untested}
+    of_the_constant = set(diagnosis.constant.effects) if diagnosis.constant is not None else set()
     for result in diagnosis.candidates:
-        if result.status == "not_testable" and result.effect not in named:
+        if result.status == "not_testable" and result.effect not in named | of_the_constant:
             rows.setdefault(result.effect, result.why)
     return PageTable(("effect", "why, and what to measure"), list(rows.items()))
 

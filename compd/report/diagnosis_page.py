@@ -12,7 +12,7 @@ import numpy as np
 from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.phrases import gross_texts, is_change
+from compd.diagnosis.phrases import is_change
 from compd.diagnosis.summary_lines import summary_lines
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect import FittedEffect
@@ -23,6 +23,7 @@ from compd.report.diagnosis_evidence import (
     described_by,
     findings_table,
     formula_list,
+    gross_rows_text,
     next_table,
     step_rows,
     untested_table,
@@ -72,11 +73,10 @@ def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     """Gross rows and changes in time, where there are any."""
     if not diagnosis.gross.rows and not any(map(is_change, diagnosis.depends_on)):
         return []
-    said = gross_texts(diagnosis.gross, diagnosis.after, fall.unit)
-    caption = ". ".join(
-        ["The error that is left. Crosses are rows that do not count, at the edge where they lie beyond", *said]
-    )
-    return [Panel("Over time", f"{caption}.", plot_time(diagnosis, fall))]
+    caption = "The error that is left; dashed lines are changes."
+    if diagnosis.gross.rows:
+        caption += f" Crosses at the edge lie beyond it: {gross_rows_text(diagnosis, fall)}."
+    return [Panel("Over time", caption, plot_time(diagnosis, fall))]
 
 
 def _description_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:

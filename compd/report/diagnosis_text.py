@@ -11,13 +11,13 @@ from rich.table import Table
 from rich.text import Text
 
 from compd.diagnosis.error_fall import ErrorFall, error_fall
-from compd.diagnosis.phrases import gross_texts
 from compd.diagnosis.summary_lines import WIDTH, summary_lines
 from compd.report.diagnosis_evidence import (
     candidates_table,
     constant_table,
     findings_table,
     formula_list,
+    gross_rows_text,
     step_rows,
     untested_table,
     without_gain,
@@ -48,8 +48,9 @@ def print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: Sequence[H
         _print_pairs(console, step_rows(number, diagnosis, fall))
     _print_findings(console, diagnosis, fall)
     _print_constant(console, diagnosis, fall)
-    for text in gross_texts(diagnosis.gross, diagnosis.after, fall.unit):
-        _paragraph(console, text)
+    if diagnosis.gross.rows:
+        _heading(console, "Rows that do not count:")
+        _paragraph(console, gross_rows_text(diagnosis, fall))
     _print_candidates(console, diagnosis, fall)
     _print_next(console, diagnosis)
 

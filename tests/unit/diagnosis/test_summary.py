@@ -144,7 +144,7 @@ Found:    link_expansion: the rods between joints and scale grow with
             temperature
 Explains: 99 % of the squared error above noise: 0.96 -> 0.18 um, rows left out
 Left:     0.18 um; noise 0.16 um (repeats): only noise is left
-Sure:     noise alone does this 1 time in 1000; a = 1.113 +- 0.021 ppm/K
+Sure:     a = 1.113 +- 0.021 ppm/K; noise alone does this 1 time in 1000
 Or else:  no other effect that was tried does as well
 Next:     add it: compd effect add link_expansion --recording monday.csv --model
           FILE; try it on another day's recording: compd compare OTHER.csv
@@ -157,8 +157,8 @@ Found:    link_elasticity (1.6 -> 0.60 um): a link stretches under its axial
           backlash (0.60 -> 0.16 um): play between scale and link
 Explains: 99 % of the squared error above noise: 1.6 -> 0.16 um, rows left out
 Left:     0.16 um; noise 0.15 um (repeats): only noise is left
-Sure:     noise alone does each at most 1 time in 1000; link_elasticity k =
-          27.97 +- 0.29 N/um; more below
+Sure:     link_elasticity k = 27.97 +- 0.29 N/um; backlash b_1 to b_3 = 0.884,
+          1.103, 0.795 (+- 0.020) um; more below
 Or else:  no other effect that was tried does as well
 Next:     add it: compd effect add link_elasticity --recording monday.csv
           --model FILE, then backlash; try it on another day's recording: compd
@@ -170,7 +170,7 @@ Found:    link_elasticity: a link stretches under its axial force; or
             joint_contact
 Explains: 100 % of the squared error above noise: 0.68 -> 0.16 um, rows left out
 Left:     0.16 um; noise 0.16 um (declared): only noise is left
-Sure:     noise alone does this 1 time in 1000; k = 27.97 +- 0.29 N/um
+Sure:     k = 27.97 +- 0.29 N/um; noise alone does this 1 time in 1000
 Or else:  link_elasticity or joint_contact (99 % alike): these rows cannot tell
 Next:     change nothing on the machine yet: what mends one does not mend its
           rival; measure the 12 rows below, which tell the rivals apart
@@ -181,8 +181,8 @@ Shares:   joint_zero (105 -> 73 um): the encoders' zeros are elsewhere
           link_length (73 -> 55 um): the arms are longer than drawn
 Explains: 75 % of the squared error above noise: 105 -> 55 um, rows left out
 Left:     55 um; noise 20 um (declared): something else acts as well
-Sure:     noise alone does each at most 1 time in 1000; joint_zero b = 4.20 +-
-          0.30 um; link_length b = 9.10 +- 0.40 um
+Sure:     joint_zero b = 4.20 +- 0.30 um; link_length b = 9.10 +- 0.40 um; noise
+          alone does each at most 1 time in 1000
 Or else:  no other effect that was tried does as well
 Besides:  a constant of (4.0, -3.0, 2.0) um: tool_offset, link_zero or the
           instrument's frame; these rows cannot tell
@@ -195,8 +195,8 @@ Shares:   stage_backlash (1.4 -> 1.1 um): play of screw and coupling
           stage_gain (1.1 -> 0.11 um): lead of the screw
 Explains: 99 % of the squared error: 1.4 -> 0.11 um, rows left out
 Left:     0.11 um; how much of it is noise cannot be known
-Sure:     noise alone does each at most 1 time in 1000; stage_backlash b = 0.610
-          +- 0.020 um; stage_gain b = 0.02400 +- 0.00030 um
+Sure:     stage_backlash b = 0.610 +- 0.020 um; stage_gain b = 0.02400 +-
+          0.00030 um; noise alone does each at most 1 time in 1000
 Or else:  no other effect that was tried does as well
 Besides:  a constant of -3.2 um in x, which stage_offset can make
 Next:     measure one point twice (two rows with the same number in a `visit`
@@ -245,7 +245,7 @@ Changed:  from 6000 s on (row 62) stage_backlash is larger: something happened
           then
 Explains: 91 % of the squared error above noise: 2.6 -> 0.90 um, rows left out
 Left:     0.90 um; noise 0.50 um (repeats): something else acts as well
-Sure:     noise alone does this 1 time in 1000; b = 3.10 +- 0.10 um
+Sure:     b = 3.10 +- 0.10 um; noise alone does this 1 time in 1000
 Or else:  no other effect that was tried does as well
 Next:     find out what changed from 6000 s on (row 62); record what may drive
           the rest: temperatures, loads, directions; what was found may be added
