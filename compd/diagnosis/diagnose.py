@@ -12,6 +12,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.shape_search import search_constants
+from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
 from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.constant import describe_constant, name_constant
@@ -33,6 +34,8 @@ from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 
+# A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
+MOST_ROWS = 5000
 # Rows of the next measurement that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
 NEXT_ROWS = 12
 # Covariates that the proposal of a next measurement names.
@@ -59,6 +62,8 @@ def diagnose(
     progress : called with a text when a stage begins.
     criteria : numbers of the verdict.
 
+    A recording of more than MOST_ROWS rows is thinned evenly; the result is of the rows that were kept.
+
     Raises CompdError as `compare` does.
 
     Example::
@@ -68,6 +73,7 @@ def diagnose(
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
     progress("comparing the model with the recording")
+    aligned = thinned(aligned, MOST_ROWS)
     before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
     present = [effect.effect.id for effect in fitted]
