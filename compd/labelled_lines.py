@@ -84,13 +84,14 @@ def _running(clauses: Sequence[str], most: int, width: int) -> list[str]:
         lines = wrap("; ".join(shown), width, break_on_hyphens=False)
         if len(lines) <= most:
             return lines
-    lines = wrap(clauses[0], width, break_on_hyphens=False)[:most]
-    return [*lines[:-1], _cut(lines[-1], width)]
+    lines = wrap(clauses[0], width, break_on_hyphens=False)
+    return [*lines[: most - 1], _cut(" ".join(lines[most - 1 :]), width)]
 
 
 def _cut(line: str, width: int) -> str:
-    """The line with an ellipsis at its end, cut between words where there are any."""
+    """The line with an ellipsis at its end, cut between words unless one of them takes half of it."""
     room = width - len(ELLIPSIS)
     if len(line) > room:
-        line = line[:room].rsplit(" ", 1)[0]
+        words = line[:room].rsplit(" ", 1)[0]
+        line = words if len(words) > room / 2 else line[:room]
     return line.rstrip(" ,;:(") + ELLIPSIS

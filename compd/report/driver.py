@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,8 @@ from compd.units import unit_of
 # Share of a part's variation that rows with neighbouring values of the driver have in common: with less it does not
 # drive the part, with more than the second the part is one line over it.
 DRIVEN, ONE_LINE = 0.75, 0.98
+# A period in a formula: sin(2 * pi * time_s / 676).
+_PERIOD = re.compile(r"2 \* pi \* (\w+) / ([0-9.]+(?:e[+-]?[0-9]+)?)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ def _needed(
     link = aligned.axes[series] if aligned.of_links else series
     if part.at_links and link < rows.links:
         yield from _of_link(link, needs, effects, aligned)
+    yield from _written_phases(effects, aligned)
     names = {name for fitted in effects for name in needed_quantities(fitted.effect, rows.links)}
     names |= {name for fitted in effects for name in fitted.effect.symbols if name.startswith("tip_")}
     for covariate in covariates(aligned):
@@ -98,6 +102,17 @@ def _places(aligned: AlignedRecording) -> Iterator[Driver]:
     for covariate in covariates(aligned):
         if covariate.name in ("x", "y", "z") or covariate.name.startswith("length of"):
             yield _driver(covariate)
+
+
+def _written_phases(effects: Sequence[FittedEffect], aligned: AlignedRecording) -> Iterator[Driver]:
+    """The place within a period that a formula has as a number."""
+    columns = {"time_s": aligned.rows.time_s, **aligned.rows.quantities}
+    for fitted in effects:
+        for name, number in _PERIOD.findall(fitted.effect.equation):
+            unit = unit_of(name)
+            title = f"{name.removesuffix(f'_{unit}')} within a period of {float(number):.4g} {unit}, {unit}"
+            if name in columns:
+                yield Driver(title, np.mod(columns[name], float(number)))
 
 
 def _phases(effects: Sequence[FittedEffect], name: str, unit: str, values: FloatArray) -> Iterator[Driver]:

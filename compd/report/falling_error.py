@@ -74,7 +74,7 @@ def plot_falling_error(diagnosis: Diagnosis, holdouts: Sequence[Holdout], fall: 
         figure.add_annotation(x=math.log10(fall.noise), text=text, xanchor="right", **label)
     lines = sum(max(ROW_PX, LINE_PX * (name.count("<br>") + 1) + 12) for name in names)
     style_figure(figure, f"error, {fall.unit}", "", 110 + lines)
-    figure.update_xaxes(type="log", range=[math.log10(low), math.log10(high)], dtick="D2", tickformat=".3~g")
+    figure.update_xaxes(type="log", range=[math.log10(low), math.log10(high)], dtick="D2", tickformat=".2~r")
     figure.update_yaxes(autorange="reversed", automargin=True, ticklabelstandoff=8)
     return figure.update_layout(showlegend=False, margin={"t": 40, "r": 30, "l": 20})
 

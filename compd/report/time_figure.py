@@ -17,8 +17,8 @@ from compd.units import UNIT_KINDS
 
 DOTS = 1500
 ROW_PX = 210
-# Gross rows beyond so many times the largest row that counts are drawn at the edge.
-EDGE = 1.6
+# Gross rows beyond so many times what all but this share of the rows stay below are drawn at the edge.
+EDGE, STRAY = 1.6, 0.002
 SECONDS_PER_HOUR = UNIT_KINDS[1]["h"]
 _CROSS = {"size": 9, "color": COLOURS["worst"], "symbol": "x-thin", "line": {"width": 2, "color": COLOURS["worst"]}}
 
@@ -36,7 +36,7 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
     style_figure(figure, "", "", 110 + ROW_PX * len(labels)).update_layout(margin={"t": 50}, showlegend=False)
     for k, label in enumerate(labels):
         values = after.residual_um[:, k]
-        edge = EDGE * float(np.abs(values[used]).max())
+        edge = EDGE * float(np.quantile(np.abs(values[used]), 1 - STRAY))
         _add_rows(figure, k, x, values, thin(used, DOTS))
         texts = [f"row {recording.row[row]}: {values[row]:.4g} {fall.unit}" for row in gross]
         shown = np.clip(np.nan_to_num(values[gross], nan=edge), -edge, edge)

@@ -30,6 +30,9 @@ def test_a_first_clause_without_room_is_cut_between_words() -> None:
 def test_a_word_longer_than_the_line_is_cut_too() -> None:
     (line,) = fit_lines([LabelledText("Sure", ("x" * 90,))], 1, 40)
     assert len(line) <= 40
+    (line,) = fit_lines([LabelledText("Sure", (f"also {'x' * 90}",))], 1, 40)
+    assert line.startswith("Sure: also xxx")
+    assert len(line) <= 40
 
 
 def test_each_name_has_its_line_and_those_without_are_mentioned() -> None:

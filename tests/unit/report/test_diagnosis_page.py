@@ -202,3 +202,9 @@ def test_pages_of_one_two_and_three_axes(axes: str, tmp_path: Path) -> None:
     page = page_of(made, tmp_path)
     assert "1. stage_gain: Lead of the screw." in page
     assert "Drawn where it does most: x" in page or axes == "x"
+
+
+def test_a_period_that_a_formula_has_as_a_number_is_drawn_as_a_phase() -> None:
+    wave = formula("wave", "b * sin(2 * pi * time_s / 1121.22)", "It swings.")
+    figure = step_figure(external_recording(), FittedEffect(wave, np.array([2.0])))
+    assert "time within a period of 1121 s, s" in texts(figure)
