@@ -113,6 +113,10 @@ class AlignedRecording:
     def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
+        return self.propagated(effect, basis)
+
+    def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:
+        """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
         if self.model is None:
             added = split_by_port(effect, self.rows, basis)
             return external_change(added, self.axes, self.of_links)
@@ -132,12 +136,15 @@ class AlignedRecording:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
 
-    def with_gaps_filled(self) -> AlignedRecording:
+    @cached_property
+    def gaps_filled(self) -> AlignedRecording:
         """The same recording, single empty cells of its quantities filled from the nearest row in time.
 
         For what describes a residual; what the effects of a model compute is never made of filled values.
         """
         quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        if all(values is self.rows.quantities[name] for name, values in quantities.items()):
+            return self
         return replace(self, rows=replace(self.rows, quantities=quantities))
 
     @cached_property

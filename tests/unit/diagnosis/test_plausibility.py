@@ -1,4 +1,4 @@
-"""Which parameters are plausible: inside their range, or weaker, but never the other way."""
+"""Which parameters are plausible: inside their range, or weaker than usual, but never of the other sign."""
 
 from __future__ import annotations
 
