@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compd.diagnosis.error_fall import ErrorFall
-from compd.diagnosis.phrases import best_description, is_change, moment_text, thermal_in_one_session, untested_here
+from compd.diagnosis.phrases import (
+    best_description,
+    is_best_a_change,
+    is_change,
+    moment_text,
+    thermal_in_one_session,
+    untested_here,
+)
 from compd.model.formula.keys import FormulaDeclaration
 from compd.number_text import join_words
 
@@ -32,14 +39,17 @@ def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
             return [*clauses, *_how_to_tell(diagnosis), *_what_to_measure(diagnosis), *_what_may_be_added(diagnosis)]
         case "adequate":
             constant = diagnosis.constant
-            if constant is not None and constant.separated_by:
+            if constant is not None and (rows := _planned_rows(diagnosis)):
+                clauses.append(f"measure the {rows} rows below, which tell where the constant is from")
+            elif constant is not None and constant.separated_by:
                 clauses.append(f"to tell where the constant is from: {constant.separated_by}")
             return [*clauses, "nothing to mend or to add; other loads, temperatures or speeds may show more"]
         case "not_testable":
             vary = "vary one thing after the other: place, direction, load, temperature"
             return [*clauses, *(_proposed(diagnosis) or [vary])]
     clauses += ["change nothing on the machine yet", *_what_to_measure(diagnosis)]
-    if any(finding.formula_effects for finding in diagnosis.depends_on):
+    described = best_description(diagnosis)
+    if described is not None and described.formula_effects:
         clauses.append("until the cause is known, the formulas below lower the error")
     return clauses
 
@@ -65,23 +75,18 @@ def _what_may_be_added(diagnosis: Diagnosis) -> list[str]:
 
 
 def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
-    """What tells the effects that have rivals from these: planned rows, else the effects' own words."""
-    if not any(step.rivals for step in diagnosis.steps):
+    """What tells the effects that have rivals from these: planned rows, else words."""
+    first = next((step for step in diagnosis.steps if step.rivals), None)
+    if first is None:
         return []
     if rows := _planned_rows(diagnosis):
         return [f"measure the {rows} rows below, which tell the rivals apart"]
+    words = next(iter(_in_words(diagnosis)), first.effect.separated_by)
+    if words != NO_WORDS:
+        return [f"to tell {first.effect.id}: {words}"]
     recording = diagnosis.before.aligned.recording.path.name
-    return [
-        f"to tell {step.effect.id}: {step.effect.separated_by}"
-        if step.effect.separated_by != NO_WORDS
-        else f"compd plan {recording} --rivals {step.effect.id},{step.rivals[0].name} says what tells them apart"
-        for step in diagnosis.steps
-        if step.rivals
-    ]
-
-
-def _planned_rows(diagnosis: Diagnosis) -> int:
-    return sum("measure" not in row for row in diagnosis.next_measurement)
+    pair = f"{first.effect.id},{first.rivals[0].name}"
+    return [f"compd plan {recording} --rivals {pair} says what tells them apart"]
 
 
 def _what_to_measure(diagnosis: Diagnosis) -> list[str]:
@@ -89,17 +94,28 @@ def _what_to_measure(diagnosis: Diagnosis) -> list[str]:
     likely = [effect for effect in untested_here(diagnosis) if effect.likely][:1]
     if likely:
         return [f"{effect.effect} {effect.why.partition('; ')[0]}: record it" for effect in likely]
-    proposed = _proposed(diagnosis)
-    what = "the rest" if diagnosis.steps else "it"
-    return proposed or [f"record what may drive {what}: temperatures, loads, directions"]
-
-
-def _proposed(diagnosis: Diagnosis) -> list[str]:
-    """The planned rows, or the first of the measurements that are proposed in words."""
-    if rows := _planned_rows(diagnosis):
-        told = any(step.rivals for step in diagnosis.steps)
-        return [] if told else [f"measure the {rows} rows below"]
     finding = best_description(diagnosis)
     if finding is not None and finding.covariate.startswith("time"):
         return ["measure again on another day, in another order: time itself drives nothing"]
+    if is_best_a_change(diagnosis):
+        return ["diagnose the rows before and after it apart"]
+    what = "the rest" if diagnosis.steps else "it"
+    return _proposed(diagnosis) or [f"record what may drive {what}: temperatures, loads, directions"]
+
+
+def _proposed(diagnosis: Diagnosis) -> list[str]:
+    """What was proposed, but for rivals and for noise that is not known: of these is said elsewhere."""
+    if any(step.rivals for step in diagnosis.steps) or diagnosis.before.floor.source == "estimate":
+        return []
+    if rows := _planned_rows(diagnosis):
+        return [f"measure the {rows} rows below"]
+    return _in_words(diagnosis)
+
+
+def _planned_rows(diagnosis: Diagnosis) -> int:
+    return sum("measure" not in row for row in diagnosis.next_measurement)
+
+
+def _in_words(diagnosis: Diagnosis) -> list[str]:
+    """The first of the measurements that are proposed in words."""
     return [str(row["measure"]) for row in diagnosis.next_measurement if "measure" in row][:1]

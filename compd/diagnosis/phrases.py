@@ -191,8 +191,15 @@ def was_any_tried(diagnosis: Diagnosis) -> bool:
 
 
 def best_description(diagnosis: Diagnosis) -> EmpiricalFinding | None:
-    """What the rest follows best, changes apart."""
-    return next((finding for finding in diagnosis.depends_on if not is_change(finding)), None)
+    """What the rest follows best; None where nothing or a change describes it better than anything it follows."""
+    if not diagnosis.depends_on or is_best_a_change(diagnosis):
+        return None
+    return diagnosis.depends_on[0]
+
+
+def is_best_a_change(diagnosis: Diagnosis) -> bool:
+    """Whether a change in time describes the rest better than anything that it follows."""
+    return any(is_change(finding) for finding in diagnosis.depends_on[:1])
 
 
 def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:

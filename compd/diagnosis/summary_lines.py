@@ -15,6 +15,7 @@ from compd.diagnosis.phrases import (
     constant_text,
     followed_text,
     gross_texts,
+    is_best_a_change,
     is_change,
     parameter_texts,
     physics_clause,
@@ -53,7 +54,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     found = tuple(_found(diagnosis, fall))
     names = tuple(clause.partition(": ")[0] for clause in found)
     others = [
-        LabelledText("Changed", tuple(_changed(diagnosis))),
+        LabelledText("Changed", tuple(_changed(diagnosis, fall))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
@@ -75,37 +76,46 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
 def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     """The verdict's word and what it means here, on one line; effects are counted where their names are too long."""
     ids = [step.effect.id for step in diagnosis.steps]
-    verb, be = ("explains", "is") if len(ids) == 1 else ("explain", "are")
-    before, share = number_text(fall.before, fall.unit), percent_text(fall.share_of(fall.after))
+    count = f"{len(ids)} effects" if len(ids) > 1 else "one effect"
+    be = "is" if len(ids) == 1 else "are"
     match diagnosis.verdict:
         case "adequate" if fall.noise_known and diagnosis.constant is not None:
             text = "nothing is missing but a constant; what varies is noise"
         case "adequate" if fall.noise_known:
-            text = f"nothing is missing; the error of {before} is noise"
+            text = f"nothing is missing; the error of {number_text(fall.before, fall.unit)} is noise"
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
         case "ambiguous":
             ids = [
                 join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps
             ]
+            count += " or rivals" if len(ids) > 1 else " or a rival"
             text = f"{{}} {be} missing; these rows cannot tell"
-        case "partial" if fall.noise_known:
-            text = f"{{}} {verb} {share}; something else acts as well"
-        case "partial":
-            text = f"{{}} {verb} {share}; the noise is not known"
         case "adequate" | "not_testable" if was_any_tried(diagnosis):
             text = "no effect that was tried lowers the error; the noise is not known"
         case "not_testable":
             text = "no effect can be tested; nothing that drives one was varied"
-        case _ if ids:
-            text = f"{{}} {verb} {share}; the rest has no known cause"
         case _:
-            text = f"no effect that was tried explains the error of {before}"
-    count = f"{len(ids)} effects" if len(ids) > 1 else "one effect"
-    if diagnosis.verdict == "ambiguous":
-        count = f"{count} or {'rivals' if len(ids) > 1 else 'a rival'}"
+            text = _above_the_noise(diagnosis, fall)
     headings = [f"{diagnosis.verdict}: {text.format(names)}" for names in (join_words(ids), count)]
     return headings[len(headings[0]) > WIDTH]
+
+
+def _above_the_noise(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """What `partial` and `unexplained` mean, with {} for the names of the effects."""
+    before = number_text(fall.before, fall.unit)
+    if not diagnosis.steps:
+        if is_best_a_change(diagnosis):
+            return f"the error of {before} goes with a change in time"
+        return f"no effect that was tried explains the error of {before}"
+    verb = "explains" if len(diagnosis.steps) == 1 else "explain"
+    if is_best_a_change(diagnosis):
+        rest = "something changed in time"
+    elif diagnosis.verdict == "unexplained":
+        rest = "the rest has no known cause"
+    else:
+        rest = "something else acts as well" if fall.noise_known else "the noise is not known"
+    return f"{{}} {verb} {percent_text(fall.share_of(fall.after))}; {rest}"
 
 
 def _found(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
@@ -119,9 +129,13 @@ def _found(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     return clauses
 
 
-def _changed(diagnosis: Diagnosis) -> list[str]:
+def _changed(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     changes = [finding for finding in diagnosis.depends_on if is_change(finding)]
-    return [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MOST_NAMED]]
+    clauses = [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MOST_NAMED]]
+    return [
+        *clauses,
+        *(f"with it {fall_text([fall.after, finding.heldout_rms_um], fall.unit)}" for finding in changes[:1]),
+    ]
 
 
 def _follows(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
@@ -141,7 +155,7 @@ def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """The error that is left beside the noise, and what the difference means."""
-    described = None if diagnosis.steps else best_description(diagnosis)
+    described = next(iter(diagnosis.depends_on), None) if not diagnosis.steps else None
     contradiction = diagnosis.before.floor.contradiction
     remarks = [contradiction] if contradiction else []
     left = fall.after if described is None else described.heldout_rms_um
@@ -150,6 +164,8 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
         return [f"{text}; {CANNOT_KNOW}", *remarks]
     if diagnosis.verdict in ("adequate", "identified", "ambiguous") or left**2 <= NOISE_RATIO * fall.noise**2:
         meaning = "only noise is left"
+    elif diagnosis.steps and is_best_a_change(diagnosis):
+        meaning = "some of it goes with the change"
     elif diagnosis.steps or described:
         meaning = "something else acts as well"
     else:

@@ -239,17 +239,17 @@ Next:    change nothing on the machine yet; vary temperature_frame_degC alone,
          cause is known, the formulas below lower the error
 """,
     changed: """
-partial: stage_backlash explains 91 %; something else acts as well
+partial: stage_backlash explains 91 %; something changed in time
 Shares:   stage_backlash: play of screw and coupling
 Changed:  from 6000 s on (row 62) stage_backlash is larger: something happened
-          then
+          then; with it 0.90 -> 0.50 um
 Explains: 91 % of the squared error above noise: 2.6 -> 0.90 um, rows left out
-Left:     0.90 um; noise 0.50 um (repeats): something else acts as well
+Left:     0.90 um; noise 0.50 um (repeats): some of it goes with the change
 Sure:     b = 3.10 +- 0.10 um; noise alone does this 1 time in 1000
 Or else:  no other effect that was tried does as well
-Next:     find out what changed from 6000 s on (row 62); record what may drive
-          the rest: temperatures, loads, directions; what was found may be added
-          (compd effect add): it lowers the error, the rest stays
+Next:     find out what changed from 6000 s on (row 62); diagnose the rows
+          before and after it apart; what was found may be added (compd effect
+          add): it lowers the error, the rest stays
 """,
     nothing_missing: """
 adequate: nothing is missing; the error of 0.17 um is noise
