@@ -20,7 +20,8 @@ from compd.report.figures import (
     plot_residual_vectors,
     plot_workspace_map,
 )
-from compd.report.page import PageTable, Panel, write_page
+from compd.report.page import Panel, write_page
+from compd.report.page_table import PageTable
 from compd.report.small_multiples import plot_residual_against
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
