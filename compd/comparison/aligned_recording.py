@@ -12,19 +12,20 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import in_place_unit
+from compd.comparison.external_machine import external_change, external_observations, external_prediction
 from compd.comparison.registration import Registration, displacement_columns, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.deltas import Deltas, deltas_by_effect, sum_deltas
+from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
 from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
 from compd.model.effect_needs import unmet_needs
 from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.observe import observe, observe_tip
+from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
@@ -95,8 +96,8 @@ class AlignedRecording:
         """
         rows = self.rows if rows is None else rows
         if self.model is None:
-            predicted = np.asarray(_external_prediction(self.recording))
-            return predicted + self._along_axes(added["reference"]) if "reference" in added else predicted
+            predicted = external_prediction(self.recording)
+            return predicted + external_change(added, self.axes, self.of_links) if added else predicted
         prediction = predict(self.model, rows, added)
         if self.of_links:
             return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
@@ -113,16 +114,10 @@ class AlignedRecording:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
         if self.model is None:
-            return self._along_axes(basis)
+            added = split_by_port(effect, self.rows, basis)
+            return external_change(added, self.axes, self.of_links)
         derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))
         return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
-
-    def _along_axes(self, at_reference: FloatArray) -> FloatArray:
-        """(N, m, ...) what an external model's coordinates show of a displacement (N, 3, ...) at the reference."""
-        shown = np.zeros((len(at_reference), len(self.axes), *at_reference.shape[2:]))
-        within = [k for k, axis in enumerate(self.axes) if axis < at_reference.shape[1]]
-        shown[:, within] = at_reference[:, [self.axes[k] for k in within]]
-        return shown
 
     @cached_property
     def registration_columns(self) -> FloatArray:
@@ -204,8 +199,9 @@ class AlignedRecording:
     def __str__(self) -> str:
         recording = self.recording
         hours = (recording.time_s[-1] - recording.time_s[0]) / 3600.0
+        when = f"over {hours:.3g} h" if recording.has_time else "in order, without time"
         return (
-            f"{recording.path.name}: {recording.machine}, {recording.rows} rows over {hours:.3g} h, "
+            f"{recording.path.name}: {recording.machine}, {recording.rows} rows {when}, "
             f"{int(self.usable.mask.sum())} of them with a prediction and a measured {', '.join(self.labels)}"
         )
 
@@ -245,7 +241,7 @@ def align_recording(
     starts = _session_starts(recording)
     if configuration is None:
         model, geometry_hash = None, ""
-        observations = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, starts)
+        observations = external_observations(recording, starts)
     else:
         model = build_model(configuration.geometry, configuration.wiring)
         geometry_hash = configuration.geometry_hash
@@ -347,26 +343,3 @@ def _session_starts(recording: Recording) -> BoolArray:
     if recording.session is not None:
         starts[1:] = recording.session[1:] != recording.session[:-1]
     return starts
-
-
-def _external_prediction(recording: Recording) -> FloatArray:
-    """(N, m) what the user's own model predicts for each measured coordinate."""
-    predicted = recording.model_mm if recording.model_link_mm is None else recording.model_link_mm
-    if predicted is None:
-        raise RecordingError(
-            Problem(
-                where=str(recording.path),
-                what="`machine: external`, but no column of the model's prediction",
-                allowed="model_x_mm ...",
-                next_step="add the model's prediction, or name the machine",
-            )
-        )
-    return predicted
-
-
-def _external_tip(recording: Recording) -> FloatArray:
-    """(N, 3) the tip as far as the user's model predicts it; nan on the other axes."""
-    tip = np.full((recording.rows, 3), np.nan)
-    if recording.model_mm is not None:
-        tip[:, ["xyz".index(axis) for axis in recording.reference_axes]] = recording.model_mm
-    return tip

@@ -28,6 +28,7 @@ from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import link_residuals
 from compd.model.uncertainty import GaugeNoise
+from compd.recording.columns import is_sensitivity
 from compd.recording.reference import sigma_key
 from compd.tables import data_frame, html_table
 from compd.units import UM_PER_MM
@@ -429,4 +430,5 @@ def _last_digit_um(aligned: AlignedRecording) -> FloatArray:
 def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:
     """Quantities (N,) in whose order rows are neighbours: time, place, everything measured."""
     places = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
-    return (aligned.recording.time_s, *places, *aligned.recording.quantities.values())
+    measured = [values for name, values in aligned.recording.quantities.items() if not is_sensitivity(name)]
+    return (aligned.recording.time_s, *places, *measured)

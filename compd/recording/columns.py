@@ -46,10 +46,17 @@ class ColumnKind(NamedTuple):
         return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
 
 
+_SENSITIVITY_STEM = r"d_[A-Za-z]\w*_(?:[xyz]|link_[1-9]\d*)"
 COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
     ColumnKind(names, re.compile(stem), unit, meaning)
     for names, stem, unit, meaning in (
-        ("time_s", r"time", "s", "seconds from the start; every row is later than the one above"),
+        (
+            "time_s",
+            r"time",
+            "s",
+            "seconds from the start; every row is later than the one above. With `machine: external` optional: the "
+            "rows then count as taken in order",
+        ),
         (
             "session",
             r"session",
@@ -75,7 +82,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "approach_<i>",
             r"approach_[1-9]\d*",
             "",
-            "1 or -1: the direction in which link i last moved; without it, from the scales",
+            "1 or -1: the direction in which link i, or axis i of an external model, last moved; without it, from the "
+            "scales",
         ),
         (
             "reference_x_mm, reference_y_mm, reference_z_mm",
@@ -98,9 +106,21 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
         ),
         ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
-        ("force_x_N, force_y_N, force_z_N", r"force_[xyz]", "N", "force on the tip, in {M}"),
+        (
+            "force_x_N, force_y_N, force_z_N",
+            r"force_[xyz]",
+            "N",
+            "force on the tip, in {M}; where the tool stands on the plate, on the work",
+        ),
         ("pressure_hPa", r"pressure", "hPa", "air pressure"),
         ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
+        (
+            "d_<name>_x_mm, d_<name>_y_mm, d_<name>_z_mm, d_<name>_link_<i>_mm",
+            _SENSITIVITY_STEM,
+            "mm",
+            "derivative of the prediction by the parameter `name` of a model of your own, in mm per unit of the "
+            "parameter: for an effect with `sensitivity: name`, and for nothing else",
+        ),
     )
 )
 # With `machine: external` there is also a column model_... for every column reference_...; and anything else that was
@@ -141,8 +161,18 @@ def link_reference_column(link: int) -> str:
     return f"reference_link_{link}_mm"
 
 
+def is_sensitivity(name: str) -> bool:
+    """Whether `name` is the column of a derivative of a model's prediction by one of its parameters.
+
+    Such a column belongs to an effect; it is nothing that was measured, and no covariate.
+    """
+    return re.fullmatch(rf"{_SENSITIVITY_STEM}_mm", name) is not None
+
+
 def decimals(name: str) -> int | None:
     """How many decimals the column `name` is rounded to when it is written; None: written in full."""
+    if is_sensitivity(name):  # mm per any unit may be small
+        return None
     column = parse_name(name)
     return DECIMALS.get(column.unit if column else unit_of(name))
 
@@ -168,9 +198,12 @@ def is_covariate(name: str) -> bool:
 
 
 def is_header(cells: Sequence[str]) -> bool:
-    """Whether these cells are a recording's header: they name the time or, rightly or wrongly spelt, mostly columns."""
+    """Whether these cells are a recording's header: they name the time, a reference or, rightly or wrongly spelt,
+    mostly columns."""
     filled = [cell for cell in cells if cell]
     intended = [intended_column(cell) for cell in filled]
+    if any(name is not None and name.startswith("reference_") for name in intended):
+        return True
     return "time_s" in intended or sum(name is not None for name in intended) * 2 > max(2, len(filled))
 
 

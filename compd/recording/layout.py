@@ -34,9 +34,11 @@ class Layout:
 
     Attributes
     ----------
-    scales, joints : how many columns; 0 = none. frame : whether the nine frame comparators are there.
-    approach : whether there is an approach column for every scale. attitude : whether the reference has an attitude.
-    axes, links : of the reference's position, or the links (1-based) whose length it measures.
+    scales, joints : how many columns; 0 = none, or an external model.
+    frame : whether the nine frame comparators are there.
+    approach : whether there is an approach column for every scale; of an external model, any.
+    axes, attitude : of the reference's position; whether it has an attitude.
+    links : the links (1-based) whose length the reference measures.
     covariates : names of all other columns.
     ending : what the names of reference and model end in: "mm", or another unit that the sidecar names.
     """
@@ -76,6 +78,9 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     joints = _count(names, "joint", "um", external, problems)
     approaches = _count(names, "approach", "", external, problems)
     frame = [name for name in FRAME_COLUMNS if name in names]
+    if external:
+        # of gauges whose machine is not known nothing can be computed: each is a quantity like any other
+        scales, joints, frame = 0, 0, []
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
     if not external:
         if not scales and not any(name.startswith("scale_") for name in names):
@@ -95,7 +100,7 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
     if quantity == "ball_plate":
         axes = AXES
-    has_approach = 0 < approaches == scales
+    has_approach = approaches > 0 and (external or approaches == scales)
     layout = Layout(scales, joints, len(frame) == 9, has_approach, axes, len(attitude) == 3, links, (), ending)
     if sidecar is not None and reference_valid:
         _check_reference(names, sidecar, layout, attitude, problems)

@@ -75,6 +75,16 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
         for recording in recordings
         if recording.reference is not None and recording.reference.frame == "instrument"
     ]
+    problems += [
+        Problem(
+            where=str(recording.path),
+            what="has no time, so that nothing says when it began",
+            allowed="recordings with `time_s`",
+            next_step="put its rows into one table with a column `session`, or diagnose it by itself",
+        )
+        for recording in recordings
+        if not recording.has_time
+    ]
     for recording in others:
         comparisons = (
             ("is of another machine", recording.machine, first.machine, "leave it out"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,9 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     if table is None:
         raise RecordingError([*problems, *table_problems.problems])
     table = correct_names(table, table_problems)
+    has_time = "time_s" in table.letters or sidecar is None or not sidecar.external
+    if not has_time:
+        table = _with_row_numbers(table)
     layout = read_layout(list(table.letters), sidecar, reference_valid, table_problems)
     check_values(table, table_problems)
     excluded = _excluded(table, sidecar, table_problems)
@@ -81,7 +85,8 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     problems += table_problems.problems
     if problems or sidecar is None:
         raise RecordingError(problems)
-    return _build(table, sidecar, layout, excluded, plate, tuple(table_problems.warnings))
+    recording = _build(table, sidecar, layout, excluded, plate, tuple(table_problems.warnings))
+    return recording if has_time else _without_time(recording)
 
 
 def check_against(recording: Recording, configuration: Configuration) -> None:
@@ -90,6 +95,18 @@ def check_against(recording: Recording, configuration: Configuration) -> None:
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
     if problems := machine_problems(recording.machine, (scales, joints), configuration, str(recording.sidecar.path)):
         raise RecordingError(problems)
+
+
+def _with_row_numbers(table: CsvTable) -> CsvTable:
+    """The table with the number of each row, from 0, in the place of its time: the rows count as taken in order."""
+    numbers = np.arange(len(table.row), dtype=np.float64)
+    return replace(table, letters={**table.letters, "time_s": ""}, columns={**table.columns, "time_s": numbers})
+
+
+def _without_time(recording: Recording) -> Recording:
+    """The recording of a table `_with_row_numbers`: the column is not in the file, and its numbers are no seconds."""
+    columns = {name: values for name, values in recording.columns.items() if name != "time_s"}
+    return replace(recording, columns=columns, has_time=False)
 
 
 def _needed_columns(layout: Layout, sidecar: Sidecar | None) -> list[str]:

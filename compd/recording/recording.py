@@ -46,14 +46,16 @@ class Recording:
     path, sha256 : the CSV file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
-    time_s : (N,) seconds from the start, strictly rising, never nan.
+    time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
+    has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None where the column is absent; -1 where the cell is empty.
         Text ids of points are numbered in sorted order.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
         the scales (`compd.travel_direction`); nan where it is not known.
-    approach_measured : whether it is from the columns.
+        With `machine: external` None; gauges and directions are quantities then.
+    approach_measured : whether there are `approach` columns.
     quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
     reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
         ball plate the calibrated place of the row's ball, all three axes.
@@ -96,6 +98,7 @@ class Recording:
     left_out: Mapping[str, int]
     columns: Mapping[str, FloatArray]
     warnings: tuple[Problem, ...] = ()
+    has_time: bool = True
 
     @property
     def machine(self) -> str:

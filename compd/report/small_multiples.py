@@ -81,7 +81,11 @@ def _axis_unit(covariate: Covariate) -> str:
     """The unit of the covariate itself, where `Covariate.unit` is that of its changes."""
     if covariate.name.startswith("temperature"):
         return "K" if " - " in covariate.name else "degC"
-    return covariate.unit if covariate.unit != "1" else "-1 = shortening, +1 = lengthening"
+    if covariate.name.startswith("direction of link"):
+        return "-1 = shortening, +1 = lengthening"
+    if covariate.name.startswith("direction of axis"):
+        return "-1 = backwards, +1 = forwards"
+    return "" if covariate.unit == "1" else covariate.unit
 
 
 def add_dots_and_means(

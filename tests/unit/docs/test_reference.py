@@ -217,7 +217,7 @@ def test_every_column_of_a_recording(kind: Any) -> None:
     assert kind.meaning
     for name in kind.names.split(", "):
         assert f"`{name}`" in page("recording")
-        column = parse_name(re.sub(r"<[ik]>", "1", name).replace("<place>", "room"))
+        column = parse_name(re.sub(r"<[ik]>", "1", name).replace("<place>", "room").replace("<name>", "arm"))
         assert column is not None
         assert column.unit == kind.unit
 
