@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,6 @@ from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
-from compd.recording.gaps import filled
 from compd.recording.recording import Recording, UsableRows
 from compd.tables import Columns, data_frame, html_table
 from compd.units import REFERENCE_UNITS
@@ -131,14 +130,6 @@ class AlignedRecording:
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
-
-    def with_gaps_filled(self) -> AlignedRecording:
-        """The same recording, single empty cells of its quantities filled from the nearest row in time.
-
-        For what describes a residual; what the effects of a model compute is never made of filled values.
-        """
-        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
-        return replace(self, rows=replace(self.rows, quantities=quantities))
 
     @cached_property
     def usable(self) -> UsableRows:

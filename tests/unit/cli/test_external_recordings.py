@@ -13,7 +13,7 @@ from compd.comparison.compare import compare
 from compd.comparison.open import open_recording
 from compd.report.figures import plot_residual_vectors, plot_workspace_map
 from compd.report.small_multiples import NOT_RECORDED
-from tests.scoreboard.trial import run_in_process
+from tests.support.command import run_in_process
 from tests.support.external import Floats, measured_places, write_external
 
 NOISE_MM = 1e-3
