@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
+from compd.recording.gaps import filled
 from compd.recording.recording import Recording, UsableRows
 from compd.tables import Columns, data_frame, html_table
 from compd.units import REFERENCE_UNITS
@@ -112,6 +113,10 @@ class AlignedRecording:
     def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
+        return self.propagated(effect, basis)
+
+    def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:
+        """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
         if self.model is None:
             added = split_by_port(effect, self.rows, basis)
             return external_change(added, self.axes, self.of_links)
@@ -130,6 +135,17 @@ class AlignedRecording:
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
+
+    @cached_property
+    def gaps_filled(self) -> AlignedRecording:
+        """The same recording, single empty cells of its quantities filled from the nearest row in time.
+
+        For what describes a residual; what the effects of a model compute is never made of filled values.
+        """
+        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        if all(values is self.rows.quantities[name] for name, values in quantities.items()):
+            return self
+        return replace(self, rows=replace(self.rows, quantities=quantities))
 
     @cached_property
     def usable(self) -> UsableRows:
@@ -239,7 +255,7 @@ def align_recording(
         observations = _observations(recording, model, starts)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
-        links = tuple(range(len(labels)) if model is None else (i - 1 for i in recording.reference_links))
+        links = tuple(i - 1 for i in recording.reference_links)
         return AlignedRecording(
             recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
         )

@@ -47,3 +47,14 @@ def test_one_empty_cell_changes_no_trend(tmp_path: Path) -> None:
     assert [trend.covariate for trend in gap] == [trend.covariate for trend in whole]
     assert gap[0].covariate == "temperature_room"
     np.testing.assert_allclose(gap[0].slope, whole[0].slope, rtol=0.01)
+
+
+def test_a_recording_with_gaps_filled_keeps_its_own_values(tmp_path: Path) -> None:
+    columns = measured_places()
+    room = np.arange(120.0)
+    room[7] = NAN
+    aligned = open_recording(write_external(tmp_path, {**columns, "temperature_room_degC": room}))
+    whole = aligned.gaps_filled
+    assert whole.rows.quantities["temperature_room_degC"][7] in (6.0, 8.0)
+    assert np.isnan(aligned.rows.quantities["temperature_room_degC"][7])
+    assert np.isnan(whole.recording.quantities["temperature_room_degC"][7])
