@@ -87,7 +87,7 @@ class EmpiricalSearch:
         # which term is worth a contest shows on few rows
         self._screened = slice(None, None, max(1, len(problem.data.y) // SCREENED_ROWS))
         self._fits: list[EmpiricalFit] = []
-        for term in empirical_terms(problem.aligned):
+        for term in empirical_terms(problem.aligned, problem.comparison.residual_um):
             effect = term.effect()
             searched = SEARCHED_CONSTANT if term.constant else 0
             for constant in term.grid or (None,):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,9 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.model.effect import Effect
 from compd.model.formula.declaration import formula_effect
+from compd.model.motion import Movement
+from compd.model.observations import Observations
+from compd.model.observe import observe_external
 from compd.recording.reader import read_recording
 
 SIGMA_UM = 0.5
@@ -30,7 +33,8 @@ def record_external(
 ) -> AlignedRecording:
     """A recording, written and read: what was measured besides, and the error along each axis to which noise is added.
 
-    columns : without `time_s` a row is measured every ten seconds.  model_mm : the prediction by axis; 0 if left out.
+    columns : without `time_s` a row is measured every ten seconds; nan is an empty cell.
+    model_mm : the prediction by axis; 0 if left out.
     """
     rng = np.random.default_rng(seed)
     count = len(next(iter(errors_um.values())))
@@ -39,7 +43,8 @@ def record_external(
         predicted_mm = np.zeros(count) if model_mm is None else model_mm[axis]
         table[f"model_{axis}_mm"] = predicted_mm
         table[f"reference_{axis}_mm"] = predicted_mm + 1e-3 * (error_um + rng.normal(0, sigma_um, count))
-    lines = [",".join(table), *(",".join(f"{value:.9g}" for value in row) for row in zip(*table.values(), strict=True))]
+    lines = [",".join(table)]
+    lines += [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     reference = {"quantity": "tool_position", "frame": frame, "sigma_um": sigma_um}
     path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": "external", "reference": reference}))
@@ -51,3 +56,24 @@ def along(axis: str, effect_id: str, formula: str, **keys: Any) -> Effect:
     parameters = {"k": {"unit": "um", "plausible": [-100, 100], "source": "a test"}}
     declaration = {"id": effect_id, "port": "reference", "axis": axis, "formula": formula, "parameters": parameters}
     return formula_effect({**declaration, **keys}, "a test")
+
+
+def external_rows(
+    tip_M_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    *,
+    links: int = 0,
+    recorded: Collection[str] = ("time", "order"),
+    time_s: FloatArray | None = None,
+) -> Observations:
+    """Rows (N,) of such a machine, an hour apart; its links moved forwards at 1 mm/s, as far as that was recorded."""
+    count = len(tip_M_mm)
+    return observe_external(
+        tip_M_mm,
+        scale_mm=np.full((count, links), 5.0),
+        movement=Movement(np.ones((count, links)), np.ones((count, links)), np.zeros((count, 0))),
+        quantities=quantities,
+        time_s=3600.0 * np.arange(count) if time_s is None else time_s,
+        session_start=np.arange(count) == 0,
+        recorded=frozenset(recorded),
+    )
