@@ -43,7 +43,7 @@ class ColumnKind(NamedTuple):
 COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
     ColumnKind(names, re.compile(stem), unit, meaning)
     for names, stem, unit, meaning in (
-        ("time_s", r"time", "s", "seconds from the start; every row is later than the one above"),
+        ("time_s", r"time", "s", "seconds from the start, different in every row; rows count in this order, however the file is sorted"),
         (
             "session",
             r"session",
