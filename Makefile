@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard nightly clean
+.PHONY: help docs demo test long pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -17,8 +17,9 @@ help:
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
-	@echo "make scoreboard  the diagnosis on hundreds of simulated machines (hours; continues where it stopped)"
-	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench and a part of the scoreboard"
+	@echo "make scoreboard  the diagnosis on 1300 simulated machines (hours; continues where it stopped)"
+	@echo "make sensitivity  the scoreboard with each threshold of the diagnosis halved and doubled (hours; continues, too)"
+	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench and the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"
 
 $(STAMP): pyproject.toml
@@ -91,9 +92,17 @@ bench: $(STAMP)
 bench-sample: $(STAMP)
 	@for name in $(SAMPLE); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done
 
-# More by option: make scoreboard OPTIONS="--seeds 10 --jobs 8"
+# One thread each, because cases run side by side.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+# A part of it by option: make scoreboard OPTIONS="--family glints change --jobs 8"
 scoreboard: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.scoreboard $(OPTIONS)
+	$(ONE_THREAD) $(BIN)/python -m tests.scoreboard --set full $(OPTIONS)
+
+# On cases that `make scoreboard` never shows.
+sensitivity: $(STAMP)
+	$(ONE_THREAD) $(BIN)/python -m tests.scoreboard --set tuning --prepare --campaigns out/tuning
+	$(ONE_THREAD) $(BIN)/python -m tests.scoreboard.sensitivity --campaigns out/tuning $(OPTIONS)
 
 # The gallery runs simulations for a minute: only when the code or the configurations have changed.
 # SCREENSHOTS=required makes it an error that there is no Chromium.
@@ -111,10 +120,7 @@ docs: $(STAMP) $(GALLERY)
 	  --doctree-dir docs/_build/doctrees docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
-NIGHTLY_CASES ?= 200
-
-nightly: lint wheel demo test pages walks long hidden bench
-	$(MAKE) scoreboard OPTIONS="--most $(NIGHTLY_CASES)"
+nightly: lint wheel demo test pages walks long hidden bench scoreboard
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

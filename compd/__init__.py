@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from compd.model.effect import Effect as Effect
     from compd.model.effect import Parameter as Parameter
     from compd.model.effect import memoryless_basis as memoryless_basis
+    from compd.model.library.effects_file import load_effects as load_effects
     from compd.release import __version__ as __version__
     from compd.simulation.campaign.simulate_campaign import simulate_campaign as simulate_campaign
 
@@ -34,6 +35,7 @@ _MODULES = {
     "open_recording": "compd.comparison.open",
     "compare": "compd.api",
     "diagnose": "compd.api",
+    "load_effects": "compd.model.library.effects_file",
     "add_effect": "compd.api",
     "open_model": "compd.api",
     "plan_measurement": "compd.api",

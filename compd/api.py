@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,18 +14,19 @@ from compd.comparison.compare import Comparison
 from compd.comparison.compare import compare as compare_aligned
 from compd.comparison.open import open_recording
 from compd.comparison.shape_search import search_constants
-from compd.configuration.document import read_document
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
+from compd.diagnosis.measurement_plan import MeasurementPlan
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.next_measurement import MeasurementPlan, require_kinematics
 from compd.diagnosis.next_measurement import plan_measurement as plan_fitted_rivals
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
+from compd.model.effect_needs import can_concern
 from compd.model.library import find_effect, load_library
-from compd.model_document import Declaration, read_stored
+from compd.model.library.effects_file import gather_effects, named_effect
+from compd.model_document import read_stored
 from compd.model_file import ModelFile, read_model_file
 from compd.recording.sidecar import EXTERNAL
 
@@ -32,6 +34,8 @@ from compd.recording.sidecar import EXTERNAL
 Recorded: TypeAlias = AlignedRecording | str | Path
 # An opened model or its path; None for the machine without effects.
 Model: TypeAlias = ModelFile | str | Path | None
+# Effects of one's own: an effect, a source of effects as `load_effects` takes it, or several of these.
+Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
 # Lowest and highest.
 Range: TypeAlias = tuple[float, float]
 
@@ -69,7 +73,7 @@ def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
     path = Path(path)
     if machine is None:
         name = read_stored(path).machine
-        links = 0 if name == EXTERNAL else _shipped_links(name, path)
+        links = None if name == EXTERNAL else _shipped_links(name, path)
     else:
         configuration = load_machine(machine)
         name, links = configuration.machine, configuration.geometry.links
@@ -118,7 +122,7 @@ def diagnose(
     recording: Recorded,
     model: Model = None,
     *,
-    effects: Sequence[Effect] = (),
+    effects: Effects = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Learn which physical effect the model of the machine lacks.
@@ -133,8 +137,9 @@ def diagnose(
         make effects distinguishable.
     model : ModelFile, str or Path, optional
         What is known already; its effects are fitted along. The file is not changed.
-    effects : sequence of Effect
-        Effects of your own, tried beside those that are installed.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own, tried beside those that are installed: each an effect, or a source of several as
+        `load_effects` takes it.
     progress : callable
         Called with a text when a stage of the search begins. A diagnosis takes seconds.
 
@@ -146,10 +151,13 @@ def diagnose(
     Raises
     ------
     CompdError
-        As `compare`.
+        As `compare`, and as `load_effects` for `effects`.
 
     Notes
     -----
+    With ``machine: external`` only those effects of the library are tried that act on what was predicted; the others
+    act inside a machine that compd does not know.
+
     The selection is by cross-validation over sessions with a penalty for each further effect (M. Stone, J. R. Stat.
     Soc. B 36 (1974) 111); every threshold stands with its reason in `compd.diagnosis.criteria`.
 
@@ -162,11 +170,20 @@ def diagnose(
     """
     aligned = _opened(recording)
     file = _opened_model(model, aligned)
-    library = [*load_library().values(), *effects]
-    return diagnose_aligned(aligned, file.fitted, file.covariance, library, progress or (lambda status: None))
+    given = gather_effects(effects)
+    rows = aligned.rows
+    library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
+    candidates = [*library, *given.values()]
+    return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress or (lambda status: None))
 
 
-def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], recording: Recorded) -> ModelFile:
+def add_effect(
+    model: Model,
+    effect: Effect | str | Path | Mapping[str, Any],
+    recording: Recorded,
+    *,
+    effects: Effects = (),
+) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
 
     Parameters
@@ -175,10 +192,12 @@ def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], re
         The model as it is; None begins a new one. It is not changed, nor is its file: the result is a new model, kept
         by its `write`.
     effect : Effect, str, Path or dict
-        An effect of the library or its id; ``"/absolute/file.py:NAME"``; a formula as a mapping, such as
-        `EmpiricalFinding.formula_effects` has, or the path of the YAML file that it is written in.
+        An effect of the library or of `effects`, or its id; ``"file.py:NAME"``; a formula as a mapping, such as
+        `EmpiricalFinding.formula_effects` has; the path of a YAML file with one effect, or ``"file.yaml:ID"``.
     recording : AlignedRecording, str or Path
         What to fit on.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own beside those that are installed, as for `diagnose`.
 
     Returns
     -------
@@ -203,9 +222,10 @@ def add_effect(model: Model, effect: Effect | str | Path | Mapping[str, Any], re
     >>> round(compd.compare(monday, model).rms_um, 2)
     0.18
     """
-    declared, found = _declared(effect)
+    found = _found(effect, gather_effects(effects))
+    declared = found.declared if isinstance(found.declared, str) else dict(found.declared)
     aligned = _opened(recording)
-    return model_changes.add(_opened_model(model, aligned), declared, found, aligned)
+    return model_changes.add(_opened_model(model, aligned), declared or found.id, found, aligned)
 
 
 def plan_measurement(
@@ -214,10 +234,13 @@ def plan_measurement(
     *,
     rows: int = 40,
     model: Model = None,
+    effects: Effects = (),
+    beside: Sequence[str] = (),
     workspace_M_mm: tuple[Range, Range, Range] | None = None,
     force_N: float | None = None,
     temperature_degC: Range | None = None,
     speed_mm_per_s: float | None = None,
+    limits: Mapping[str, Range] | None = None,
 ) -> MeasurementPlan:
     """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most.
 
@@ -231,6 +254,11 @@ def plan_measurement(
         How many rows may be measured at most.
     model : ModelFile, str or Path, optional
         What is known already.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own, which `rivals` and `beside` may name, as for `diagnose`.
+    beside : sequence of str
+        Ids of other effects that act on the recording and are not in the model, such as the other steps of a diagnosis;
+        they are fitted along.
     workspace_M_mm : three pairs of float, optional
         Lowest and highest x, y and z of the tip in {M}, mm; left out, as in the recording.
     force_N : float, optional
@@ -239,6 +267,9 @@ def plan_measurement(
         Lowest and highest temperature, degC; left out, as in the recording.
     speed_mm_per_s : float, optional
         Fastest motion of a link, mm/s; left out, as in the recording.
+    limits : dict, optional
+        With ``machine: external``, in place of the four above: lowest and highest value of a column that the rivals are
+        computed from; of a column that is left out, as in the recording.
 
     Returns
     -------
@@ -249,10 +280,9 @@ def plan_measurement(
     ------
     CompdError
         Where the rivals are not two different effects, or one of them is in the model already; where a limit is no
-        rising pair or negative; where the effects cannot be fitted on this recording.
+        rising pair, negative, or for another kind of machine; where the effects cannot be fitted on this recording.
     RecordingError
-        For an external model, of whose machine no measurement can be planned; and where a place within the limits
-        cannot be reached.
+        Where a place within the limits cannot be reached.
 
     Notes
     -----
@@ -279,11 +309,11 @@ def plan_measurement(
                 next_step="a diagnosis names rivals",
             )
         )
-    effects = [find_effect(name, "rivals") for name in rivals]
+    own = gather_effects(effects)
+    first, second, *others = (named_effect(name, "rivals", own) for name in (*rivals, *beside))
     aligned = _opened(recording)
-    require_kinematics(aligned)
     file = _opened_model(model, aligned)
-    present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in rivals]
+    present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in (*rivals, *beside)]
     if present:
         raise CompdError(
             Problem(
@@ -294,10 +324,13 @@ def plan_measurement(
                 next_step="`compd effect remove` takes it out",
             )
         )
-    limits = _limits(recorded_limits(aligned), workspace_M_mm, force_N, temperature_degC, speed_mm_per_s)
+    given = _plan_limits(aligned, workspace_M_mm, force_N, temperature_degC, speed_mm_per_s, limits or {})
     sigma_um = compare_aligned(aligned, file.fitted, file.covariance).floor.by_axis_um
-    first, second = (search_constants(aligned, file.fitted, effect, sigma_um).fitted[-1] for effect in effects)
-    return plan_fitted_rivals(aligned, file.fitted, (first, second), sigma_um, limits, rows)
+    fitted = file.fitted
+    for effect in others:
+        fitted = search_constants(aligned, fitted, effect, sigma_um).fitted
+    pair = [search_constants(aligned, fitted, effect, sigma_um).fitted for effect in (first, second)]
+    return plan_fitted_rivals(aligned, pair[0][:-1], (pair[0][-1], pair[1][-1]), sigma_um, given, rows)
 
 
 def _opened(recording: Recorded) -> AlignedRecording:
@@ -321,27 +354,35 @@ def _opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
                 next_step="give this machine's model, or begin a new one",
             )
         )
-    return model
-
-
-def _declared(effect: Effect | str | Path | Mapping[str, Any]) -> tuple[Declaration, Effect]:
-    """How a model file declares the effect, and the effect. Raises CompdError with every problem."""
-    if isinstance(effect, Effect):
-        if load_library().get(effect.id) != effect:
-            raise CompdError(
-                Problem(
-                    where=f"effect {effect.id}",
-                    what="is not installed, so that a model file could not name it",
-                    next_step='put it into a file and give "/absolute/file.py:NAME"',
-                )
+    if model.links not in (0, links):
+        raise StateError(
+            Problem(
+                where="model",
+                what="has another number of links than the recording",
+                value=str(model.links),
+                allowed=str(links),
+                next_step="give the model of these links, or begin a new one",
             )
-        return effect.id, effect
+        )
+    # of an external model, whose effects had no number of a single link
+    return replace(model, links=links)
+
+
+def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:
+    """The effect that is to be added, such that a model file can name it. Raises CompdError with every problem."""
     if isinstance(effect, Mapping):
-        return dict(effect), find_effect(effect, "effect")
-    if Path(effect).suffix in (".yaml", ".yml"):
-        declared = read_document(Path(effect)).data
-        return declared, find_effect(declared, str(effect))
-    return str(effect), find_effect(str(effect), "effect")
+        return find_effect(effect, "effect")
+    if not isinstance(effect, Effect):
+        return named_effect(str(effect), "effect", given)
+    if not effect.declared and load_library().get(effect.id) != effect:
+        raise CompdError(
+            Problem(
+                where=f"effect {effect.id}",
+                what="is not installed, so that a model file could not name it",
+                next_step='put it into a file and give "/absolute/file.py:NAME"',
+            )
+        )
+    return effect
 
 
 def _shipped_links(name: str, path: Path) -> int:
@@ -359,34 +400,55 @@ def _shipped_links(name: str, path: Path) -> int:
     return load_machine(name).geometry.links
 
 
-def _limits(
-    recorded: ProgrammeLimits,
+def _plan_limits(
+    aligned: AlignedRecording,
     workspace_M_mm: tuple[Range, Range, Range] | None,
     force_N: float | None,
     temperature_degC: Range | None,
     speed_mm_per_s: float | None,
-) -> ProgrammeLimits:
-    """The recorded limits, with those that a person gives instead. Raises CompdError with every one that is faulty."""
+    by_column: Mapping[str, Range],
+) -> ProgrammeLimits | Mapping[str, Range]:
+    """The limits that a plan keeps.
+
+    Raises CompdError with every one that is faulty, or for the other kind of machine.
+    """
     pairs = {f"workspace_M_mm, {axis}": pair for axis, pair in zip("xyz", workspace_M_mm or (), strict=False)}
     if temperature_degC is not None:
         pairs["temperature_degC"] = temperature_degC
     largest = {"force_N": force_N, "speed_mm_per_s": speed_mm_per_s}
+    given: dict[str, Any] = {name: value for name, value in largest.items() if value is not None}
     problems = [
         Problem(where=name, what="is not understood", value=str(pair), allowed="two numbers, low before high")
         for name, pair in pairs.items()
         if not (len(pair) == 2 and pair[0] < pair[1])
     ]
     problems += [
+        Problem(where=f"limit of {name}", what="is not understood", value=str(pair), allowed="two numbers, low first")
+        for name, pair in by_column.items()
+        if not (len(pair) == 2 and pair[0] <= pair[1])
+    ]
+    problems += [
         Problem(where=name, what="is not understood", value=str(value), allowed="0 or more")
-        for name, value in largest.items()
-        if value is not None and not value >= 0
+        for name, value in given.items()
+        if not value >= 0
+    ]
+    external = aligned.model is None
+    problems += [
+        Problem(
+            where=name,
+            what="is a limit of an external machine" if not external else "is no limit of an external machine",
+            allowed="limits by column" if external else "workspace, force, temperature and speed",
+            next_step="give `--limit COLUMN=LOW,HIGH`, in Python limits={COLUMN: (LOW, HIGH)}" if external else "",
+        )
+        for name in ([*pairs, *given] if external else [f"limit of {name}" for name in by_column])
     ]
     if problems:
         raise CompdError(problems)
-    given: dict[str, Any] = {name: value for name, value in largest.items() if value is not None}
+    if external:
+        return by_column
     if workspace_M_mm is not None:
         low_M_mm, high_M_mm = np.array(workspace_M_mm, dtype=np.float64).T
         given |= {"tip_low_M_mm": low_M_mm, "tip_high_M_mm": high_M_mm}
     if temperature_degC is not None:
         given["temperature_degC"] = temperature_degC
-    return recorded._replace(**given)
+    return recorded_limits(aligned)._replace(**given)

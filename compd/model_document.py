@@ -206,6 +206,13 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
     )
 
 
+class _Dumper(yaml.SafeDumper):
+    """Writes a formula that stands in the model and in a step twice, and not as `&id001` and `*id001`."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
 def write_stored(path: Path, stored: StoredModel) -> None:
     """Write a model whole or not at all. Raises StateError where the disk refuses."""
     data = {
@@ -216,7 +223,7 @@ def write_stored(path: Path, stored: StoredModel) -> None:
         **stored.state,
         "steps": [{**asdict(step), "replaced": dict(step.replaced)} for step in stored.steps],
     }
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
     try:
         # the daemon, another user, must be able to read it
         write_files({path: text}, mode=0o644)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effect import FittedEffect
+from compd.model.effect import Effect, FittedEffect
 from compd.model.library import find_effect
 from compd.model_document import (
     Declaration,
@@ -81,7 +82,7 @@ class ModelFile:
     machine : str
         Name of the machine's configuration, or ``"external"``.
     links : int
-        Number of the machine's links; 0 for ``"external"``.
+        Number of the machine's links; of an external model 0, or the number of links whose length it predicts.
     declared : tuple of str or dict
         Each effect as it was named: an id, ``/absolute/file.py:NAME``, or a formula written out.
     fitted : tuple of FittedEffect
@@ -182,9 +183,10 @@ class ModelFile:
         return {name: [getattr(number, name) for number in numbers] for name in EffectNumber.__dataclass_fields__}
 
 
-def read_model_file(path: Path, machine: str, links: int, geometry: str = "") -> ModelFile:
-    """Read a model file for the machine of this name with so many links (0 for an external model).
+def read_model_file(path: Path, machine: str, links: int | None, geometry: str = "") -> ModelFile:
+    """Read a model file for the machine of this name with so many links.
 
+    links : 0 for an external model of a tip; None for an external model, of as many links as the file has numbers of.
     geometry : hash of the machine's geometry, where numbers that were fitted on another one are of no use.
     Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
     installed, numbers that are missing.
@@ -211,21 +213,25 @@ def read_model_file(path: Path, machine: str, links: int, geometry: str = "") ->
             )
         )
     problems: list[Problem] = []
-    fitted: list[FittedEffect] = []
+    found: list[tuple[Effect, EffectEntry, str]] = []
     for number, entry in enumerate(document.effects, start=1):
+        where = f"{path}, effect {number}"
         try:
-            fitted.append(_fitted_effect(entry, links, f"{path}, effect {number}", problems))
+            found.append((find_effect(entry.effect, where), entry, where))
         except CompdError as error:
             problems += error.problems
-    count = sum(len(effect.theta) for effect in fitted)
+    if links is None:
+        links = max((_links_of(effect, entry) for effect, entry, _ in found), default=0)
+    fitted = [_fitted_effect(effect, entry, links, where, problems) for effect, entry, where in found]
+    parameters = sum(len(effect.theta) for effect in fitted)
     covariance = np.array(document.covariance, dtype=np.float64).reshape(len(document.covariance), -1)
-    if not problems and len(covariance) != count:
+    if not problems and len(covariance) != parameters:
         problems.append(
             Problem(
                 where=f"{path}, covariance",
                 what="has another size than the parameters",
                 value=str(covariance.shape),
-                allowed=f"({count}, {count})",
+                allowed=f"({parameters}, {parameters})",
                 next_step="fit it again with `compd effect fit`",
             )
         )
@@ -251,9 +257,15 @@ def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray)
     )
 
 
-def _fitted_effect(entry: EffectEntry, links: int, where: str, problems: list[Problem]) -> FittedEffect:
-    """The effect with its numbers; what is missing goes to `problems`. Raises CompdError where it is not installed."""
-    effect = find_effect(entry.effect, where)
+def _links_of(effect: Effect, entry: EffectEntry) -> int:
+    """How many links the file has numbers of an effect for; 0 where it has none for single links."""
+    names = {parameter.name for parameter in entry.parameters}
+    of_links = [parameter for parameter in effect.parameters if parameter.per == "link"]
+    return next(i for i in count() if not any(f"{parameter.name}_{i + 1}" in names for parameter in of_links))
+
+
+def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, problems: list[Problem]) -> FittedEffect:
+    """The effect with its numbers; what is missing goes to `problems`."""
     values = {parameter.name: parameter.value for parameter in entry.parameters}
     columns = effect.columns(links)
     names = [column.name for column in columns]

@@ -1,4 +1,4 @@
-"""Units: the factor between millimetres and micrometres, and the units in which column names end."""
+"""Units: the factor between millimetres and micrometres, units of a reference, and those in which column names end."""
 
 from __future__ import annotations
 
@@ -6,6 +6,17 @@ from collections.abc import Mapping
 
 # Micrometres in a millimetre: what people read is in um, what is computed in mm.
 UM_PER_MM = 1e3
+
+# Units in which a reference and its errors may be given, and what the names of their columns end in. Of "um" the
+# columns are in mm; of every other unit the number is computed with as if the unit were a micrometre.
+REFERENCE_UNITS: Mapping[str, str] = {
+    "um": "mm",
+    "arcsec": "arcsec",
+    "deg": "deg",
+    "mrad": "mrad",
+    "urad": "urad",
+    "um/m": "um_per_m",
+}
 
 # Factor to the first unit of each kind (SI brochure, 9th edition; kgf and inch by definition).
 UNIT_KINDS: tuple[Mapping[str, float], ...] = (

@@ -15,6 +15,15 @@ DaemonOption = Annotated[
 MachineOption = Annotated[
     Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
 ]
+EffectsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effects",
+        metavar="FILE",
+        help="Effects of your own beside the library's: FILE.yaml, FILE.py, a directory of them, or the name of a file "
+        "that comes with compd. May be repeated.",
+    ),
+]
 
 
 def unix_address(address: str) -> str:

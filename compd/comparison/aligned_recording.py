@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,24 +11,28 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import in_place_unit
+from compd.comparison.external_machine import external_change, external_observations, external_prediction
 from compd.comparison.registration import Registration, displacement_columns, register, registration_columns
 from compd.comparison.velocity import velocities
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.deltas import Deltas, deltas_by_effect, sum_deltas
+from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
 from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
 from compd.model.effect_needs import unmet_needs
 from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.observe import observe, observe_tip
+from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
+from compd.recording.gaps import filled
 from compd.recording.recording import Recording, UsableRows
 from compd.tables import Columns, data_frame, html_table
+from compd.units import REFERENCE_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,6 +74,11 @@ class AlignedRecording:
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property
+    def unit(self) -> str:
+        """The unit in which people read the residual: ``"um"``, or what the sidecar names, such as ``"arcsec"``."""
+        return self.recording.unit
+
+    @property
     def of_links(self) -> bool:
         """Whether link lengths were measured, not the tip."""
         return self.recording.reference_link_mm is not None
@@ -87,8 +96,8 @@ class AlignedRecording:
         """
         rows = self.rows if rows is None else rows
         if self.model is None:
-            predicted = np.asarray(_external_prediction(self.recording))
-            return predicted if "reference" not in added else predicted + added["reference"][:, list(self.axes)]
+            predicted = external_prediction(self.recording)
+            return predicted + external_change(added, self.axes, self.of_links) if added else predicted
         prediction = predict(self.model, rows, added)
         if self.of_links:
             return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
@@ -105,7 +114,8 @@ class AlignedRecording:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
         basis, _ = effect.basis(self.rows, shape, None)
         if self.model is None:
-            return np.asarray(basis[:, list(self.axes)])
+            added = split_by_port(effect, self.rows, basis)
+            return external_change(added, self.axes, self.of_links)
         derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))
         return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
 
@@ -121,6 +131,14 @@ class AlignedRecording:
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
+
+    def with_gaps_filled(self) -> AlignedRecording:
+        """The same recording, single empty cells of its quantities filled from the nearest row in time.
+
+        For what describes a residual; what the effects of a model compute is never made of filled values.
+        """
+        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        return replace(self, rows=replace(self.rows, quantities=quantities))
 
     @cached_property
     def usable(self) -> UsableRows:
@@ -145,19 +163,20 @@ class AlignedRecording:
         pandas.DataFrame
             N rows: `row`, the row as a spreadsheet shows it; every column of the file under its own name, in its own
             unit; then for each measured coordinate `measured_x_mm` and `predicted_x_mm` in {M} (or
-            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect. nan where a cell is
-            empty and where there is no pose.
+            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect; for a reference in
+            another unit `measured_x_arcsec` ... nan where a cell is empty and where there is no pose.
 
         Raises
         ------
         CompdError
             Where pandas is not installed.
         """
-        predicted_mm = self.predicted_mm({})
+        measured, predicted = (in_place_unit(place, self.unit) for place in (self.measured_mm, self.predicted_mm({})))
+        ending = REFERENCE_UNITS[self.unit]
         columns: dict[str, Any] = {"row": self.recording.row, **self.recording.columns}
         for k, name in enumerate(self.label_names):
-            columns[f"measured_{name}_mm"] = self.measured_mm[:, k]
-            columns[f"predicted_{name}_mm"] = predicted_mm[:, k]
+            columns[f"measured_{name}_{ending}"] = measured[:, k]
+            columns[f"predicted_{name}_{ending}"] = predicted[:, k]
         return data_frame(columns)
 
     @property
@@ -180,8 +199,9 @@ class AlignedRecording:
     def __str__(self) -> str:
         recording = self.recording
         hours = (recording.time_s[-1] - recording.time_s[0]) / 3600.0
+        when = f"over {hours:.3g} h" if recording.has_time else "in order, without time"
         return (
-            f"{recording.path.name}: {recording.machine}, {recording.rows} rows over {hours:.3g} h, "
+            f"{recording.path.name}: {recording.machine}, {recording.rows} rows {when}, "
             f"{int(self.usable.mask.sum())} of them with a prediction and a measured {', '.join(self.labels)}"
         )
 
@@ -221,14 +241,14 @@ def align_recording(
     starts = _session_starts(recording)
     if configuration is None:
         model, geometry_hash = None, ""
-        observations = observe_tip(_external_tip(recording), recording.quantities, recording.time_s, starts)
+        observations = external_observations(recording, starts)
     else:
         model = build_model(configuration.geometry, configuration.wiring)
         geometry_hash = configuration.geometry_hash
         observations = _observations(recording, model, starts)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
-        links = tuple(i - 1 for i in recording.reference_links)
+        links = tuple(range(len(labels)) if model is None else (i - 1 for i in recording.reference_links))
         return AlignedRecording(
             recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
         )
@@ -323,26 +343,3 @@ def _session_starts(recording: Recording) -> BoolArray:
     if recording.session is not None:
         starts[1:] = recording.session[1:] != recording.session[:-1]
     return starts
-
-
-def _external_prediction(recording: Recording) -> FloatArray:
-    """(N, m) what the user's own model predicts for each measured coordinate."""
-    predicted = recording.model_mm if recording.model_link_mm is None else recording.model_link_mm
-    if predicted is None:
-        raise RecordingError(
-            Problem(
-                where=str(recording.path),
-                what="`machine: external`, but no column of the model's prediction",
-                allowed="model_x_mm ...",
-                next_step="add the model's prediction, or name the machine",
-            )
-        )
-    return predicted
-
-
-def _external_tip(recording: Recording) -> FloatArray:
-    """(N, 3) the tip as far as the user's model predicts it; nan on the other axes."""
-    tip = np.full((recording.rows, 3), np.nan)
-    if recording.model_mm is not None:
-        tip[:, ["xyz".index(axis) for axis in recording.reference_axes]] = recording.model_mm
-    return tip

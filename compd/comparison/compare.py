@@ -16,6 +16,7 @@ from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import format_error, residual_ending
 from compd.comparison.fit import frame_motion_um
 from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
@@ -27,6 +28,8 @@ from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import link_residuals
 from compd.model.uncertainty import GaugeNoise
+from compd.recording.columns import is_sensitivity
+from compd.recording.reference import sigma_key
 from compd.tables import data_frame, html_table
 from compd.units import UM_PER_MM
 
@@ -53,7 +56,7 @@ class Comparison:
     fitted : tuple of FittedEffect
         The effects of the model.
     residual_um : (N, m) array
-        Measured minus modelled, um; nan where a row cannot be used.
+        Measured minus modelled, um (or in `aligned.unit`, as all numbers in um); nan where a row cannot be used.
     used : (N,) array of bool
         The rows that count.
     outlier : (N,) array of bool
@@ -136,21 +139,20 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """The result in a sentence or two, for a person at the machine."""
-        who = (
-            f"{self.aligned.recording.machine}: measured and modelled differ by {self.rms_um:.3g} um "
-            "(rms per coordinate)"
-        )
+        unit = self.aligned.unit
+        error, noise = format_error(self.rms_um, unit, 3), format_error(self.floor.um, unit, 3)
+        who = f"{self.aligned.recording.machine}: measured and modelled differ by {error} (rms per coordinate)"
         if not self.floor.known:
             return (
                 f"{who}. How much of it is noise cannot be known: measure one point twice, with the same number in the "
-                "column `visit`, or declare the reference's uncertainty, `sigma_um`."
+                f"column `visit`, or declare the reference's uncertainty, `{sigma_key(unit)}`."
             )
         if self.at_floor:
-            return f"{who}, which is the noise of the measurement itself ({self.floor.um:.3g} um): nothing is missing."
+            return f"{who}, which is the noise of the measurement itself ({noise}): nothing is missing."
         share = 1 - 1 / self.floor_ratio
         return (
-            f"{who}; noise alone would be {self.floor.um:.3g} um. {100 * share:.0f} % of the squared error has a cause "
-            "that the model does not have."
+            f"{who}; noise alone would be {noise}. {100 * share:.0f} % of the squared error has a cause that the model "
+            "does not have."
         )
 
     @property
@@ -168,20 +170,20 @@ class Comparison:
         -------
         pandas.DataFrame
             N rows: `row`, the row as a spreadsheet shows it; `time_s`; for each measured coordinate `residual_x_um`
-            (or `residual_link_1_um`), measured minus modelled, nan where a row cannot be used; `used` and `outlier`,
-            true or false; `why_left_out`, the reason in words or an empty text.
+            (or `residual_link_1_um`; in another unit `residual_x_arcsec` ...), measured minus modelled, nan where a row
+            cannot be used; `used` and `outlier`, true or false; `why_left_out`, the reason in words or an empty text.
 
         Raises
         ------
         CompdError
             Where pandas is not installed.
         """
-        names = self.aligned.label_names
+        names, ending = self.aligned.label_names, residual_ending(self.aligned.unit)
         return data_frame(
             {
                 "row": self.aligned.recording.row,
                 "time_s": self.aligned.recording.time_s,
-                **{f"residual_{name}_um": self.residual_um[:, k] for k, name in enumerate(names)},
+                **{f"residual_{name}_{ending}": self.residual_um[:, k] for k, name in enumerate(names)},
                 "used": self.used,
                 "outlier": self.outlier,
                 "why_left_out": self.why_left_out,
@@ -189,13 +191,13 @@ class Comparison:
         )
 
     def _repr_html_(self) -> str:
-        size_um = np.abs(self.residual_um[self.used])
+        size_um, ending = np.abs(self.residual_um[self.used]), residual_ending(self.aligned.unit)
         table = {
             "coordinate": self.aligned.labels,
-            "rms_um": self.rms_by_axis_um.tolist(),
-            "noise_floor_um": self.floor.by_axis_um.tolist(),
-            "95_percent_um": np.quantile(size_um, 0.95, axis=0).tolist(),
-            "largest_um": size_um.max(axis=0).tolist(),
+            f"rms_{ending}": self.rms_by_axis_um.tolist(),
+            f"noise_floor_{ending}": self.floor.by_axis_um.tolist(),
+            f"95_percent_{ending}": np.quantile(size_um, 0.95, axis=0).tolist(),
+            f"largest_{ending}": size_um.max(axis=0).tolist(),
         }
         remarks = [
             f"{int(self.used.sum())} rows used, {len(self.used) - int(self.used.sum())} not. "
@@ -209,7 +211,10 @@ class Comparison:
         return f"<Comparison: {self.verdict}>"
 
     def as_json(self) -> dict[str, Any]:
-        """What `compd compare --json` prints, as plain data; nan and inf are None."""
+        """What `compd compare --json` prints, as plain data; nan and inf are None.
+
+        Keys that end in `_um` hold numbers in `unit`, which is um unless the sidecar names another.
+        """
         recording = self.aligned.recording
         size = np.abs(self.residual_um[self.used])
         distance = self.distance_um[self.used]
@@ -218,6 +223,7 @@ class Comparison:
             "recording": str(recording.path),
             "sha256": recording.sha256,
             "machine": recording.machine,
+            "unit": self.aligned.unit,
             "effects": [effect.effect.id for effect in self.fitted],
             "axes": list(self.aligned.labels),
             "residual_rms_um": self.rms_um,
@@ -309,6 +315,7 @@ def compare(
         _last_digit_um(aligned),
         _orders(aligned),
         criteria,
+        aligned.unit,
     )
     links_um = None
     if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
@@ -423,4 +430,5 @@ def _last_digit_um(aligned: AlignedRecording) -> FloatArray:
 def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:
     """Quantities (N,) in whose order rows are neighbours: time, place, everything measured."""
     places = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
-    return (aligned.recording.time_s, *places, *aligned.recording.quantities.values())
+    measured = [values for name, values in aligned.recording.quantities.items() if not is_sensitivity(name)]
+    return (aligned.recording.time_s, *places, *measured)

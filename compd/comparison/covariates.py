@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.display_unit import in_place_unit, place_unit
+from compd.recording.columns import is_sensitivity
 from compd.units import unit_of
 
 
@@ -28,27 +31,40 @@ class Covariate(NamedTuple):
 
 def covariates(aligned: AlignedRecording) -> list[Covariate]:
     """Time, the tip's place, every measured quantity, gradients of temperature, each link's length and direction."""
-    recording = aligned.recording
-    result = [Covariate("time", "h", recording.time_s / 3600.0)]
+    recording, quantities = aligned.recording, aligned.rows.quantities
+    result = [Covariate("time", "h", recording.time_s / 3600.0)] if recording.has_time else []
     result += [
-        Covariate(axis, "mm", column)
+        Covariate(axis, place_unit(aligned.unit), in_place_unit(column, aligned.unit))
         for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True)
         if np.isfinite(column).any()
     ]
-    for name, column in recording.quantities.items():
+    for name, column in quantities.items():
+        if is_sensitivity(name):
+            continue
         unit = unit_of(name)
-        result.append(Covariate(name.removesuffix(f"_{unit}"), _difference_unit(unit), column, _link_of(name)))
-    for top in [name for name in recording.quantities if name.endswith("_top_degC")]:
+        if link := _link_of_approach(name):
+            of = "link" if aligned.of_links else "axis"
+            result.append(Covariate(f"direction of {of} {link}", "1", column, link))
+        else:
+            result.append(Covariate(name.removesuffix(f"_{unit}"), _difference_unit(unit), column, _link_of(name)))
+    for top in [name for name in quantities if name.endswith("_top_degC")]:
         bottom = top.replace("_top_", "_bottom_")
-        if bottom in recording.quantities:
+        if bottom in quantities:
             gradient = f"{top.removesuffix('_degC')} - {bottom.removesuffix('_degC')}"
-            result.append(Covariate(gradient, "K", recording.quantities[top] - recording.quantities[bottom]))
-    for i, length in enumerate(aligned.rows.link_mm.T, start=1):
-        result.append(Covariate(f"length of link {i}", "mm", length, i))
+            result.append(Covariate(gradient, "K", quantities[top] - quantities[bottom]))
+    if aligned.model is not None:
+        for i, length in enumerate(aligned.rows.link_mm.T, start=1):
+            result.append(Covariate(f"length of link {i}", "mm", length, i))
     if recording.approach is not None:
         for i, direction in enumerate(recording.approach.T, start=1):
             result.append(Covariate(f"direction of link {i}", "1", direction, i))
     return result
+
+
+def _link_of_approach(name: str) -> int:
+    """The link, or axis of an external model, whose direction of travel a quantity is; 0 for any other quantity."""
+    match = re.fullmatch(r"approach_([1-9]\d*)", name)
+    return int(match[1]) if match else 0
 
 
 def _link_of(name: str) -> int:

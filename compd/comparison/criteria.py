@@ -47,7 +47,7 @@ class ComparisonCriteria:
         "other, and the repeats alone count",
         reason="a choice: a hundred repeats then overrule a declaration that is wrong by a fifth",
     )
-    contradiction_factor: float = threshold(
+    declared_ratio: float = threshold(
         2.0,
         unit="1",
         meaning="repeats that contradict a declaration and scatter by more than so many times as much, or as little, "

@@ -25,8 +25,10 @@ from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import format_error
 from compd.comparison.replicates import replicate_pairs
 from compd.comparison.robust import SCALE_EFFICIENCY, trimmed_scale
+from compd.recording.reference import sigma_key
 
 # Variance of the estimate from N differences of neighbours, as a share of that of N independent values' (von
 # Neumann).
@@ -91,6 +93,7 @@ def noise_floor(
     digit_um: FloatArray,
     orders: tuple[FloatArray, ...],
     criteria: ComparisonCriteria = ComparisonCriteria(),
+    unit: str = "um",
 ) -> NoiseFloor:
     """The noise floor from repeats; else from what is declared; else an estimate.
 
@@ -99,6 +102,7 @@ def noise_floor(
     gauges_um : (m,) the gauges' noise at the tip, nan where unknown (then left out).
     digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
     orders : quantities (N,) by which rows are sorted for an estimate.
+    unit : in which people read the residual, in place of um.
     """
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
     is_declared = bool(np.isfinite(declared_um).all())
@@ -106,11 +110,13 @@ def noise_floor(
     if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
         scatter = scatter._replace(by_axis_um=np.maximum(scatter.by_axis_um, digit_um))
         if (scatter.by_axis_um > 0).all():
-            return _from_repeats(scatter, expected_um if is_declared else None, criteria)
+            return _from_repeats(scatter, expected_um if is_declared else None, criteria, unit)
     no_repeats = _why_no_repeats(scatter, criteria)
     if is_declared:
-        gauges = "" if np.isnan(gauges_um).any() else f" with the gauges' {rms(gauges_um):.3g} um at the tip"
-        how = f"declared: the reference's {rms(declared_um):.3g} um{gauges}; {no_repeats}, so nothing tests it"
+        declared = f"the reference's {format_error(rms(declared_um), unit, 3)}"
+        if not np.isnan(gauges_um).any():
+            declared += f" with the gauges' {format_error(rms(gauges_um), unit, 3)} at the tip"
+        how = f"declared: {declared}; {no_repeats}, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
     return _from_differences(residual_um[use], tuple(order[use] for order in orders), no_repeats)
 
@@ -124,21 +130,24 @@ def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> st
     return "repeats are alike to the last digit"
 
 
-def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria) -> NoiseFloor:
+def _from_repeats(
+    scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, unit: str
+) -> NoiseFloor:
     """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom.
 
     F test of the ratio of both variances, averaged over the coordinates, with `declared_dof` for the declaration.
     """
     axes = len(scatter.by_axis_um)
     dof = scatter.dof * axes
-    how = f"repeats of one visit scatter by {rms(scatter.by_axis_um):.3g} um ({scatter.pairs} pairs of rows)"
+    scattered = format_error(rms(scatter.by_axis_um), unit, 3)
+    how = f"repeats of one visit scatter by {scattered} ({scatter.pairs} pairs of rows)"
     if expected_um is None:
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
-    declared = f"declared noise of {rms(expected_um):.3g} um"
+    declared = f"declared noise of {format_error(rms(expected_um), unit, 3)}"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
     below = float(f_distribution.cdf(ratio, dof, criteria.declared_dof * axes))
     if min(below, 1 - below) < criteria.contradiction_p_value / 2:
-        remark = _contradiction(float(np.sqrt(ratio)), criteria.contradiction_factor)
+        remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio, sigma_key(unit))
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)
     pooled_dof = scatter.dof + criteria.declared_dof
     variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof
@@ -147,13 +156,13 @@ def _from_repeats(scatter: Scatter, expected_um: FloatArray | None, criteria: Co
     )
 
 
-def _contradiction(factor: float, limit: float) -> str:
+def _contradiction(factor: float, limit: float, key: str) -> str:
     """What to check where repeats scatter `factor` times as much as declared; "" within a factor `limit`."""
     if factor > limit:
-        return f"the repeats scatter {factor:.3g} times as much as declared: check the instrument, or `sigma_um`"
+        return f"the repeats scatter {factor:.3g} times as much as declared: check the instrument, or `{key}`"
     if factor < 1 / limit:
         return (
-            f"the repeats scatter {1 / factor:.3g} times less than declared: check `sigma_um`; what it holds beside "
+            f"the repeats scatter {1 / factor:.3g} times less than declared: check `{key}`; what it holds beside "
             "noise, repeats do not show"
         )
     return ""

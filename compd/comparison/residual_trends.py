@@ -10,7 +10,7 @@ straight lines only: proof is the task of a diagnosis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,9 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import cluster_std, neighbour_blocks
 from compd.comparison.covariates import Covariate, covariates
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import format_error
 from compd.comparison.noise_floor import NoiseFloor
+from compd.recording.gaps import filled
 
 # Trends per coordinate, and collinear covariates per trend: more are noise in a report.
 PER_COORDINATE = 2
@@ -45,7 +47,7 @@ class Trend:
 
     coordinate : "x" or "link 2".
     covariate : what it follows; None for a constant offset.  unit : the covariate's.
-    slope : um per unit; of a direction, the jump in um; of an offset, um.
+    slope : um per unit; of a direction, the jump in um; of an offset, um.  residual_unit : in place of um.
     explained : share of the coordinate's variation, 0 to 1 (R^2; of an offset, of its mean square).
     p_value : probability of so strong a trend by noise alone, corrected for the number of tests.
     collinear : other covariates that changed in the same way on these rows.
@@ -60,16 +62,18 @@ class Trend:
     p_value: float
     collinear: tuple[str, ...] = ()
     largest_at: str = ""
+    residual_unit: str = "um"
 
     @property
     def text(self) -> str:
         """A sentence for a person."""
+        slope = ("+" if self.slope >= 0 else "") + format_error(self.slope, self.residual_unit)
         if self.covariate is None:
-            sentence = f"{self.coordinate} is off by {self.slope:+.2g} um everywhere"
+            sentence = f"{self.coordinate} is off by {slope} everywhere"
         elif self.covariate.startswith("direction"):
-            sentence = f"{self.coordinate} error jumps by {self.slope:+.2g} um with the {self.covariate}"
+            sentence = f"{self.coordinate} error jumps by {slope} with the {self.covariate}"
         else:
-            sentence = f"{self.coordinate} error follows {self.covariate}, {self.slope:+.2g} um/{self.unit}"
+            sentence = f"{self.coordinate} error follows {self.covariate}, {slope}/{self.unit}"
         if self.covariate is not None:
             sentence += f" ({100 * self.explained:.0f} % of its variation)"
         if self.collinear:
@@ -110,7 +114,8 @@ def find_trends(
         # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
         ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
-    all_covariates = covariates(aligned)
+    time_s = aligned.recording.time_s
+    all_covariates = [covariate._replace(values=filled(covariate.values, time_s)) for covariate in covariates(aligned)]
     block = neighbour_blocks(aligned.recording)
     tests = len(coordinates) * len(all_covariates)
     trends: list[tuple[float, Trend]] = []
@@ -122,7 +127,7 @@ def find_trends(
         largest_at = _largest_at(aligned, values, used, criteria.location_ratio)
         trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at, criteria)
     trends.sort(key=lambda pair: -pair[0])
-    return _without_weaker_links([trend for _, trend in trends])
+    return _without_weaker_links([replace(trend, residual_unit=aligned.unit) for _, trend in trends])
 
 
 def _thinned(used: BoolArray) -> BoolArray:
@@ -252,5 +257,6 @@ def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, 
             ratio = rms_um[end] / max(rms_um[other], 1e-12)
             if ratio > largest:
                 largest = ratio
-                text = f"{ENDS[name][end]} ({rms_um[end]:.2g} um rms, {rms_um[other]:.2g} um at the other end)"
+                here, there = (format_error(rms_um[k], aligned.unit) for k in (end, other))
+                text = f"{ENDS[name][end]} ({here} rms, {there} at the other end)"
     return text

@@ -73,16 +73,12 @@ class CandidatePool:
 
 
 def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> CandidatePool:
-    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model.
-
-    Of an external model the effects that act inside a machine are neither candidates nor untestable: they do not
-    concern it.
-    """
+    """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
     candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
     usable = aligned.usable.mask
     for effect in effects:
-        if effect.id in present or (aligned.model is None and effect.live):
+        if effect.id in present:
             continue
         reason = _missing_inputs(effect, aligned)
         if reason:

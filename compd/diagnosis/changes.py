@@ -40,7 +40,7 @@ def change_candidates(
             name=f"{candidate.name} change",
             effect=candidate.effect,
             columns_um=_after(candidate.columns_um, time_s, moment_s),
-            limits=np.tile([-np.inf, np.inf], (len(candidate.limits), 1)),
+            limits=np.ptp(candidate.limits, axis=1)[:, None] * [-1.0, 1.0],
             searched_parameters=candidate.searched_parameters + SEARCHED_CONSTANT,
             constants=candidate.constants,
             kind="change",

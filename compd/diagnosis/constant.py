@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,6 +96,17 @@ def split_constants(
     return tuple(competing), tuple(same.values())
 
 
+def name_constant(explanation: Explanation) -> Explanation:
+    """Where nothing but a constant was found, the effect that makes it best in its place, with its rivals.
+
+    Beside effects that vary a constant is told on a line of its own; alone, it is what is wrong with the machine.
+    """
+    if len(explanation.members) != 1 or not explanation.constants:
+        return explanation
+    family = find_rivals(explanation.losses, explanation.members, explanation.constants[0])
+    return replace(explanation, members=(family[0].member,)) if family else explanation
+
+
 def describe_constant(
     problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect]
 ) -> ConstantFinding | None:
@@ -103,8 +115,8 @@ def describe_constant(
     named : the fitted effect of each named member.
     """
     aligned, losses = problem.aligned, explanation.losses
-    member = next((k for k in explanation.named if losses.candidates[k].kind == "constant"), None)
-    if member is not None:
+    if explanation.constants:
+        member = explanation.constants[0]
         values, std = named[member].theta, np.sqrt(np.diag(named[member].covariance))
         rivals = find_rivals(losses, explanation.members, member)
         effects = [losses.candidates[rival.member].effect for rival in rivals]

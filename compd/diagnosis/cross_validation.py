@@ -1,67 +1,145 @@
-"""How rows are divided for cross-validation: by whole sessions, and by whole sectors of the workspace."""
+"""How rows are divided for cross-validation: by whole sessions, whole sectors of the workspace, or a named column.
+
+Rows that are left out must be like the rows that a model will meet, not like their neighbours: a row beside one that
+was fitted lets a fit predict its own noise (leakage; Roberts et al., Ecography 40 (2017) 913: block cross-validation).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.errors import Problem, RecordingError
 from compd.recording.recording import BLOCKS
+from compd.recording.sidecar import PLACE, TIME
 
+# A column with more different values than this is a quantity, and divided into BLOCKS classes of equally many rows.
+MOST_VALUES = 12
+# Share of an axis's extent: places nearer to each other are one place, and an axis along which the tip moves less than
+# this share of the longest one does not count as an axis of the workspace.
+SAME_PLACE = 0.01
 # With fewer sessions blocks of time are left out in their place: of two, one would have to predict the other.
 FEWEST_SESSIONS = 3
-# Sectors about the vertical into which the workspace is divided: a fifth left out leaves four fifths to learn from.
+# Sectors into which the workspace is divided: a fifth left out leaves four fifths to learn from.
 SECTORS = 5
 
 
 def row_splits(aligned: AlignedRecording) -> tuple[IntArray, ...]:
     """Splits of the N rows, each (N,) the fold of each row, numbered from 0.
 
-    By session (or time), and by sector where nominal points are known. Sessions that are left out test what an effect
-    says of the weather, sectors what it says of the geometry. Repeats of one point never lie in two folds: they would
-    let a fit predict its own noise (leakage; Roberts et al., Ecography 40 (2017) 913: block cross-validation).
+    By what the sidecar's `folds:` names; without it by time, and by place where it is known:
+
+    time : sessions, or blocks of time. What is left out tests what an effect says of the weather.
+    place : sectors about the middle of the first two axes along which the tip moves, with equally many places each.
+        They test what an effect says of the geometry. The tip is the model's prediction: x, y, z of a known machine,
+        the columns `model_...` of an external one.
+    a column : each of its values; of a quantity with many values, classes of about equally many rows.
+
+    Rows of one visit are always in one fold, and rows of one `point` in one sector.
+
+    Raises RecordingError where the sidecar names what does not divide the rows.
     """
-    splits = [_split_by_session(aligned)]
-    by_sector = _split_by_sector(aligned)
-    if by_sector is not None:
-        splits.append(by_sector)
+    recording = aligned.recording
+    if not recording.sidecar.folds:
+        by_place = _split_by_place(aligned)
+        by_time = _split_by_time(aligned)
+        return (by_time,) if by_place is None else (by_time, by_place)
+    splits: list[IntArray] = []
+    problems: list[Problem] = []
+    for name in recording.sidecar.folds:
+        if name == TIME:
+            split: IntArray | None = _split_by_time(aligned)
+        elif name == PLACE:
+            split = _split_by_place(aligned)
+        else:
+            split = _split_by_values(aligned, recording.columns[name])
+        if split is None or split.max() == 0:
+            problems.append(_undivided(aligned, name))
+        else:
+            splits.append(split)
+    if problems:
+        raise RecordingError(problems)
     return tuple(splits)
 
 
-def _split_by_session(aligned: AlignedRecording) -> IntArray:
-    """(N,) sessions; with too few of them, blocks of time, repeats of one visit in the same."""
+def _undivided(aligned: AlignedRecording, name: str) -> Problem:
+    by_place = f"the tip moves along two axes, and {2 * SECTORS} places were measured"
+    return Problem(
+        where=f"{aligned.recording.sidecar.path} folds",
+        what="does not divide the rows",
+        value=name,
+        allowed=by_place if name == PLACE else "a column with two values or more, `time` or `place`",
+        next_step="name another column, or delete `folds:`",
+    )
+
+
+def _split_by_time(aligned: AlignedRecording) -> IntArray:
+    """(N,) sessions; with too few of them, blocks of time."""
     recording = aligned.recording
     fold = recording.fold
     if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
-        fold = np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows
-        if recording.visit is not None:
-            _, first_row, visit = np.unique(recording.visit, return_index=True, return_inverse=True)
-            fold = np.where(recording.visit >= 0, fold[first_row][visit], fold)
+        fold = _first_of_visit(aligned, np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
+    return _numbered(fold)
+
+
+def _split_by_values(aligned: AlignedRecording, values: FloatArray) -> IntArray:
+    """(N,) each value of a column, or classes of about equally many rows; empty cells are a fold of their own."""
+    known = values[np.isfinite(values)]
+    if len(np.unique(known)) > MOST_VALUES:
+        edges = np.unique(np.quantile(known, np.arange(1, BLOCKS) / BLOCKS))
+        values = np.where(np.isfinite(values), np.searchsorted(edges, values), np.nan)
+    # nan sorts behind every number, and all of them are one value
+    return _numbered(_first_of_visit(aligned, np.unique(values, return_inverse=True)[1]))
+
+
+def _split_by_place(aligned: AlignedRecording) -> IntArray | None:
+    """(N,) sectors with equally many places each; None with fewer than two axes, or two places per sector."""
+    tip_mm = aligned.rows.tip_M_mm
+    extent_mm = np.array([np.ptp(axis[np.isfinite(axis)]) if np.isfinite(axis).any() else 0.0 for axis in tip_mm.T])
+    axes = np.flatnonzero(extent_mm > SAME_PLACE * extent_mm.max())[:2]
+    if len(axes) < 2:
+        return None
+    at_mm, extent_mm = tip_mm[:, axes], extent_mm[axes]
+    known: BoolArray = np.asarray(np.isfinite(at_mm).all(axis=1))
+    # rows without a prediction count nowhere, and are one place
+    place = _places(aligned, np.where(known[:, None], np.rint(at_mm / (SAME_PLACE * extent_mm)), np.inf))
+    count = int(place.max()) + 1
+    if count < 2 * SECTORS:
+        return None
+    middle_mm = at_mm[known].mean(axis=0)
+    azimuth_rad = np.array([_azimuth_rad(at_mm[known & (place == k)] - middle_mm) for k in range(count)])
+    sector = np.empty(count, dtype=np.int64)
+    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(count) * SECTORS // count
+    return sector[place]
+
+
+def _places(aligned: AlignedRecording, cell: FloatArray) -> IntArray:
+    """(N,) number of each row's place: its `point`; where there is none, its cell (N, 2), of a visit's first row."""
+    number = _first_of_visit(aligned, np.unique(cell, axis=0, return_inverse=True)[1].ravel())
+    point = aligned.recording.point
+    if point is not None:
+        number = np.where(point >= 0, point, number + point.max() + 1)
+    return _numbered(number)
+
+
+def _first_of_visit(aligned: AlignedRecording, fold: IntArray) -> IntArray:
+    """(N,) the fold of each row, of a row in a visit that of the visit's first row."""
+    visit = aligned.recording.visit
+    if visit is None:
+        return fold
+    _, first_row, number = np.unique(visit, return_index=True, return_inverse=True)
+    return np.where(visit >= 0, fold[first_row][number], fold)
+
+
+def _numbered(fold: IntArray) -> IntArray:
+    """(N,) folds as numbers from 0 without gaps."""
     return np.asarray(np.unique(fold, return_inverse=True)[1], dtype=np.int64)
 
 
-def _split_by_sector(aligned: AlignedRecording) -> IntArray | None:
-    """(N,) sectors about the vertical through the middle of the workspace, with equally many points each.
-
-    None where the tip or its nominal points are not known, or where there are fewer than two points per sector.
-    """
-    point, tip_M_mm = aligned.recording.point, aligned.rows.tip_M_mm
-    known = np.isfinite(tip_M_mm).all(axis=1)
-    if point is None or not known.any():
-        return None
-    points, index = np.unique(point, return_inverse=True)
-    if len(points) < 2 * SECTORS:
-        return None
-    middle = tip_M_mm[known].mean(axis=0)
-    azimuth_rad = np.array([_azimuth_rad(tip_M_mm[known & (index == k)] - middle) for k in range(len(points))])
-    sector = np.empty(len(points), dtype=np.int64)
-    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(len(points)) * SECTORS // len(points)
-    return sector[index]
-
-
 def _azimuth_rad(from_middle_mm: FloatArray) -> float:
-    """Mean azimuth of one point's rows (R, 3), -pi to pi; of a point without rows 0."""
+    """Mean azimuth of one place's rows (R, 2), -pi to pi; of a place without rows 0."""
     if not len(from_middle_mm):
         return 0.0
-    x, y, _ = from_middle_mm.mean(axis=0)
+    x, y = from_middle_mm.mean(axis=0)
     return float(np.arctan2(y, x))

@@ -14,11 +14,11 @@ from compd.comparison.fit import fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
 from compd.diagnosis.candidates import library_pool
-from compd.diagnosis.constant import describe_constant
+from compd.diagnosis.constant import describe_constant, name_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, UntestedEffect
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, Rival, UntestedEffect
 from compd.diagnosis.gross_rows import gross_rows
 from compd.diagnosis.measurement_programmes import recorded_limits
 from compd.diagnosis.next_measurement import plan_measurement
@@ -77,7 +77,7 @@ def diagnose(
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
     weights = problem.weigh_beside([explanation.losses.candidates[k] for k in explanation.members])
     problem = build_problem(before, pool, criteria, weights)
-    explanation = explain_again(problem, explanation, progress)
+    explanation = name_constant(explain_again(problem, explanation, progress))
     progress("fitting on the real forward model")
     return _diagnosis(problem, explanation, covariance)
 
@@ -162,7 +162,7 @@ def _steps(
         steps.append(
             DiagnosisStep(
                 fitted=fitted,
-                rivals=find_rivals(losses, explanation.members, k),
+                rivals=_rivals(explanation, k),
                 heldout_rms_um=problem.unit_um * float(np.sqrt(loss)),
                 explained_fraction=explained_fraction(loss_before, loss, floor),
                 p_value=p_value_by_effect[fitted.effect.id],
@@ -170,6 +170,16 @@ def _steps(
             )
         )
     return tuple(steps)
+
+
+def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
+    """Effects that would do in a member's place, with the descriptions or without: these settle no contest."""
+    rivals = find_rivals(explanation.losses, explanation.members, member)
+    if explanation.described:
+        known = {rival.name for rival in rivals}
+        others = find_rivals(explanation.losses, explanation.named, member)
+        rivals += tuple(rival for rival in others if rival.name not in known)
+    return rivals
 
 
 def _p_values(losses: SubsetLosses, effects: tuple[int, ...]) -> dict[str, float]:

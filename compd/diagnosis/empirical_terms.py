@@ -97,9 +97,8 @@ class EmpiricalTerm:
         """(N, m, axes) by how much the measured coordinates change per displacement of the port along each axis."""
         axes = ["xyz".index(axis) for axis in self.axes]
         if self.port == "reference":
-            return np.broadcast_to(
-                np.eye(3)[list(aligned.axes)][:, axes], (len(aligned.rows), len(aligned.axes), len(axes))
-            )
+            shown = np.equal.outer(aligned.axes, axes).astype(np.float64)
+            return np.broadcast_to(shown, (len(aligned.rows), *shown.shape))
         return aligned.sensitivity(["tool"])["tool"].tip[:, list(aligned.axes)][:, :, axes]
 
     def declaration(
@@ -190,10 +189,10 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     if aligned.model is not None:
         yield EmpiricalTerm("", "", "link", 0.0)
         yield EmpiricalTerm("", "", "link", 0.0, per_link=True)
-    if not aligned.of_links:
-        if aligned.model is not None:
+        if not aligned.of_links:
             yield EmpiricalTerm("", "", "tool", 0.0, axes=("x", "y", "z"))
-        yield EmpiricalTerm("", "", "reference", 0.0, axes=tuple("xyz"[axis] for axis in aligned.axes))
+    if aligned.model is None or not aligned.of_links:
+        yield EmpiricalTerm("", "", "reference", 0.0, axes=tuple("xyz"[axis] for axis in aligned.axes[:3]))
 
 
 def _machine_covariates(aligned: AlignedRecording) -> Iterator[tuple[str, FloatArray]]:

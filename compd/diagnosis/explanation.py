@@ -53,6 +53,11 @@ class Explanation:
         return self._of_kind("effect", "constant")
 
     @property
+    def constants(self) -> tuple[int, ...]:
+        """The constant, if it is in the set."""
+        return self._of_kind("constant")
+
+    @property
     def proxies(self) -> tuple[int, ...]:
         """Effects that were not measured, by what stands for their temperature."""
         return self._of_kind("proxy")
@@ -154,6 +159,8 @@ class _Competitors:
         fits = tuple(self._empirical.best_fits(nuisance))
         for fit in fits:
             term = fit.term
+            if term.form == "step" and self._problem.aligned.model is not None:
+                continue  # a change of an effect that makes a constant does the same, and has a name
             if self._is_new((term.covariate, term.form, term.port, term.per_link, fit.constant)):
                 self.fit_by_place[len(self.candidates)] = fit
                 self.candidates.append(fit.candidate(fit.columns_um(self._problem.aligned)))

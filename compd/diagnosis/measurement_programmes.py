@@ -1,4 +1,4 @@
-"""What could be measured next: short programmes of rows, each with one purpose, within given limits."""
+"""What could be measured next on a machine whose kinematics is known: short programmes of rows, one purpose each."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, step_times_s
 from compd.errors import Problem, RecordingError
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import MachineConstants, Observations, REFERENCE_TEMPERATURE_degC
 from compd.model.observe import observe
 from compd.model.solve_status import Reason
+from compd.recording.plan_file import plan_row
 
 # Places along each edge of the workspace's box.
 PLACES_PER_EDGE = 3
@@ -27,8 +31,6 @@ LOADS = (1 / 6, 1 / 2, 1.0)
 REVERSALS_MM = (0.02, 0.1, 0.5, 2.0, 10.0, 30.0)
 # Speeds as shares of the fastest.
 SPEEDS = (0.25, 1.0)
-# Times after a step of temperature, as shares of the longest time that may be waited.
-WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)
 ROW_EVERY_S = 30.0
 # Quantiles of the recorded positions that bound the workspace, so that no single row stretches it.
 WORKSPACE_QUANTILES = (0.02, 0.98)
@@ -91,7 +93,35 @@ def recorded_limits(aligned: AlignedRecording) -> ProgrammeLimits:
     )
 
 
-def programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Programme]:
+def machine_programmes(aligned: AlignedRecording, effects: Sequence[Effect], limits: ProgrammeLimits) -> ProgrammeRows:
+    """The programmes within the limits that vary what `effects` are computed from.
+
+    Raises RecordingError where a place within the limits cannot be reached.
+    """
+    assert aligned.model is not None
+    names = list(dict.fromkeys(name for effect in effects for name in needed_quantities(effect, aligned.rows.links)))
+    possible = list(_programmes(aligned, limits, names))
+    observations = _observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
+    purposes = [programme.purpose for programme in possible for _ in range(len(programme))]
+    held = (
+        zip(*(observations.quantities[name].tolist() for name in names), strict=True) if names else [()] * len(purposes)
+    )
+    to_set = [
+        plan_row(purpose, time_s, tip_M_mm, dict(zip(names, values, strict=True)), direction, speed_mm_per_s)
+        for purpose, time_s, tip_M_mm, values, direction, speed_mm_per_s in zip(
+            purposes,
+            observations.time_s.tolist(),
+            observations.tip_M_mm.tolist(),
+            held,
+            observations.direction.tolist(),
+            np.abs(observations.velocity_mm_per_s).max(axis=1).tolist(),
+            strict=True,
+        )
+    ]
+    return ProgrammeRows(observations, np.array([len(programme) for programme in possible]), to_set)
+
+
+def _programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequence[str]) -> Iterator[Programme]:
     """Programmes that vary one thing each: place, load, temperature, another quantity, direction, speed, time.
 
     names : the quantities that the rivals need; others stay as they are.
@@ -120,8 +150,8 @@ def programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Sequen
             for value in (low, high):
                 temperatures = {name: np.array([value]) for name in group}
                 yield _programme_at(place, n, "one part warm or cold alone", temperatures)
-        step = np.array([low, *[high] * len(WAITS)])
-        times_s = np.array([0.0, *(1.0 + limits.wait_s * share for share in WAITS)])
+        times_s = step_times_s(limits.wait_s)
+        step = np.where(times_s > 0, high, low)
         yield _programme_at(middle, n, "a step of temperature, watched", dict.fromkeys(group, step), times_s)
     for name in names:
         if not name.startswith(("temperature_", "force_")):
@@ -182,7 +212,7 @@ def _temperature_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
     return [*([links] if links else []), *((name,) for name in names if name not in links)]
 
 
-def observe_programmes(
+def _observe_programmes(
     model: MachineModel, constants: MachineConstants, chosen: Sequence[Programme], aligned: AlignedRecording
 ) -> Observations:
     """The programmes as rows that effects can be computed on, each a session of its own, with perfect gauges.
@@ -204,19 +234,16 @@ def observe_programmes(
             )
         )
     scale_mm = pose.link_length_mm - zero.link_length_mm
-    starts = np.zeros(count, dtype=bool)
-    starts[np.cumsum([0, *(len(programme) for programme in chosen)])[:-1]] = True
+    starts = programme_starts(np.array([len(programme) for programme in chosen]))
     direction = np.concatenate([programme.direction for programme in chosen])
     travel_mm = np.diff(scale_mm, axis=0, prepend=scale_mm[:1])
     follows = (direction == 0).all(axis=1)
     direction[follows] = np.where(starts[:, None], 1.0, np.sign(travel_mm))[follows]
     velocity = np.concatenate([programme.velocity_mm_per_s for programme in chosen])
-    quantities = {
-        name: np.concatenate(
-            [np.broadcast_to(programme.quantities.get(name, value), (len(programme),)) for programme in chosen]
-        )
-        for name, value in _values_at_rest(aligned).items()
-    }
+    quantities = {name: np.full(count, value) for name, value in _values_at_rest(aligned).items()}
+    for programme, begin in zip(chosen, np.flatnonzero(starts), strict=True):
+        for name, values in programme.quantities.items():
+            quantities[name][begin : begin + len(programme)] = values
     comparators = model.joint_weights.shape[1]
     return observe(
         model,

@@ -1,154 +1,28 @@
-"""The next measurement: the rows that tell two rivals apart best, by T-optimal experimental design."""
+"""The next measurement: rows that answer what a recording leaves open, or what to measure where no rows can."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+from itertools import permutations
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.least_squares import solve_ridge
-from compd.diagnosis.measurement_programmes import Programme, ProgrammeLimits, observe_programmes, programmes
-from compd.errors import Problem, RecordingError
-from compd.model.effect import FittedEffect
-from compd.model.effect_needs import needed_quantities
-from compd.model.machine import MachineModel
-from compd.model.observations import Observations
-from compd.model.sensitivity import effect_sensitivity, sensitivities
-from compd.recording.plan_file import plan_row, plan_text, write_plan_file
-from compd.tables import Columns, data_frame, html_table
-from compd.units import UM_PER_MM
+from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
+from compd.diagnosis.measurement_planner import MeasurementPlanner
+from compd.diagnosis.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
+from compd.diagnosis.measurement_settings import SettingLimits
+from compd.diagnosis.programme_rows import ProgrammeRows
+from compd.diagnosis.setting_programmes import setting_programmes
+from compd.errors import CompdError, Problem
+from compd.model.effect import ConstantValues, Effect, FittedEffect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-# Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
-RIDGE = 1e-9
-
-
-@dataclass(frozen=True, repr=False)
-class MeasurementPlan:
-    """Rows to measure, which tell two rival effects apart.
-
-    Attributes
-    ----------
-    rivals : (str, str)
-        Ids of the two effects.
-    rows : tuple of dict
-        One per row: each column of the plan's file and its value. `row`, `purpose`, `time_s`, the tip's place
-        in {M} `tip_x_mm` ..., the directions in which the links come `approach_1` ..., `speed_mm_per_s`, and what is
-        held: loads in N, temperatures in degC.
-    separation : float
-        By how much the nearer rival will differ from the other on the recording and these rows together, in standard
-        deviations of the noise (root of the sum of squares over all rows).
-    before : float
-        The same on the recording alone.
-    """
-
-    rivals: tuple[str, str]
-    rows: tuple[dict[str, Any], ...]
-    separation: float
-    before: float
-
-    @property
-    def summary(self) -> str:
-        """What the rows are good for, in a sentence."""
-        return (
-            f"{self.rivals[0]} and {self.rivals[1]} differ by {self.before:.2g} times the noise on what was measured, "
-            f"by {self.separation:.2g} times with these {len(self.rows)} rows."
-        )
-
-    def write_to(self, stream: TextIO) -> None:
-        """Write the rows as CSV."""
-        stream.write(plan_text(self.rows))
-
-    def write(self, path: str | Path) -> None:
-        """Write the rows as CSV, for a person at the machine or for `compd simulate --plan`.
-
-        Parameters
-        ----------
-        path : str or Path
-            Where to; an existing file is replaced.
-
-        Raises
-        ------
-        RecordingError
-            Where the file cannot be written.
-        """
-        write_plan_file(Path(path), self.rows)
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """The rows, as a pandas data frame.
-
-        Returns
-        -------
-        pandas.DataFrame
-            One row per row to measure, with the columns of the file; nan where nothing is to be set.
-
-        Raises
-        ------
-        CompdError
-            Where pandas is not installed.
-        """
-        return data_frame(self._columns())
-
-    def _repr_html_(self) -> str:
-        return html_table(self.summary, self._columns())
-
-    def __repr__(self) -> str:
-        return f"<MeasurementPlan: {self.summary}>"
-
-    def _columns(self) -> Columns:
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: [row.get(name, np.nan) for row in self.rows] for name in names}
-
-
-class _ProgrammeSums(NamedTuple):
-    """What each of K programmes adds to a rival's refit: normal (K, p, p), score (K, p), square (K,)."""
-
-    normal: FloatArray
-    score: FloatArray
-    square: FloatArray
-
-
-class _RivalRefit:
-    """Least squares of one effect's prediction by its rival's columns, on rows that grow by programmes.
-
-    With y what the effect predicts and A the columns of the rival and of the model, A^T A, A^T y and y^T y are kept.
-    """
-
-    def __init__(self, predicted: FloatArray, rival_columns: FloatArray) -> None:
-        """predicted : (n,).  rival_columns : (n, p)."""
-        self._normal = rival_columns.T @ rival_columns
-        self._score = rival_columns.T @ predicted
-        self._square = float(predicted @ predicted)
-
-    def discrepancy(self) -> float:
-        """Sum of squares that the rival cannot imitate."""
-        theta = solve_ridge(self._normal, self._score, self._ridge)
-        return self._square - float(self._score @ theta)
-
-    def discrepancies_with(self, sums: _ProgrammeSums) -> FloatArray:
-        """(K,) the same after adding each of K programmes."""
-        normal = self._normal + sums.normal
-        score = self._score + sums.score
-        theta = solve_ridge(normal, score, np.broadcast_to(self._ridge, score.shape))
-        return np.asarray(self._square + sums.square - (score * theta).sum(axis=-1))
-
-    def add(self, sums: _ProgrammeSums, k: int) -> None:
-        """Add the rows of programme k."""
-        self._normal = self._normal + sums.normal[k]
-        self._score = self._score + sums.score[k]
-        self._square = self._square + float(sums.square[k])
-
-    @property
-    def _ridge(self) -> FloatArray:
-        return np.asarray(RIDGE * np.diag(self._normal) + 1e-12)
+# Rows that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
+NEXT_ROWS = 12
+# What cannot be tested yet is looked for at this share of its largest plausible size.
+EXPECTED_SIZE = 0.5
 
 
 def plan_measurement(
@@ -156,160 +30,186 @@ def plan_measurement(
     model: Sequence[FittedEffect],
     pair: tuple[FittedEffect, FittedEffect],
     sigma_um: FloatArray,
-    limits: ProgrammeLimits,
+    limits: ProgrammeLimits | SettingLimits,
     rows: int,
 ) -> MeasurementPlan:
     """The rows on which two fitted rivals differ most, however the other one is refitted.
 
-    The criterion is T-optimality (Atkinson and Fedorov, Biometrika 62 (1975) 57): with the prediction of rival 1 as
-    the truth, the sum of squares that rival 2 leaves with its best parameters, in variances of the noise, ::
+    The criterion is T-optimality (`compd.diagnosis.t_optimal`), with either rival as the truth; the smaller of the two
+    sums of squares counts. Effects of the model, constants and the instrument's frame are refitted along, and the
+    recording's rows count.
 
-        T_12 = min_theta  sum_i |eta_1(x_i) - A_2(x_i) theta|^2 / sigma^2
-
-    and likewise T_21. The parameters of the model's effects are refitted along, and the recording's rows count. Where
-    a D-optimal design would make the parameters of one effect most precise, this one makes the wrong effect fail.
-    Programmes are added one at a time (the sequential construction of optimal designs: Fedorov, Theory of Optimal
-    Experiments (1972)), each the one that adds most per row to the smaller of the two; what a programme that was
-    chosen n times already adds counts 1 / (n + 1) of it, so that different programmes are taken.
-
-    model : the model's own effects.  pair : the rivals, fitted on the recording.  sigma_um : (m,) noise.
+    model : effects that are fitted along.  pair : the rivals, fitted on the recording.  sigma_um : (m,) noise.
+    limits : of a machine whose kinematics is known ProgrammeLimits; of an external one the columns' limits, where they
+        are not those of the recording.
     rows : how many may be measured at most.
 
-    Raises RecordingError for an external model, and where a place within the limits cannot be reached.
+    Raises RecordingError where a place within the limits cannot be reached; CompdError where a limit is faulty.
 
     Example::
 
         plan = plan_measurement(aligned, (), (spring, contact), sigma_um, recorded_limits(aligned), rows=30)
         plan.before, plan.separation  # by how many standard deviations the two differ, before and after
     """
-    model_of_machine = require_kinematics(aligned)
-    names = list(
-        dict.fromkeys(name for effect in pair for name in needed_quantities(effect.effect, aligned.rows.links))
-    )
-    possible = [programme for programme in programmes(aligned, limits, names) if len(programme) <= rows]
-    observations = observe_programmes(model_of_machine, aligned.rows.constants, possible, aligned)
-    lengths = np.array([len(programme) for programme in possible])
-    ends = np.cumsum([0, *lengths])
-    refits, sums = _rival_refits(aligned, model, pair, sigma_um, observations, ends)
-    before = np.sqrt(max(min(refit.discrepancy() for refit in refits), 0.0))
-    chosen, discrepancy = _choose(refits, sums, lengths, rows)
-    planned = [
-        row
-        for k in sorted(set(chosen))
-        for _ in range(chosen.count(k))
-        for row in _rows_to_set(possible[k], observations, ends[k], names)
-    ]
-    return MeasurementPlan(
-        rivals=(pair[0].effect.id, pair[1].effect.id),
-        rows=tuple({"row": number, **row} for number, row in enumerate(planned, start=1)),
-        separation=float(np.sqrt(max(discrepancy, 0.0))),
-        before=float(before),
-    )
+    possible = _programmes(aligned, [fitted.effect for fitted in pair], model, limits)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    first, second = (planner.contender(fitted) for fitted in pair)
+    return planner.plan([(first, second), (second, first)], rows, _words([fitted.effect for fitted in pair]))
 
 
-def require_kinematics(aligned: AlignedRecording) -> MachineModel:
-    """The machine's model. Raises RecordingError for an external one, in which no place can be reached."""
-    if aligned.model is None:
-        raise RecordingError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="of an external model's machine no measurement can be planned",
-                next_step="write a machine configuration",
-            )
-        )
-    return aligned.model
-
-
-def _rival_refits(
+def next_measurement(
     aligned: AlignedRecording,
     model: Sequence[FittedEffect],
-    pair: tuple[FittedEffect, FittedEffect],
+    found: FittedEffect,
+    rival: Effect,
     sigma_um: FloatArray,
-    observations: Observations,
-    ends: IntArray,
-) -> tuple[list[_RivalRefit], list[_ProgrammeSums]]:
-    """Each rival refitted to the other on the recording, and what each programme adds to that.
+    rows: int = NEXT_ROWS,
+    constants: ConstantValues | None = None,
+) -> NextMeasurement:
+    """What tells an effect from its rival: rows within the limits of the recording, or words.
 
-    observations : rows of all programmes.  ends : (K + 1,) of each programme among them.
+    model : effects that are fitted along: the model's own, and the others that were found.
+    found : the effect as fitted.  rival : taken with the numbers by which it imitates `found` best.
+    sigma_um : (m,) noise; where more is left than noise, what is left.
+    constants : nonlinear constants of the rival; None for those of its grid by which it imitates best.
     """
-    effects = (*model, *pair)
-    recorded = [aligned.columns(effect.effect, effect.constants) * UM_PER_MM / sigma_um[:, None] for effect in effects]
-    usable = aligned.usable.mask
-    known = usable & np.all([np.isfinite(values).all(axis=(1, 2)) for values in recorded], axis=0)
-    new = _columns_on(aligned, observations, effects, sigma_um)
-    refits, sums = [], []
-    for truth, rival in ((len(model), len(model) + 1), (len(model) + 1, len(model))):
-        theta = effects[truth].theta
-        fitted = [*range(len(model)), rival]
-        rival_columns = np.concatenate([recorded[k][known] for k in fitted], axis=2)
-        refits.append(
-            _RivalRefit((recorded[truth][known] @ theta).ravel(), rival_columns.reshape(-1, rival_columns.shape[2]))
-        )
-        sums.append(_programme_sums(new[truth] @ theta, np.concatenate([new[k] for k in fitted], axis=2), ends))
-    return refits, sums
+    effects = [found.effect, rival]
+    try:
+        possible = _programmes(aligned, effects, model)
+    except CompdError as error:
+        return _words_alone(effects, error)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    first = planner.contender(found)
+    second = planner.imitation(first, rival, constants)
+    return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)))
 
 
-def _columns_on(
-    aligned: AlignedRecording, observations: Observations, effects: Sequence[FittedEffect], sigma_um: FloatArray
-) -> list[FloatArray]:
-    """(R, m, P) of each effect: whitened columns on rows that were not measured yet."""
-    assert aligned.model is not None
-    by_port = sensitivities(aligned.model, observations, {port for effect in effects for port in effect.effect.ports})
-    whitened = []
-    for effect in effects:
-        basis, _ = effect.effect.basis(observations, effect.constants, None)
-        predicted = effect_sensitivity(effect.effect, observations, basis, by_port)
-        measured = (predicted.link_length if aligned.of_links else predicted.tip)[:, list(aligned.axes)]
-        whitened.append(measured * UM_PER_MM / sigma_um[:, None])
-    return whitened
+def measurement_of_constant(
+    aligned: AlignedRecording,
+    model: Sequence[FittedEffect],
+    causes: Sequence[Effect],
+    constant_um: FloatArray,
+    sigma_um: FloatArray,
+    rows: int = NEXT_ROWS,
+) -> NextMeasurement:
+    """What parts the possible causes of a constant: rows on which they are none or another one, or words.
 
-
-def _programme_sums(predicted: FloatArray, rival_columns: FloatArray, ends: IntArray) -> _ProgrammeSums:
-    """Sums over the rows of each programme of predicted (R, m) and rival_columns (R, m, p)."""
-    normal, score, square = [], [], []
-    for begin, end in pairwise(ends):
-        A = rival_columns[begin:end].reshape(-1, rival_columns.shape[2])
-        y = predicted[begin:end].ravel()
-        normal.append(A.T @ A)
-        score.append(A.T @ y)
-        square.append(y @ y)
-    return _ProgrammeSums(np.stack(normal), np.stack(score), np.array(square))
-
-
-def _choose(
-    refits: Sequence[_RivalRefit], sums: Sequence[_ProgrammeSums], lengths: IntArray, rows: int
-) -> tuple[list[int], float]:
-    """Programmes in the order in which they are chosen, and the smaller discrepancy with all of them."""
-    chosen: list[int] = []
-    reached = np.array([refit.discrepancy() for refit in refits])
-    while lengths.min() <= (rows_left := rows - sum(lengths[k] for k in chosen)):
-        discrepancies = np.stack([refit.discrepancies_with(parts) for refit, parts in zip(refits, sums, strict=True)])
-        gain_per_row = np.min(discrepancies - reached[:, None], axis=0) / lengths
-        gain_per_row[lengths > rows_left] = -np.inf
-        gain_per_row[chosen] /= 1.0 + np.array([chosen.count(k) for k in chosen])
-        best = int(np.argmax(gain_per_row))
-        chosen.append(best)
-        for refit, parts in zip(refits, sums, strict=True):
-            refit.add(parts, best)
-        reached = discrepancies[:, best]
-    return chosen, float(reached.min())
-
-
-def _rows_to_set(
-    programme: Programme, observations: Observations, begin: int, names: Sequence[str]
-) -> list[dict[str, Any]]:
-    """What a person sets in each row of a programme, by column of the plan's file.
-
-    begin : the programme's first row among the observations.  names : quantities to be set.
+    causes : effects that make nothing but a constant on the recording.  constant_um : (m,) the constant.
+    Each cause is taken with the numbers by which it imitates the constant best, and contends with every other one and
+    with what is constant everywhere, such as the zero of the instrument. Two causes that no rows within the limits part
+    are left out.
     """
-    return [
-        plan_row(
-            programme.purpose,
-            programme.time_s[k],
-            programme.tip_M_mm[k],
-            {name: observations.quantities[name][begin + k] for name in names},
-            observations.direction[begin + k],
-            np.abs(observations.velocity_mm_per_s[begin + k]).max(),
-        )
-        for k in range(len(programme))
+    try:
+        possible = _programmes(aligned, causes, model)
+    except CompdError as error:
+        return _words_alone(causes, error)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False)
+    constant = planner.constant(constant_um)
+    contenders = [constant, *(planner.imitation(constant, cause) for cause in causes)]
+    contests = [contest for contest in permutations(contenders, 2) if planner.separable(contest)]
+    if not contests:
+        names = tuple(cause.id for cause in causes)
+        return NextMeasurement(names, None, _words(causes), "they remain the same constant on all of them")
+    return _rows_or_words(planner.plan(contests, rows, _words(causes)))
+
+
+def measurement_to_test(
+    aligned: AlignedRecording,
+    model: Sequence[FittedEffect],
+    effect: Effect,
+    sigma_um: FloatArray,
+    rows: int = NEXT_ROWS,
+) -> NextMeasurement:
+    """What makes an effect testable that is not on this recording.
+
+    Words where a quantity is not measured or stayed as it was; rows where the effect would be seen on them, at half of
+    its largest plausible size.
+    """
+    names = (effect.id,)
+    problems = unmet_needs(effect, aligned.rows.available, aligned.rows.links)
+    if problems:
+        measure = "; ".join(dict.fromkeys(problem.next_step for problem in problems))
+        return NextMeasurement(names, None, measure, "; ".join(problem.what for problem in problems))
+    unvaried = _unvaried(aligned, effect)
+    if unvaried:
+        stayed = ", ".join(f"{name} stayed at {value:g}" for name, value in unvaried.items())
+        return NextMeasurement(names, None, f"vary {', '.join(unvaried)}", stayed)
+    try:
+        possible = _programmes(aligned, [effect], model)
+    except CompdError as error:
+        return _words_alone([effect], error)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    sizes = [
+        EXPECTED_SIZE * max(map(abs, column.parameter.theta_range)) for column in effect.columns(aligned.rows.links)
     ]
+    plans = [
+        planner.plan(
+            [(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)], rows, effect.separated_by
+        )
+        for constants in effect.constant_grid(aligned.rows)
+    ]
+    return _rows_or_words(max(plans, key=lambda plan: plan.separation))
+
+
+def _programmes(
+    aligned: AlignedRecording,
+    effects: Sequence[Effect],
+    model: Sequence[FittedEffect],
+    limits: ProgrammeLimits | SettingLimits | None = None,
+) -> ProgrammeRows:
+    """What could be measured next about the effects. limits : None for those of the recording.
+
+    Raises CompdError where nothing could be.
+    """
+    if aligned.model is not None:
+        given = limits if isinstance(limits, ProgrammeLimits) else recorded_limits(aligned)
+        return machine_programmes(aligned, effects, given)
+    by_column = {} if limits is None or isinstance(limits, ProgrammeLimits) else limits
+    # what the model's effects are computed from is varied too: only then are these parted from the others
+    possible = setting_programmes(aligned, [*effects, *(fitted.effect for fitted in model)], by_column)
+    if not len(possible.lengths):
+        raise CompdError(
+            Problem(
+                where=str(aligned.recording.path),
+                what="nothing that these effects are computed from was varied",
+                value=", ".join(effect.id for effect in effects),
+                next_step="record a column by which they differ, or give limits within which one can be varied",
+            )
+        )
+    return possible
+
+
+def _unvaried(aligned: AlignedRecording, effect: Effect) -> dict[str, float]:
+    """Quantity -> value of those that the effect needs; empty where one of them changed."""
+    usable = aligned.usable.mask
+    values = {}
+    for name in needed_quantities(effect, aligned.rows.links):
+        if name not in aligned.rows.quantities:
+            continue
+        known = aligned.rows.quantities[name][usable]
+        known = known[np.isfinite(known)]
+        if len(known) and np.ptp(known) > 0:
+            return {}
+        values[name] = float(known[0]) if len(known) else float("nan")
+    return values
+
+
+def _words(effects: Sequence[Effect]) -> str:
+    """What tells the effects from others, as they say it themselves."""
+    return "; ".join(dict.fromkeys(effect.separated_by for effect in effects))
+
+
+def _words_alone(effects: Sequence[Effect], error: CompdError) -> NextMeasurement:
+    return NextMeasurement(tuple(effect.id for effect in effects), None, _words(effects), error.problems[0].what)
+
+
+def _rows_or_words(plan: MeasurementPlan) -> NextMeasurement:
+    """The plan where it is worth measuring; else what is, and why, in words."""
+    if plan.tells_apart:
+        return NextMeasurement(plan.rivals, plan)
+    if plan.separation < LEAST_SEPARATION:
+        why = f"the best {len(plan.rows)} rows make a difference of {as_factor(plan.separation)} times the noise"
+        why += f", and it takes {LEAST_SEPARATION:.2g}"
+    else:
+        why = f"the best {len(plan.rows)} rows add little to a difference of {as_factor(plan.before)} times the noise"
+    return NextMeasurement(plan.rivals, None, plan.separated_by, why)

@@ -153,7 +153,7 @@ class SubsetLosses:
         """
         for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
             candidate = self.candidates[k]
-            if candidate.kind not in ("effect", "proxy"):
+            if candidate.kind not in ("effect", "proxy", "change"):
                 continue
             std = np.sqrt(np.diag(covariance))
             for (low, high), value, error in zip(candidate.limits, theta, std, strict=True):

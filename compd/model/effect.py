@@ -28,7 +28,7 @@ PORTS: dict[Port, str] = {
     "platform_joint": "centre of each platform joint in {P}, mm (n x 3)",
     "revolute_axis": "direction of each revolute axis in {P}, rad (n x 3)",
     "plate": "plate points m1, m2, m3 in {M}, mm (3 x 3)",
-    "tool": "tool vector in {P}, mm (3)",
+    "tool": "tool vector in {P}, or in {M} where the tool stands on the plate, mm (3)",
     "reference": "what the reference instrument shows: x, y, z in mm, then rotation about x, y, z in rad (6)",
 }
 

@@ -5,34 +5,53 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from compd.errors import Problem
-from compd.model.effect import Effect
+from compd.model.effect import Effect, Port
 
 # The words that an effect's `needs` may hold beside names of quantities, and what each stands for.
 NEEDS: Mapping[str, str] = {
     "force": "the force on the tip: `force_x_N`, `force_y_N`, `force_z_N`",
+    "kinematics": "a machine whose kinematics compd knows",
+    "scale": "the scale of each link",
     "direction": "the direction in which each link came to its place: from the scales, or columns `approach_1` ...",
-    "motion": "the links' speeds, from the scales of rows that were taken on the move",
+    "motion": "the links' speeds: from the scales of rows that were taken on the move, or columns "
+    "`velocity_1_mm_per_s` ...",
     "time": "the time of each row",
     "order": "the rows in the order in which they were measured",
     "revolute_axes": "a machine with revolute axes, that is a tripod",
     "plate_thickness_mm": "`plate_thickness_mm` in the configuration",
     "scale_signal_period_mm": "`scale_signal_period_mm` in the configuration",
 }
-# Needs that stand for several quantities, or for none: direction, motion, time and order come from the scales and the
-# clock, which every machine has.
-_QUANTITIES_OF_NEED: dict[str, tuple[str, ...]] = {
-    "force": ("force_x_N", "force_y_N", "force_z_N"),
-    "direction": (),
-    "motion": (),
-    "time": (),
-    "order": (),
+_QUANTITIES_OF_NEED: dict[str, tuple[str, ...]] = {"force": ("force_x_N", "force_y_N", "force_z_N")}
+# Needs that the machine's description meets, or that columns of a recording meet where the machine's kinematics is not
+# known: what is missing where they are not met, and what to do.
+_NO_QUANTITIES: Mapping[str, tuple[str, str]] = {
+    "kinematics": ("the machine's kinematics, which an external model does not give", "write a machine configuration"),
+    "scale": ("the scales, which were not recorded", "record columns `scale_1_mm` ..., one for each link"),
+    "direction": (
+        "the direction of travel, which was not recorded",
+        "record columns `approach_1` ... (1 or -1), or the scales `scale_1_mm` ...",
+    ),
+    "motion": (
+        "speeds, which were not recorded",
+        "record columns `velocity_1_mm_per_s` ..., or the scales of rows taken on the move",
+    ),
+    "time": ("the time of each row, which was not recorded", "record a column `time_s`"),
+    "order": ("the rows' order in time, which was not recorded", "record a column `time_s`"),
+    "revolute_axes": (
+        "revolute_axes, which this machine does not have",
+        "only a tripod (kinematics: tripod_3spr) has revolute axes",
+    ),
+    "plate_thickness_mm": (
+        "plate_thickness_mm, which this machine does not have",
+        "write `plate_thickness_mm` under `geometry:`",
+    ),
+    "scale_signal_period_mm": (
+        "scale_signal_period_mm, which this machine does not have",
+        "write `scale_signal_period_mm` under `geometry:`",
+    ),
 }
-# Needs that the machine's description meets, and what to do where it does not.
-_SETTINGS = {
-    "revolute_axes": "only a tripod (kinematics: tripod_3spr) has revolute axes",
-    "plate_thickness_mm": "write `plate_thickness_mm` under `geometry:`",
-    "scale_signal_period_mm": "write `scale_signal_period_mm` under `geometry:`",
-}
+# Those that no column of a recording can meet.
+_DESCRIBED = frozenset({"kinematics", "revolute_axes", "plate_thickness_mm", "scale_signal_period_mm"})
 _GAUGE_OF_QUANTITY = {
     "temperature": "a thermometer",
     "force": "a force gauge",
@@ -47,9 +66,11 @@ def needed_quantities(effect: Effect, links: int) -> list[str]:
     for need in effect.needs:
         if "{link}" in need:
             quantities += [need.format(link=i + 1) for i in range(links)]
+        elif "{axis}" in need:
+            quantities += [need.format(axis=axis) for axis in "xyz"]
         elif need in _QUANTITIES_OF_NEED:
             quantities += _QUANTITIES_OF_NEED[need]
-        elif need not in _SETTINGS:
+        elif need not in _NO_QUANTITIES:
             quantities.append(need)
     return quantities
 
@@ -64,28 +85,54 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
         Problem(
             where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
         )
-        for name in needed_quantities(effect, links)
-        if name not in available
+        for name in _missing_quantities(effect, available, links)
     ]
-    problems += [
-        Problem(
-            where=f"effect {effect.id}",
-            what=f"needs {need}, which this machine does not have",
-            next_step=_SETTINGS[need],
-        )
-        for need in effect.needs
-        if need in _SETTINGS and need not in available
-    ]
-    if effect.live and not links:
+    for need in effect.needs:
+        if need in _NO_QUANTITIES and need not in available:
+            missing, next_step = _NO_QUANTITIES[need]
+            problems.append(Problem(where=f"effect {effect.id}", what=f"needs {missing}", next_step=next_step))
+    if not _reaches_prediction(effect, available, links):
         problems.append(
             Problem(
                 where=f"effect {effect.id}",
                 what=f"acts at the port {effect.port}, which an external model has not",
-                allowed="effects at the port `reference`",
+                allowed="effects at the ports " + ", ".join(_external_ports(links)),
                 next_step="write a machine configuration",
             )
         )
     return problems
+
+
+def can_concern(effect: Effect, available: Collection[str], links: int) -> bool:
+    """Whether measuring more could make the effect usable on this machine, if it is not yet.
+
+    On a machine whose kinematics is not known, nothing can be said of effects that act inside it.
+
+    available, links : as in `unmet_needs`.
+    """
+    if "kinematics" in available:
+        return True
+    return _reaches_prediction(effect, available, links) and _DESCRIBED.isdisjoint(effect.needs)
+
+
+def _reaches_prediction(effect: Effect, available: Collection[str], links: int) -> bool:
+    """Whether what the effect adds can be carried over to what was predicted.
+
+    Without known kinematics only what acts on the predicted coordinates themselves: on link lengths what their scales
+    and the links add, on the tip what the reference adds.
+    """
+    return "kinematics" in available or any(port in effect.ports for port in _external_ports(links))
+
+
+def _external_ports(links: int) -> tuple[Port, ...]:
+    return ("scale", "link") if links else ("reference",)
+
+
+def _missing_quantities(effect: Effect, available: Collection[str], links: int) -> list[str]:
+    """What of `needed_quantities` is not available; of a need for each axis one axis is enough."""
+    of_axes = {need: [need.format(axis=axis) for axis in "xyz"] for need in effect.needs if "{axis}" in need}
+    enough = {name for names in of_axes.values() if any(name in available for name in names) for name in names}
+    return [name for name in needed_quantities(effect, links) if name not in available and name not in enough]
 
 
 def _gauge_to_add(name: str) -> str:

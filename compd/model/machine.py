@@ -178,7 +178,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
     return MachineConstants(
         platform_joints_P_mm=model.platform_joints_P_mm,
         revolute_axes_P=model.revolute_axes_P,
-        tool_P_mm=zero.contact.tip_P_mm,
+        arrangement=model.arrangement,
         zero_directions_M=directions_M,
         zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),
         zero_axial_force_N=weight_alone.axial_N,

@@ -15,11 +15,16 @@ from compd.errors import CompdError, Problem
 from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
 from compd.model.statics import link_forces
+from compd.model.tool import Arrangement
 
 # ISO 1: lengths are stated at 20 degC.
 REFERENCE_TEMPERATURE_degC = 20.0
 # ISO 2533 standard atmosphere: at this pressure interferometers' tables have their zero.
 REFERENCE_PRESSURE_hPa = 1013.25
+
+# What a machine of known kinematics gives in every recording and live: its pose with all lengths and directions, the
+# scales, which way the links last moved and how fast, and the rows' order in time.
+GIVEN_BY_KINEMATICS = frozenset({"kinematics", "scale", "direction", "motion", "time", "order"})
 
 # Columns of the reference instrument and of a model: an effect computed from them would be fitted to its own answer.
 ANSWER_PREFIXES = ("reference_", "model_")
@@ -42,7 +47,8 @@ class MachineConstants(NamedTuple):
     """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
     platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.
-    tool_P_mm (3,), at machine zero.
+    arrangement: where the tool is; its tool_mm (3,) in {P}, or in {M} where the tool stands on the plate, as at machine
+        zero.
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
     zero_axes_M (n, 3): unit vector square to each link at machine zero, towards which its base joint's first angle
         counts: the revolute axis on a tripod, horizontal on a hexapod.
@@ -54,7 +60,7 @@ class MachineConstants(NamedTuple):
 
     platform_joints_P_mm: FloatArray
     revolute_axes_P: FloatArray
-    tool_P_mm: FloatArray
+    arrangement: Arrangement
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray
     zero_axial_force_N: FloatArray
@@ -79,6 +85,7 @@ class Observations:
     velocity_mm_per_s (N, n), joint_velocity_mm_per_s (N, k): of the readings.
     link_mm (N, n), directions_M (N, n, 3) from base to platform joint, base_joints_M_mm (N, n, 3).
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
+    recorded : of a machine without known kinematics, what of GIVEN_BY_KINEMATICS was recorded all the same.
     """
 
     constants: MachineConstants
@@ -97,6 +104,7 @@ class Observations:
     origin_M_mm: FloatArray
     rotation_M_P: FloatArray
     tip_M_mm: FloatArray
+    recorded: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
@@ -119,10 +127,21 @@ class Observations:
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
-            if column.name not in ("constants", "quantities")
+            if column.name not in ("constants", "quantities", "recorded")
         }
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
+
+    def extended_by(self, rows: Observations) -> Observations:
+        """These rows and then those of the same machine, with the quantities that both have."""
+        joined: dict[str, Any] = {
+            column.name: np.concatenate([getattr(self, column.name), getattr(rows, column.name)])
+            for column in fields(self)
+            if isinstance(getattr(self, column.name), np.ndarray)
+        }
+        names = [name for name in self.quantities if name in rows.quantities]
+        quantities = {name: np.concatenate([self.quantities[name], rows.quantities[name]]) for name in names}
+        return replace(self, **joined, quantities=quantities)
 
     @property
     def links(self) -> int:
@@ -137,7 +156,7 @@ class Observations:
     @property
     def available(self) -> set[str]:
         """Names of the quantities and settings that there are, as `unmet_needs` takes them."""
-        return set(self.quantities) | available_settings(self.constants)
+        return set(self.quantities) | available_settings(self.constants) | self.recorded
 
     def setting(self, name: str) -> float | None:
         """A number from the machine's description, None where it has none."""
@@ -169,8 +188,13 @@ class Observations:
 
     @cached_property
     def force_M_N(self) -> FloatArray:
-        """(N, 3) external force on the tip."""
+        """(N, 3) external force on what the platform carries: at the tip, on the tool or on the work."""
         return np.stack([self.quantity(f"force_{axis}_N") for axis in "xyz"], axis=1)
+
+    @cached_property
+    def force_on_tool_N(self) -> FloatArray:
+        """(N, 3) force on the tool's tip, in the frame of the tool vector: {P}, or {M} for a tool on the plate."""
+        return self.constants.arrangement.force_on_tool_N(self.force_M_N, self.rotation_M_P)
 
     @cached_property
     def axial_force_N(self) -> FloatArray:
@@ -199,6 +223,8 @@ class Observations:
 def available_settings(constants: MachineConstants) -> set[str]:
     """The settings that this machine has, of those that effects may need."""
     settings = {"revolute_axes"} if len(constants.revolute_axes_P) else set()
+    if len(constants.platform_joints_P_mm):
+        settings |= GIVEN_BY_KINEMATICS
     for name in ("plate_thickness_mm", "scale_signal_period_mm"):
         if not np.isnan(getattr(constants, name)):
             settings.add(name)

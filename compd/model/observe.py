@@ -14,6 +14,7 @@ from compd.model.kinematics import Pose, forward_kinematics, joint_shortening, l
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import MachineConstants, Observations
+from compd.model.tool import ToolOnPlatform
 
 
 def observe(
@@ -95,20 +96,28 @@ def observe_at_pose(
     )
 
 
-def observe_tip(
-    tip_M_mm: FloatArray, quantities: Mapping[str, FloatArray], time_s: FloatArray, session_start: BoolArray
+def observe_external(
+    tip_M_mm: FloatArray,
+    *,
+    scale_mm: FloatArray,
+    movement: Movement,
+    quantities: Mapping[str, FloatArray],
+    time_s: FloatArray,
+    session_start: BoolArray,
+    recorded: frozenset[str],
 ) -> Observations:
-    """Observations of a machine that an external model computes: only the tip (N, 3) and measured quantities are known.
+    """Observations of a machine that an external model computes, of whose kinematics nothing is known.
 
-    Effects at the port `reference` can be computed from them; `unmet_needs` refuses the others.
+    tip_M_mm : (N, 3), nan where link lengths are predicted.  scale_mm : (N, n), of the links whose length was measured,
+    nan where not recorded; n = 0 for a machine of which the tip was measured.  recorded : as in `Observations`.
     """
-    count = len(tip_M_mm)
-    none, no_vectors = np.zeros((count, 0)), np.zeros((0, 3))
+    count, links = scale_mm.shape
+    no_vectors = np.zeros((0, 3))
     unknown = np.full(3, np.nan)
     constants = MachineConstants(
         platform_joints_P_mm=no_vectors,
         revolute_axes_P=no_vectors,
-        tool_P_mm=unknown,
+        arrangement=ToolOnPlatform(unknown),
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,
         zero_axial_force_N=np.zeros(0),
@@ -122,19 +131,20 @@ def observe_tip(
     )
     return Observations(
         constants=constants,
-        scale_mm=none,
-        joint_mm=none,
+        scale_mm=scale_mm,
+        joint_mm=np.zeros((count, 0)),
         frame_mm=np.full((count, 9), np.nan),
         quantities=quantities,
         time_s=time_s,
         session_start=session_start,
-        direction=none,
-        velocity_mm_per_s=none,
-        joint_velocity_mm_per_s=none,
-        link_mm=none,
-        directions_M=np.zeros((count, 0, 3)),
-        base_joints_M_mm=np.zeros((count, 0, 3)),
+        direction=movement.direction,
+        velocity_mm_per_s=movement.velocity_mm_per_s,
+        joint_velocity_mm_per_s=movement.joint_velocity_mm_per_s,
+        link_mm=np.full((count, links), np.nan),
+        directions_M=np.full((count, links, 3), np.nan),
+        base_joints_M_mm=np.full((count, links, 3), np.nan),
         origin_M_mm=np.full((count, 3), np.nan),
         rotation_M_P=np.full((count, 3, 3), np.nan),
         tip_M_mm=tip_M_mm,
+        recorded=recorded,
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
@@ -52,6 +53,13 @@ class ToolOnPlatform:
         """The same place of the tip in {M}, reached with another tool tool_mm (..., 3)."""
         return Contact(contact.tip_M_mm, tool_mm)
 
+    def force_on_tool_N(self, force_M_N: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
+        """The force (..., 3) on the tool's tip, in the frame of `tool_mm`: R^T F, for the platform carries the tool.
+
+        force_M_N : (..., 3), the external force F on what the platform carries.  rotation_M_P : (..., 3, 3).
+        """
+        return np.asarray((rotation_M_P * force_M_N[..., :, None]).sum(axis=-2))
+
     def measured_tip_mm(self, contact: Contact) -> FloatArray:
         """The tip (..., 3) in the frame in which this arrangement measures, {M}."""
         return contact.tip_M_mm
@@ -84,6 +92,14 @@ class ToolOnPlate:
     def with_tool(self, contact: Contact, tool_mm: FloatArray) -> Contact:
         """The same place on the work, touched with another tool tool_mm (..., 3)."""
         return Contact(tool_mm, contact.tip_P_mm)
+
+    def force_on_tool_N(self, force_M_N: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
+        """The force (..., 3) on the tool's tip, in the frame of `tool_mm`: -F, for the platform carries the work.
+
+        force_M_N : (..., 3), the external force F on what the platform carries, here by the tool on the work; the work
+        presses back on the tool.  rotation_M_P : (..., 3, 3), of no influence: tool and force are both in {M}.
+        """
+        return np.asarray(-force_M_N)
 
     def measured_tip_mm(self, contact: Contact) -> FloatArray:
         """The tip (..., 3) in the frame in which this arrangement measures: the place on the work, in {P}."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
-from compd.units import KNOWN_UNITS, conversion_text, unit_of
+from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
@@ -30,7 +30,7 @@ class ColumnKind(NamedTuple):
     ----------
     names : as people write them, `<i>` for a number from 1.
     stem : what matches the name without its unit.
-    unit : the one unit that the format gives it; "" = no unit.
+    unit : the unit that the format gives it; "" = no unit.
     meaning : for the reference.
     """
 
@@ -39,11 +39,24 @@ class ColumnKind(NamedTuple):
     unit: str
     meaning: str
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The unit, and for the reference's lengths those that `reference.unit` of the sidecar may put in its place."""
+        of_reference = self.unit == "mm" and self.names.startswith("reference_")
+        return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
 
+
+_SENSITIVITY_STEM = r"d_[A-Za-z]\w*_(?:[xyz]|link_[1-9]\d*)"
 COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
     ColumnKind(names, re.compile(stem), unit, meaning)
     for names, stem, unit, meaning in (
-        ("time_s", r"time", "s", "seconds from the start, different in every row; rows count in this order, however the file is sorted"),
+        (
+            "time_s",
+            r"time",
+            "s",
+            "seconds from the start, different in every row; rows count in this order, however the file is sorted. With "
+            "`machine: external` optional: the rows then count as taken in order",
+        ),
         (
             "session",
             r"session",
@@ -69,13 +82,15 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "approach_<i>",
             r"approach_[1-9]\d*",
             "",
-            "1 or -1: the direction in which link i last moved; without it, from the scales",
+            "1 or -1: the direction in which link i, or axis i of an external model, last moved; without it, from the "
+            "scales",
         ),
         (
             "reference_x_mm, reference_y_mm, reference_z_mm",
             r"(?:reference|model)_[xyz]",
             "mm",
-            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes",
+            "the tip as the reference instrument measured it, in {M} or in the instrument's frame; any axes; with "
+            "another `reference.unit` in the sidecar the name ends in it, as in reference_x_arcsec",
         ),
         (
             "reference_rx_rad, reference_ry_rad, reference_rz_rad",
@@ -87,13 +102,25 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "reference_link_<i>_mm",
             r"(?:reference|model)_link_[1-9]\d*",
             "mm",
-            "in place of the tip: the change of link i as an interferometer measured it",
+            "in place of the tip: the change of link i as an interferometer measured it; the unit as that of the tip",
         ),
         ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
-        ("force_x_N, force_y_N, force_z_N", r"force_[xyz]", "N", "force on the tip, in {M}"),
+        (
+            "force_x_N, force_y_N, force_z_N",
+            r"force_[xyz]",
+            "N",
+            "force on the tip, in {M}; where the tool stands on the plate, on the work",
+        ),
         ("pressure_hPa", r"pressure", "hPa", "air pressure"),
         ("humidity_pct", r"humidity", "pct", "relative humidity of the air"),
+        (
+            "d_<name>_x_mm, d_<name>_y_mm, d_<name>_z_mm, d_<name>_link_<i>_mm",
+            _SENSITIVITY_STEM,
+            "mm",
+            "derivative of the prediction by the parameter `name` of a model of your own, in mm per unit of the "
+            "parameter: for an effect with `sensitivity: name`, and for nothing else",
+        ),
     )
 )
 # With `machine: external` there is also a column model_... for every column reference_...; and anything else that was
@@ -134,8 +161,18 @@ def link_reference_column(link: int) -> str:
     return f"reference_link_{link}_mm"
 
 
+def is_sensitivity(name: str) -> bool:
+    """Whether `name` is the column of a derivative of a model's prediction by one of its parameters.
+
+    Such a column belongs to an effect; it is nothing that was measured, and no covariate.
+    """
+    return re.fullmatch(rf"{_SENSITIVITY_STEM}_mm", name) is not None
+
+
 def decimals(name: str) -> int | None:
     """How many decimals the column `name` is rounded to when it is written; None: written in full."""
+    if is_sensitivity(name):  # mm per any unit may be small
+        return None
     column = parse_name(name)
     return DECIMALS.get(column.unit if column else unit_of(name))
 
@@ -148,9 +185,10 @@ def number_text(value: float) -> str:
 def parse_name(name: str) -> ColumnName | None:
     """The parts of a name that is exactly a column of the format; None for every other name."""
     for kind in COLUMN_KINDS:
-        stem = name.removesuffix(f"_{kind.unit}") if kind.unit else name
-        if (stem != name or not kind.unit) and kind.stem.fullmatch(stem):
-            return ColumnName(stem, kind.unit)
+        for unit in kind.units:
+            stem = name.removesuffix(f"_{unit}") if unit else name
+            if (stem != name or not unit) and kind.stem.fullmatch(stem):
+                return ColumnName(stem, unit)
     return None
 
 
@@ -160,9 +198,12 @@ def is_covariate(name: str) -> bool:
 
 
 def is_header(cells: Sequence[str]) -> bool:
-    """Whether these cells are a recording's header: they name the time or, rightly or wrongly spelt, mostly columns."""
+    """Whether these cells are a recording's header: they name the time, a reference or, rightly or wrongly spelt,
+    mostly columns."""
     filled = [cell for cell in cells if cell]
     intended = [intended_column(cell) for cell in filled]
+    if any(name is not None and name.startswith("reference_") for name in intended):
+        return True
     return "time_s" in intended or sum(name is not None for name in intended) * 2 > max(2, len(filled))
 
 

@@ -15,7 +15,8 @@ from compd.recording.clock_offset import ClockOffset, estimate_offset, evaluate_
 from compd.recording.columns import link_reference_column
 from compd.recording.instrument_export import LENGTH, Track
 from compd.recording.recording import Recording
-from compd.recording.sidecar import Frame, sidecar_contents
+from compd.recording.reference import Frame
+from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 
 # The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
@@ -200,7 +201,12 @@ def _sidecar(
     joined |= {name: round(value, 6) for name, value in known.items() if not np.isnan(value)}
     provenance = {**recording.sidecar.provenance, "join": joined}
     return sidecar_contents(
-        recording.machine, reference, recording.exclusions_by_position(), provenance, recording.sidecar.notes
+        recording.machine,
+        reference,
+        recording.exclusions_by_position(),
+        provenance,
+        recording.sidecar.notes,
+        recording.sidecar.folds,
     )
 
 

@@ -15,14 +15,17 @@ from compd.recording.columns import (
     AXES,
     FRAME_COLUMNS,
     ID_COLUMNS,
-    POSITION_COLUMNS,
     approach_columns,
     joint_columns,
     parse_name,
     scale_columns,
 )
 from compd.recording.problem_list import ProblemList
-from compd.recording.sidecar import EXTERNAL, Sidecar
+from compd.recording.reference import sigma_key
+from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
+from compd.units import REFERENCE_UNITS
+
+_IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,13 @@ class Layout:
 
     Attributes
     ----------
-    scales, joints : how many columns; 0 = none. frame : whether the nine frame comparators are there.
-    approach : whether there is an approach column for every scale. attitude : whether the reference has an attitude.
-    axes, links : of the reference's position, or the links (1-based) whose length it measures.
+    scales, joints : how many columns; 0 = none, or an external model.
+    frame : whether the nine frame comparators are there.
+    approach : whether there is an approach column for every scale; of an external model, any.
+    axes, attitude : of the reference's position; whether it has an attitude.
+    links : the links (1-based) whose length the reference measures.
     covariates : names of all other columns.
+    ending : what the names of reference and model end in: "mm", or another unit that the sidecar names.
     """
 
     scales: int
@@ -45,14 +51,15 @@ class Layout:
     attitude: bool
     links: tuple[int, ...]
     covariates: tuple[str, ...]
+    ending: str = "mm"
 
     @property
     def reference(self) -> tuple[str, ...]:
         """What follows "reference_", and "model_", in the columns' names: x_mm, rx_rad, link_1_mm."""
         return (
-            *(f"{axis}_mm" for axis in self.axes),
+            *(f"{axis}_{self.ending}" for axis in self.axes),
             *(f"{axis}_rad" for axis in ATTITUDES if self.attitude),
-            *(f"link_{i}_mm" for i in self.links),
+            *(f"link_{i}_{self.ending}" for i in self.links),
         )
 
 
@@ -62,12 +69,18 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     reference_valid : whether the sidecar's reference could be read; if not, reference columns are not checked.
     """
     external = sidecar is not None and sidecar.external
+    ending = REFERENCE_UNITS[sidecar.unit] if sidecar is not None else "mm"
+    if sidecar is not None and reference_valid:
+        names = _names_in_unit(names, sidecar, problems)
     if "time_s" not in names:
         _add_missing(["time_s"], names, problems)
     scales = _count(names, "scale", "mm", external, problems)
     joints = _count(names, "joint", "um", external, problems)
     approaches = _count(names, "approach", "", external, problems)
     frame = [name for name in FRAME_COLUMNS if name in names]
+    if external:
+        # of gauges whose machine is not known nothing can be computed: each is a quantity like any other
+        scales, joints, frame = 0, 0, []
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
     if not external:
         if not scales and not any(name.startswith("scale_") for name in names):
@@ -82,15 +95,18 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
         # A link's change by interferometer needs no frame: the paper's figures 17 and 18.
         if len(frame) < 9 and (frame or quantity != "link_length"):
             _add_missing([name for name in FRAME_COLUMNS if name not in frame], names, problems)
-    links = tuple(_numbers(names, "reference_link", "mm"))
-    axes = tuple(axis for axis in AXES if f"reference_{axis}_mm" in names)
+    links = tuple(_numbers(names, "reference_link", ending))
+    axes = tuple(axis for axis in AXES if f"reference_{axis}_{ending}" in names)
     attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
     if quantity == "ball_plate":
         axes = AXES
-    layout = Layout(scales, joints, len(frame) == 9, 0 < approaches == scales, axes, len(attitude) == 3, links, ())
+    has_approach = approaches > 0 and (external or approaches == scales)
+    layout = Layout(scales, joints, len(frame) == 9, has_approach, axes, len(attitude) == 3, links, (), ending)
     if sidecar is not None and reference_valid:
         _check_reference(names, sidecar, layout, attitude, problems)
         _check_model(names, external, layout, problems)
+    if sidecar is not None:
+        _check_folds(names, sidecar, problems)
     return replace(layout, covariates=tuple(_covariates(names, layout)))
 
 
@@ -150,6 +166,25 @@ def _count(names: Sequence[str], stem: str, unit: str, external: bool, problems:
     return 0 if external else numbers[-1]
 
 
+def _names_in_unit(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) -> list[str]:
+    """The names, those of reference and model in the sidecar's unit; it is a problem where they are in another one."""
+    ending = REFERENCE_UNITS[sidecar.unit]
+    right = {name: name for name in names}
+    for unit, other in REFERENCE_UNITS.items():
+        columns = [(name, column.stem) for name in names if (column := parse_name(name)) and column.unit == other]
+        wrong = {name: f"{stem}_{ending}" for name, stem in columns if _IN_REFERENCE_UNIT.fullmatch(stem)}
+        if other == ending or not wrong:
+            continue
+        mend = f"convert them and name them {', '.join(wrong.values())}"
+        problems.add(
+            "",
+            f"{', '.join(wrong)}: in {other} by their names, but the reference is in {sidecar.unit} by the sidecar",
+            next_step=f"write `unit: {unit}` under `reference:`, or {mend}" if sidecar.external else mend,
+        )
+        right |= wrong
+    return list(right.values())
+
+
 def _check_reference(
     names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], problems: ProblemList
 ) -> None:
@@ -165,9 +200,10 @@ def _check_reference(
             )
         return
     quantity = sidecar.reference.quantity
+    positions = [f"reference_{axis}_{layout.ending}" for axis in AXES]
     wanted: dict[str, list[str]] = {
-        "tool_position": [*POSITION_COLUMNS],
-        "tool_pose": [*POSITION_COLUMNS, *ATTITUDE_COLUMNS],
+        "tool_position": positions,
+        "tool_pose": [*positions, *ATTITUDE_COLUMNS],
         "link_length": [name for name in present if name.startswith("reference_link_")],
         "ball_plate": ["ball"],
     }
@@ -177,28 +213,29 @@ def _check_reference(
             "",
             f"{', '.join(extra)}: not a column of the quantity that the sidecar names",
             quantity,
-            ", ".join(wanted[quantity]) or "reference_link_1_mm, ...",
+            ", ".join(wanted[quantity]) or f"reference_link_1_{layout.ending}, ...",
             "mend `quantity:` in the sidecar, or delete the columns",
         )
     if quantity in ("tool_position", "tool_pose") and not layout.axes:
-        _add_missing(["reference_x_mm, reference_y_mm or reference_z_mm"], names, problems)
+        _add_missing([f"{positions[0]}, {positions[1]} or {positions[2]}"], names, problems)
     if quantity == "tool_pose" and len(attitude) < 3:
         _add_missing([f"reference_{axis}_rad" for axis in ATTITUDES if axis not in attitude], names, problems)
     if quantity == "link_length":
         if not layout.links:
-            _add_missing(["reference_link_1_mm, ..."], names, problems)
+            _add_missing([f"reference_link_1_{layout.ending}, ..."], names, problems)
         beyond = [i for i in layout.links if layout.scales and i > layout.scales]
         if beyond:
             problems.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
     if quantity == "ball_plate" and "ball" not in names:
         _add_missing(["ball"], names, problems)
     count = len(layout.links) if quantity == "link_length" else len(layout.axes)
-    if count and len(sidecar.reference.sigma_um) not in (1, count):
+    key, sigma = sigma_key(sidecar.unit), sidecar.reference.standard_uncertainty
+    if count and len(sigma) not in (1, count):
         problems.add(
             "",
-            f"sigma_um has {len(sidecar.reference.sigma_um)} values for {count} reference columns",
+            f"{key} has {len(sigma)} values for {count} reference columns",
             allowed=f"1 or {count} values",
-            next_step="mend `sigma_um:` in the sidecar",
+            next_step=f"mend `{key}:` in the sidecar",
         )
 
 
@@ -222,6 +259,22 @@ def _check_model(names: Sequence[str], external: bool, layout: Layout, problems:
             "",
             f"{', '.join(extra)}: a prediction with no reference to compare it with",
             next_step="add the reference's column, or delete the model's",
+        )
+
+
+def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) -> None:
+    """Check that every column of `folds:` is there, and is none of the reference or the model."""
+    columns = [name for name in names if name != "time_s" and not name.startswith(("reference_", "model_"))]
+    unknown = [name for name in sidecar.folds if name not in (TIME, PLACE, *columns)]
+    if unknown:
+        problems.problems.append(
+            Problem(
+                where=f"{sidecar.path} folds",
+                what="names what rows cannot be divided by",
+                value=", ".join(unknown),
+                allowed=", ".join((TIME, PLACE, *columns)),
+                next_step="name a column, or delete it",
+            )
         )
 
 

@@ -14,6 +14,7 @@ from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.recording.columns import ID_COLUMNS
 from compd.recording.recording import Recording
+from compd.recording.reference import sigma_key
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 
@@ -74,10 +75,21 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
         for recording in recordings
         if recording.reference is not None and recording.reference.frame == "instrument"
     ]
+    problems += [
+        Problem(
+            where=str(recording.path),
+            what="has no time, so that nothing says when it began",
+            allowed="recordings with `time_s`",
+            next_step="put its rows into one table with a column `session`, or diagnose it by itself",
+        )
+        for recording in recordings
+        if not recording.has_time
+    ]
     for recording in others:
         comparisons = (
             ("is of another machine", recording.machine, first.machine, "leave it out"),
             ("has another reference", _reference_text(recording), _reference_text(first), "diagnose it by itself"),
+            ("has other folds", _folds_text(recording), _folds_text(first), "write the same `folds:` in both"),
             (
                 "was recorded from another machine zero",
                 _zero_time(recording),
@@ -95,7 +107,13 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
 
 def _reference_text(recording: Recording) -> str:
     reference = recording.reference
-    return "none" if reference is None else f"{reference.quantity}, {reference.frame}, sigma {reference.sigma_um} um"
+    if reference is None:
+        return "none"
+    return f"{reference.quantity}, {reference.frame}, sigma {reference.standard_uncertainty} {reference.unit}"
+
+
+def _folds_text(recording: Recording) -> str:
+    return ", ".join(recording.sidecar.folds) or "no `folds:`"
 
 
 def _zero_time(recording: Recording) -> str:
@@ -166,9 +184,11 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
     reference_contents: dict[str, Any] | None = None
     if reference is not None:
         reference_contents = {"quantity": reference.quantity, "frame": reference.frame}
-        sigma_um = [value for value in reference.sigma_um if np.isfinite(value)]
-        if sigma_um:
-            reference_contents["sigma_um"] = sigma_um[0] if len(sigma_um) == 1 else sigma_um
+        if reference.unit != "um":
+            reference_contents["unit"] = reference.unit
+        sigma = [value for value in reference.standard_uncertainty if np.isfinite(value)]
+        if sigma:
+            reference_contents[sigma_key(reference.unit)] = sigma[0] if len(sigma) == 1 else sigma
     rows_before = 0
     excluded: dict[int, str] = {}
     for recording in recordings:
@@ -184,4 +204,5 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         }
         for recording, start_s in zip(recordings, starts_s, strict=True)
     ]
-    return sidecar_contents(recordings[0].machine, reference_contents, excluded, {"merge": sources})
+    first = recordings[0].sidecar
+    return sidecar_contents(first.machine, reference_contents, excluded, {"merge": sources}, folds=first.folds)

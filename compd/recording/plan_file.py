@@ -10,6 +10,9 @@ CSV with one row per measurement, a header, `.` decimal, UTF-8:
 | `<name>_<unit>` | a quantity that is held meanwhile: temperature_room_degC, force_x_N, ... |
 | `approach_<i>` | +1/-1: the direction in which link i comes to the place; 0: as it comes |
 | `speed_mm_per_s` | speed of the fastest link while it passes the place; 0: at rest |
+
+A plan for a machine of an external model has the columns of its recording that are to be set in place of the tip, the
+links and their speed. A person measures it; nothing in compd reads it.
 """
 
 from __future__ import annotations
@@ -23,7 +26,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
 from compd.recording.columns import approach_columns
@@ -32,15 +34,17 @@ PURPOSE_COLUMN = "purpose"
 TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 SPEED_COLUMN = "speed_mm_per_s"
 NEEDED_COLUMNS = ("time_s", *TIP_COLUMNS)
+# Columns that say nothing to set: when, and for the reader.
+NOT_SET = ("row", PURPOSE_COLUMN, "time_s")
 WRITTEN_BY = "`compd plan` writes such a file"
 
 
 def plan_row(
     purpose: str,
     time_s: float,
-    tip_M_mm: FloatArray,
+    tip_M_mm: Sequence[float],
     quantities: Mapping[str, float],
-    approach: FloatArray,
+    approach: Sequence[float],
     speed_mm_per_s: float,
 ) -> dict[str, Any]:
     """One row by column, rounded to what a person can set.
@@ -54,6 +58,16 @@ def plan_row(
         **{name: round(float(value), 3) for name, value in quantities.items()},
         **{name: int(sign) for name, sign in zip(approach_columns(len(approach)), approach, strict=True)},
         SPEED_COLUMN: round(float(speed_mm_per_s), 2),
+    }
+
+
+def settings_row(purpose: str, time_s: float, settings: Mapping[str, float]) -> dict[str, Any]:
+    """One row for a machine of an external model. settings : column -> value; whole numbers are written as such."""
+    numbers = {name: float(value) for name, value in settings.items()}
+    return {
+        PURPOSE_COLUMN: purpose,
+        "time_s": round(float(time_s), 1),
+        **{name: int(value) if value.is_integer() else value for name, value in numbers.items()},
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,10 @@ from compd.recording.columns import (
     ATTITUDES,
     AXES,
     FRAME_COLUMNS,
-    POSITION_COLUMNS,
     approach_columns,
     correct_names,
     is_header,
     joint_columns,
-    link_reference_column,
     scale_columns,
 )
 from compd.recording.csv_table import CsvTable, read_table
@@ -69,6 +68,9 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     if table is None:
         raise RecordingError([*problems, *table_problems.problems])
     table = correct_names(table, table_problems)
+    has_time = "time_s" in table.letters or sidecar is None or not sidecar.external
+    if not has_time:
+        table = _with_row_numbers(table)
     layout = read_layout(list(table.letters), sidecar, reference_valid, table_problems)
     check_values(table, table_problems)
     excluded = _excluded(table, sidecar, table_problems)
@@ -83,7 +85,8 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     problems += table_problems.problems
     if problems or sidecar is None:
         raise RecordingError(problems)
-    return _build(table, sidecar, layout, excluded, plate, tuple(table_problems.warnings))
+    recording = _build(table, sidecar, layout, excluded, plate, tuple(table_problems.warnings))
+    return recording if has_time else _without_time(recording)
 
 
 def check_against(recording: Recording, configuration: Configuration) -> None:
@@ -92,6 +95,18 @@ def check_against(recording: Recording, configuration: Configuration) -> None:
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
     if problems := machine_problems(recording.machine, (scales, joints), configuration, str(recording.sidecar.path)):
         raise RecordingError(problems)
+
+
+def _with_row_numbers(table: CsvTable) -> CsvTable:
+    """The table with the number of each row, from 0, in the place of its time: the rows count as taken in order."""
+    numbers = np.arange(len(table.row), dtype=np.float64)
+    return replace(table, letters={**table.letters, "time_s": ""}, columns={**table.columns, "time_s": numbers})
+
+
+def _without_time(recording: Recording) -> Recording:
+    """The recording of a table `_with_row_numbers`: the column is not in the file, and its numbers are no seconds."""
+    columns = {name: values for name, values in recording.columns.items() if name != "time_s"}
+    return replace(recording, columns=columns, has_time=False)
 
 
 def _needed_columns(layout: Layout, sidecar: Sidecar | None) -> list[str]:
@@ -140,6 +155,11 @@ def _build(
         present = [columns[name] for name in names if name in columns]
         return np.column_stack(present) if present else None
 
+    def in_mm(kind: str, places: Iterable[str]) -> FloatArray | None:
+        """Reference or model; one unit of an angle counts as a micrometre."""
+        values = stack(f"{kind}_{place}_{layout.ending}" for place in places)
+        return values if values is None or layout.ending == "mm" else values / UM_PER_MM
+
     def ids(name: str) -> IntArray | None:
         return np.where(np.isnan(columns[name]), -1, columns[name]).astype(np.int64) if name in columns else None
 
@@ -150,7 +170,8 @@ def _build(
         approach = row_directions(scale_mm, session)
     joint_um = stack(joint_columns(layout.joints))
     frame_um = stack(FRAME_COLUMNS) if layout.frame else None
-    position = stack(POSITION_COLUMNS)
+    position = in_mm("reference", AXES)
+    links = [f"link_{i}" for i in layout.links]
     if plate is not None and ball is not None:
         position = plate.positions_of_mm(ball)
     return Recording(
@@ -172,12 +193,12 @@ def _build(
         reference_mm=position,
         reference_rotation_rad=stack(ATTITUDE_COLUMNS),
         reference_links=layout.links,
-        reference_link_mm=stack(link_reference_column(i) for i in layout.links),
+        reference_link_mm=in_mm("reference", links),
         ball=ball,
         plate=plate,
-        model_mm=stack(f"model_{axis}_mm" for axis in AXES),
+        model_mm=in_mm("model", AXES),
         model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
-        model_link_mm=stack(f"model_link_{i}_mm" for i in layout.links),
+        model_link_mm=in_mm("model", links),
         excluded=excluded[kept],
         left_out={reason: count for reason, count in left_out.items() if count},
         columns=columns,

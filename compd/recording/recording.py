@@ -14,7 +14,8 @@ from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
-from compd.recording.sidecar import Reference, Sidecar
+from compd.recording.reference import Reference
+from compd.recording.sidecar import Sidecar
 from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).
@@ -38,19 +39,23 @@ class UsableRows(NamedTuple):
 class Recording:
     """N rows of one recording. Lengths are mm (the file's um are converted), nan where a cell was empty.
 
+    Where the reference is in another `unit`, such as arcsec, one of it counts as a um (1e-3 mm) in the attributes.
+
     Attributes
     ----------
     path, sha256 : the CSV file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
-    time_s : (N,) seconds from the start, strictly rising, never nan.
+    time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
+    has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None where the column is absent; -1 where the cell is empty.
         Text ids of points are numbered in sorted order.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
         the scales (`compd.travel_direction`); nan where it is not known.
-    approach_measured : whether it is from the columns.
+        With `machine: external` None; gauges and directions are quantities then.
+    approach_measured : whether there are `approach` columns.
     quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
     reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
         ball plate the calibrated place of the row's ball, all three axes.
@@ -93,6 +98,7 @@ class Recording:
     left_out: Mapping[str, int]
     columns: Mapping[str, FloatArray]
     warnings: tuple[Problem, ...] = ()
+    has_time: bool = True
 
     @property
     def machine(self) -> str:
@@ -103,6 +109,11 @@ class Recording:
     def reference(self) -> Reference | None:
         """What the reference is; None for gauges alone."""
         return self.sidecar.reference
+
+    @property
+    def unit(self) -> str:
+        """The unit in which people read the reference and its errors: "um", or what the sidecar names."""
+        return self.sidecar.unit
 
     @property
     def rows(self) -> int:
@@ -134,8 +145,8 @@ class Recording:
     def reference_sigma_mm(self) -> FloatArray:
         """(axes or links,) standard uncertainty of the reference; nan where it is not known."""
         count = len(self.reference_axes) or len(self.reference_links)
-        sigma_um = self.reference.sigma_um if self.reference else (np.nan,)
-        return np.broadcast_to(np.array(sigma_um) / UM_PER_MM, (count,)).astype(np.float64)
+        sigma = self.reference.standard_uncertainty if self.reference else (np.nan,)
+        return np.broadcast_to(np.array(sigma) / UM_PER_MM, (count,)).astype(np.float64)
 
     def exclusions_by_position(self) -> dict[int, str]:
         """Spreadsheet row -> reason, as the rows are numbered when this recording's N rows alone are written."""

@@ -2,114 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
 from compd.configuration.document import Document, read_document
 from compd.configuration.section import Section, refusal, unknown_key, validate
 from compd.errors import ConfigurationError, Problem, RecordingError
+from compd.recording.reference import Quantity, Reference
+from compd.units import REFERENCE_UNITS
 
 # What this release writes. Format 1, of release 0.1, has the same keys but no `format:`.
 FORMAT = 2
 EXTERNAL = "external"
-Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
-Frame = Literal["machine", "instrument"]
+# What cross-validation may leave out as a whole, beside the values of a column.
+TIME, PLACE = "time", "place"
 
-_SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
 _EXAMPLE = "machine: tripod-cmm, and under it reference: {quantity: tool_position, frame: machine}"
 # Row 1 is the header.
 _FIRST_ROW = 2
-
-
-class Reference(Section):
-    """What the reference instrument measured. An unknown `sigma_um` is nan; `balls` is relative to the sidecar."""
-
-    quantity: Quantity = Field(
-        description="what was measured: the tip, the tip and the attitude, the links' change, or balls of a ball plate"
-    )
-    frame: Frame = Field(
-        default="machine",
-        validate_default=True,
-        description="machine: the coordinates are in {M}; instrument: in the instrument's own frame, so that a "
-        "registration of six parameters is always fitted; of a ball plate always instrument unless it is written",
-    )
-    sigma_um: Annotated[
-        tuple[float, ...],
-        WithJsonSchema({"anyOf": [_SIGMA_SCHEMA, {"type": "array", "items": _SIGMA_SCHEMA}]}),
-    ] = Field(
-        default=(math.nan,),
-        description="standard uncertainty of the reference, um: one number, or one for each axis; left out where it is "
-        "not known",
-    )
-    balls: Path | None = Field(
-        default=None,
-        validate_default=True,
-        description="ball_plate only: the ball plate's file, relative to the sidecar",
-    )
-
-    @field_validator("quantity", mode="before")
-    @classmethod
-    def _known_quantity(cls, quantity: Any) -> Any:
-        return _one_of(quantity, get_args(Quantity), "say what the instrument measured")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _mapping(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            raise refusal("must hold `quantity:` and what belongs to it", next_step="see the format")
-        # a key without a value is a missing key; the frame's default depends on the quantity
-        return {"quantity": None, "frame": None, **{key: value for key, value in data.items() if value is not None}}
-
-    @field_validator("frame", mode="before")
-    @classmethod
-    def _frame_of_the_quantity(cls, frame: Any, info: ValidationInfo) -> Any:
-        quantity = info.data.get("quantity")
-        if frame is None and quantity in ("link_length", "ball_plate"):
-            return "instrument" if quantity == "ball_plate" else "machine"
-        if quantity == "link_length" and frame == "instrument":
-            raise refusal("a link's length has no frame", "machine, or nothing", "delete it")
-        return _one_of(frame, get_args(Frame), "say in which frame the reference columns are")
-
-    @field_validator("sigma_um", mode="before")
-    @classmethod
-    def _standard_uncertainties(cls, sigma: Any) -> Any:
-        sigmas = sigma if isinstance(sigma, list) else [sigma]
-        numbers = [value for value in sigmas if isinstance(value, int | float) and not isinstance(value, bool)]
-        if not sigmas or len(numbers) != len(sigmas) or not all(0 < number < math.inf for number in numbers):
-            raise refusal(
-                "is no standard uncertainty",
-                "a number greater than 0 in micrometres, or one for each axis: [0.1, 0.1, 0.3]",
-                "leave it out where it is not known",
-            )
-        return tuple(numbers)
-
-    @field_validator("balls", mode="before")
-    @classmethod
-    def _balls_of_a_ball_plate(cls, balls: Any, info: ValidationInfo) -> Any:
-        quantity = info.data.get("quantity")
-        if quantity == "ball_plate" and (not isinstance(balls, str) or not balls):
-            raise refusal(
-                "is missing" if balls is None else "is no file name",
-                "a CSV file: ball, x_mm, y_mm, z_mm",
-                "name the plate's file, beside the sidecar",
-            )
-        if quantity not in (None, "ball_plate") and balls is not None:
-            raise refusal(f"belongs to ball_plate, not to {quantity}", next_step="delete it")
-        return balls
-
-
-def _one_of(value: Any, names: tuple[str, ...], next_step: str) -> Any:
-    if value not in names:
-        raise refusal("is missing" if value is None else "is unknown", ", ".join(names), next_step)
-    return value
 
 
 def _row_numbers(value: Any) -> tuple[int, ...]:
@@ -183,6 +100,17 @@ def _checked_exclusions(value: Any) -> Any:
     return value or []
 
 
+def _checked_folds(value: Any) -> tuple[str, ...]:
+    names = value if isinstance(value, list) else [] if value is None else [value]
+    if not all(isinstance(name, str) and name for name in names) or value == []:
+        raise refusal(
+            "names nothing to leave out",
+            f"{TIME}, {PLACE}, or the name of a column; or a list of them",
+            f"write `folds: {PLACE}`, or leave it out",
+        )
+    return tuple(dict.fromkeys(names))
+
+
 def _mapping_or_nothing(value: Any) -> Any:
     if value is not None and not isinstance(value, dict):
         raise refusal("is of the wrong kind", "`key: value` lines")
@@ -209,6 +137,15 @@ SECTIONS: Mapping[str, Any] = {
     "reference": Annotated[
         Reference | None, Field(description="what the reference instrument measured; left out where there was none")
     ],
+    "folds": Annotated[
+        str | tuple[str, ...],
+        BeforeValidator(_checked_folds),
+        Field(
+            description=f"what cross-validation leaves out as a whole, one of these or a list: `{TIME}`, sessions or "
+            f"blocks of time; `{PLACE}`, sectors of the workspace; the name of a column, each of its values, or eight "
+            f"classes of a quantity with many values. Without the key `{TIME}`, and `{PLACE}` where it is known"
+        ),
+    ],
     "excluded_rows": Annotated[
         tuple[Exclusion, ...],
         BeforeValidator(_checked_exclusions),
@@ -231,6 +168,7 @@ class Sidecar:
     ----------
     machine : name of a machine configuration, or "external".
     reference : None in a recording of gauges alone, to which `compd join` adds one.
+    folds : what cross-validation leaves out: "time", "place" or columns; empty where the sidecar does not say.
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.
     format : number of the format that the file was written in.
@@ -243,11 +181,17 @@ class Sidecar:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: str = ""
     format: int = FORMAT
+    folds: tuple[str, ...] = ()
 
     @property
     def external(self) -> bool:
         """The recording carries the user's own model's prediction."""
         return self.machine == EXTERNAL
+
+    @property
+    def unit(self) -> str:
+        """Unit of the reference's errors: "um", or what `reference.unit` names."""
+        return "um" if self.reference is None else self.reference.unit
 
 
 def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
@@ -267,9 +211,19 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
     _refuse_newer_format(document)
     problems += [unknown_key(document, (key,), list(SECTIONS)) for key in document.data if key not in SECTIONS]
     sections = {key: validate(kind, document, (key,), problems) for key, kind in SECTIONS.items()}
-    reference = sections["reference"]
+    reference: Reference | None = sections["reference"]
     if reference is None:
-        reference = _quantity_alone(document)
+        reference = _columns_alone(document)
+    elif reference.unit != "um" and sections["machine"] not in (None, EXTERNAL):
+        problems.append(
+            Problem(
+                where=document.where(("reference", "unit")),
+                what=f"belongs to `machine: {EXTERNAL}`",
+                value=reference.unit,
+                allowed="um, or nothing",
+                next_step="delete it, and give the columns in mm",
+            )
+        )
     elif reference.balls is not None:
         reference = reference.model_copy(update={"balls": path.parent / reference.balls})
     exclusions: tuple[Exclusion, ...] = sections["excluded_rows"] or ()
@@ -281,6 +235,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         sections["provenance"] or {},
         sections["notes"] or "",
         sections["format"] or FORMAT,
+        sections["folds"] or (),
     )
 
 
@@ -290,6 +245,7 @@ def sidecar_contents(
     excluded: Mapping[int, str] | None = None,
     provenance: Mapping[str, Any] | None = None,
     notes: str = "",
+    folds: Sequence[str] = (),
 ) -> dict[str, Any]:
     """What a sidecar is to hold, as plain data; keys without a value are left out.
 
@@ -298,6 +254,7 @@ def sidecar_contents(
     contents = {
         "machine": machine,
         "reference": reference,
+        "folds": list(folds),
         "excluded_rows": [{"row": row, "reason": reason} for row, reason in (excluded or {}).items()],
         "provenance": provenance,
         "notes": notes,
@@ -324,9 +281,10 @@ def _refuse_newer_format(document: Document) -> None:
         )
 
 
-def _quantity_alone(document: Document) -> Reference | None:
-    """A faulty reference reduced to its quantity, which says what columns there must be; None where that is faulty."""
-    quantity = document.value(("reference", "quantity"))
+def _columns_alone(document: Document) -> Reference | None:
+    """A faulty reference reduced to what says which columns there must be; None where its quantity is faulty."""
+    quantity, unit = document.value(("reference", "quantity")), document.value(("reference", "unit"))
     if quantity not in get_args(Quantity):
         return None
-    return Reference.model_construct(quantity=quantity, frame="machine", sigma_um=(math.nan,), balls=None)
+    known_unit = unit if isinstance(unit, str) and unit in REFERENCE_UNITS else "um"
+    return Reference.model_construct(quantity=quantity, unit=known_unit, frame="machine")

@@ -11,6 +11,7 @@ from plotly.graph_objects import Figure
 from compd.arrays import rms
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import covariates
+from compd.comparison.display_unit import format_error
 from compd.model_file import parameter_estimates
 from compd.report.figures import (
     plot_contributions,
@@ -29,8 +30,8 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
     """Numbers of every recording side by side."""
     head = ["", *(name_of(comparison) for comparison in comparisons)]
     rows: list[list[str]] = [
-        ["residual, rms per coordinate", *(f"{comparison.rms_um:.3g} um" for comparison in comparisons)],
-        ["noise floor", *(f"{comparison.floor.um:.3g} um ({comparison.floor.source})" for comparison in comparisons)],
+        ["residual, rms per coordinate", *(_shown(comparison, comparison.rms_um) for comparison in comparisons)],
+        ["noise floor", *(_floor(comparison) for comparison in comparisons)],
         ["floor ratio, 1 = at the floor", *(f"{comparison.floor_ratio:.3g}" for comparison in comparisons)],
     ]
     labels = list(dict.fromkeys(label for comparison in comparisons for label in comparison.aligned.labels))
@@ -176,24 +177,34 @@ def _effects(comparison: Comparison) -> PageTable:
     return PageTable(("effect", "parameter", "value", "standard error", "unit"), rows)
 
 
+def _shown(comparison: Comparison, value_um: float) -> str:
+    """A value with three figures in the unit of the recording."""
+    return format_error(value_um, comparison.aligned.unit, 3)
+
+
+def _floor(comparison: Comparison) -> str:
+    return f"{_shown(comparison, comparison.floor.um)} ({comparison.floor.source})"
+
+
 def _axis(comparison: Comparison, label: str) -> str:
     if label not in comparison.aligned.labels:
         return "-"
     size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
-    return f"{rms(size):.3g} / {np.quantile(size, 0.95):.3g} / {size.max():.3g} um"
+    return f"{rms(size):.3g} / {np.quantile(size, 0.95):.3g} / {_shown(comparison, size.max())}"
 
 
 def _distance(comparison: Comparison) -> str:
     if comparison.aligned.of_links or len(comparison.aligned.labels) < 3:
         return "-"
     distance = comparison.distance_um[comparison.used]
-    return f"{rms(distance):.3g} / {np.quantile(distance, 0.95):.3g} / {distance.max():.3g} um"
+    return f"{rms(distance):.3g} / {np.quantile(distance, 0.95):.3g} / {_shown(comparison, distance.max())}"
 
 
 def _without(comparison: Comparison, name: str) -> str:
-    return f"{comparison.contributions[name].without_rms_um:.3g} um" if name in comparison.contributions else "-"
+    without = comparison.contributions.get(name)
+    return "-" if without is None else _shown(comparison, without.without_rms_um)
 
 
 def _uncertainty(comparison: Comparison) -> str:
     total = rms(comparison.uncertainty.total_um[comparison.used])
-    return "not known" if np.isnan(total) else f"{total:.2g} um"
+    return "not known" if np.isnan(total) else format_error(total, comparison.aligned.unit)

@@ -8,6 +8,7 @@ from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, rms
 from compd.comparison.compare import Comparison
+from compd.comparison.display_unit import format_error, in_place_unit, place_unit
 from compd.report.page import COLOURS, PageTable, style_figure
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
 from compd.units import UM_PER_MM
@@ -16,6 +17,8 @@ from compd.units import UM_PER_MM
 ARROWS = 400
 # Cells of the map along each axis.
 CELLS = 9
+# Of a map: its name, and the axes to the right and upwards.
+VIEWS = (("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2))
 # The typical arrow is drawn as long as this share of the workspace.
 ARROW_SHARE = 0.12
 
@@ -40,23 +43,24 @@ def plot_link_residuals(comparison: Comparison) -> Figure | PageTable:
 def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, float]:
     """Residual vectors in the workspace, and how many times they are enlarged."""
     aligned = comparison.aligned
-    used = np.flatnonzero(comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1))
-    if aligned.of_links or not len(used):
+    places_mm, axes = _places_mm(comparison)
+    used = np.flatnonzero(comparison.used & np.isfinite(places_mm).all(axis=1))
+    if aligned.of_links or len(axes) < 2 or not len(used):
         return NOT_RECORDED, 1.0
     chosen = thin(used, ARROWS)
-    tip = aligned.rows.tip_M_mm[chosen]
+    tip_mm, unit = places_mm[chosen], aligned.unit
     vector_um = np.zeros((len(chosen), 3))
     vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
     typical_mm = max(rms(np.linalg.norm(vector_um, axis=1)) / UM_PER_MM, 1e-9)
-    reach_mm = float(np.ptp(tip, axis=0).max()) or 1.0
+    reach_mm = float(np.ptp(tip_mm, axis=0).max()) or 1.0
     enlarged = 10.0 ** np.floor(np.log10(ARROW_SHARE * reach_mm / typical_mm))
     enlarged *= max(step for step in (1, 2, 5) if step * enlarged <= ARROW_SHARE * reach_mm / typical_mm)
-    end = tip + vector_um / UM_PER_MM * enlarged
-    gap = np.full_like(tip, np.nan)
-    path = np.stack([tip, end, gap], axis=1).reshape(-1, 3)
+    end_mm = tip_mm + vector_um / UM_PER_MM * enlarged
+    end, gap = in_place_unit(end_mm, unit), np.full_like(tip_mm, np.nan)
+    path = np.stack([in_place_unit(tip_mm, unit), end, gap], axis=1).reshape(-1, 3)
     size_um = np.linalg.norm(vector_um, axis=1)
     hover = [
-        f"({a:+.2f}, {b:+.2f}, {c:+.2f}) um, row {row}"
+        f"({a:+.3g}, {b:+.3g}, {c:+.3g}) {unit}, row {row}"
         for (a, b, c), row in zip(vector_um, aligned.recording.row[chosen], strict=True)
     ]
     figure = Figure()
@@ -84,14 +88,14 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
                 "size": 3,
                 "color": size_um,
                 "colorscale": "Viridis",
-                "colorbar": {"title": "um", "thickness": 14, "len": 0.8},
+                "colorbar": {"title": unit, "thickness": 14, "len": 0.8},
             },
         )
     )
     style_figure(figure, "", "", 600)
     figure.update_layout(
         scene={
-            **{f"{axis}axis_title": f"{axis}, mm" for axis in "xyz"},
+            **{f"{axis}axis_title": f"{axis}, {place_unit(unit)}" for axis in "xyz"},
             "aspectmode": "data",
             "camera": {"eye": {"x": 1.3, "y": -1.6, "z": 0.9}},
         },
@@ -102,7 +106,7 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
 
 def plot_histogram(comparison: Comparison) -> Figure:
     """Each coordinate's residual, and what noise alone would make."""
-    labels = comparison.aligned.labels
+    labels, unit = comparison.aligned.labels, comparison.aligned.unit
     figure = make_subplots(1, len(labels), subplot_titles=list(labels))
     for k, label in enumerate(labels, start=1):
         values = comparison.residual_um[comparison.used, k - 1]
@@ -139,26 +143,27 @@ def plot_histogram(comparison: Comparison) -> Figure:
             row=1,
             col=k,
         )
-        figure.update_xaxes(title_text=f"residual of {label}, um", row=1, col=k)
-    style_figure(figure, f"residual of {labels[0]}, um", "rows", 350)
+        figure.update_xaxes(title_text=f"residual of {label}, {unit}", row=1, col=k)
+    style_figure(figure, f"residual of {labels[0]}, {unit}", "rows", 350)
     return figure.update_layout(margin={"t": 70}, legend={"y": 1.12})
 
 
 def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
-    """Rms residual in cells of the workspace, seen from above, from the front and from the side."""
-    aligned = comparison.aligned
-    used = comparison.used & np.isfinite(aligned.rows.tip_M_mm).all(axis=1)
-    if not used.any():
+    """Rms residual in cells of the workspace, seen from above, from the front and from the side, as axes are known."""
+    places_mm, axes = _places_mm(comparison)
+    used = comparison.used & np.isfinite(places_mm).all(axis=1)
+    views = [(name, a, b) for name, a, b in VIEWS if a in axes and b in axes]
+    if not views or not used.any() or np.ptp(places_mm[used], axis=0).max() == 0:
         return NOT_RECORDED
-    tip_mm = aligned.rows.tip_M_mm[used]
+    unit = comparison.aligned.unit
+    shown, place = place_unit(unit), in_place_unit(places_mm[used], unit)
     square_um2 = (comparison.residual_um[used] ** 2).mean(axis=1)
-    views = [("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2)]
-    figure = make_subplots(1, 3, subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
+    figure = make_subplots(1, len(views), subplot_titles=[name for name, _, _ in views], horizontal_spacing=0.09)
     maps: list[tuple[list[FloatArray], FloatArray]] = []
     for _, a, b in views:
-        edges = [np.linspace(*_ends(tip_mm[:, axis]), CELLS + 1) for axis in (a, b)]
-        total_um2, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges, weights=square_um2)
-        count, _, _ = np.histogram2d(tip_mm[:, a], tip_mm[:, b], bins=edges)
+        edges = [np.linspace(*_ends(place[:, axis]), CELLS + 1) for axis in (a, b)]
+        total_um2, _, _ = np.histogram2d(place[:, a], place[:, b], bins=edges, weights=square_um2)
+        count, _, _ = np.histogram2d(place[:, a], place[:, b], bins=edges)
         with np.errstate(invalid="ignore"):
             maps.append((edges, np.sqrt(total_um2 / np.where(count > 0, count, np.nan))))
     highest_um = max(float(np.nanmax(cells_um)) for _, cells_um in maps)
@@ -172,17 +177,24 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
                 zmin=0.0,
                 zmax=highest_um,
                 colorscale="Viridis",
-                showscale=k == 3,
-                colorbar={"title": "um rms", "thickness": 14},
+                showscale=k == len(views),
+                colorbar={"title": f"{unit} rms", "thickness": 14},
                 name=name,
-                hovertemplate="%{z:.2f} um rms<extra></extra>",
+                hovertemplate=f"%{{z:.3g}} {unit} rms<extra></extra>",
             ),
             row=1,
             col=k,
         )
-        figure.update_xaxes(title_text=f"{'xyz'[a]}, mm", row=1, col=k)
-        figure.update_yaxes(title_text=f"{'xyz'[b]}, mm", title_standoff=2, row=1, col=k)
-    return style_figure(figure, "x, mm", "y, mm", 390).update_layout(margin={"r": 80, "t": 60})
+        figure.update_xaxes(title_text=f"{'xyz'[a]}, {shown}", row=1, col=k)
+        figure.update_yaxes(title_text=f"{'xyz'[b]}, {shown}", title_standoff=2, row=1, col=k)
+    return style_figure(figure, f"x, {shown}", f"y, {shown}", 390).update_layout(margin={"r": 80, "t": 60})
+
+
+def _places_mm(comparison: Comparison) -> tuple[FloatArray, list[int]]:
+    """(N, 3) places of the tip, and the axes that are known; the place is 0 along those that a model does not have."""
+    tip_M_mm = comparison.aligned.rows.tip_M_mm
+    known = np.isfinite(tip_M_mm).any(axis=0)
+    return np.where(known, tip_M_mm, 0.0), np.flatnonzero(known).tolist()
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
@@ -194,6 +206,7 @@ def plot_contributions(comparison: Comparison) -> Figure | PageTable:
     """The error that is left with each source switched off, beside the whole model and the noise floor."""
     if not comparison.contributions:
         return NOT_RECORDED
+    unit = comparison.aligned.unit
     names = ["whole model", *(f"without {name}" for name in comparison.contributions)]
     left = [comparison.rms_um, *(part.without_rms_um for part in comparison.contributions.values())]
     colours = [COLOURS["best"], *[COLOURS["plain"]] * (len(names) - 1)]
@@ -203,7 +216,7 @@ def plot_contributions(comparison: Comparison) -> Figure | PageTable:
             y=names,
             orientation="h",
             marker_color=colours,
-            text=[f"{x:.3g} um" for x in left],
+            text=[format_error(x, unit, 3) for x in left],
             textposition="outside",
             cliponaxis=False,
             showlegend=False,
@@ -216,5 +229,5 @@ def plot_contributions(comparison: Comparison) -> Figure | PageTable:
         annotation_position="top",
     )
     figure.update_yaxes(autorange="reversed")
-    style_figure(figure, "residual, um rms per coordinate", "", 130 + 38 * len(names))
+    style_figure(figure, f"residual, {unit} rms per coordinate", "", 130 + 38 * len(names))
     return figure.update_layout(margin={"l": 210, "r": 90, "t": 40}, xaxis_range=[0, 1.05 * max(left)])

@@ -23,7 +23,8 @@ NOT_RECORDED = PageTable(("",), [("not recorded, or it never changed",)])
 
 def plot_residual_against(comparison: Comparison, columns: Sequence[Covariate]) -> Figure | PageTable:
     """The residual against each covariate: dots, and each coordinate's mean in twelve classes of equally many rows."""
-    return small_multiples(comparison, columns, comparison.residual_um, comparison.aligned.labels, "residual, um")
+    label = f"residual, {comparison.aligned.unit}"
+    return small_multiples(comparison, columns, comparison.residual_um, comparison.aligned.labels, label)
 
 
 def small_multiples(
@@ -56,7 +57,15 @@ def small_multiples(
         for series, name in enumerate(names):
             colour = SERIES_COLOURS[series % len(SERIES_COLOURS)]
             add_dots_and_means(
-                figure, (row, col), covariate.values, values_um[:, series], used, name, colour, legend=k == 0
+                figure,
+                (row, col),
+                covariate.values,
+                values_um[:, series],
+                used,
+                name,
+                colour,
+                legend=k == 0,
+                unit=comparison.aligned.unit,
             )
         figure.update_xaxes(title_text=_axis_unit(covariate), title_standoff=4, row=row, col=col)
         if col == 1:
@@ -72,7 +81,11 @@ def _axis_unit(covariate: Covariate) -> str:
     """The unit of the covariate itself, where `Covariate.unit` is that of its changes."""
     if covariate.name.startswith("temperature"):
         return "K" if " - " in covariate.name else "degC"
-    return covariate.unit if covariate.unit != "1" else "-1 = shortening, +1 = lengthening"
+    if covariate.name.startswith("direction of link"):
+        return "-1 = shortening, +1 = lengthening"
+    if covariate.name.startswith("direction of axis"):
+        return "-1 = backwards, +1 = forwards"
+    return "" if covariate.unit == "1" else covariate.unit
 
 
 def add_dots_and_means(
@@ -84,10 +97,11 @@ def add_dots_and_means(
     name: str,
     colour: str,
     legend: bool,
+    unit: str = "um",
 ) -> None:
     """Add values y_um (N,) against x (N,) to the subplot at `place` (row, column): dots, and means of classes.
 
-    rows : (R,) indices of the rows that count.  legend : whether the series gets an entry.
+    rows : (R,) indices of the rows that count.  legend : whether the series gets an entry.  unit : in place of um.
     """
     known = rows[np.isfinite(x[rows]) & np.isfinite(y_um[rows])]
     dots = thin(known, DOTS)
@@ -101,7 +115,7 @@ def add_dots_and_means(
             showlegend=False,
             legendgroup=name,
             marker={"size": 3, "color": colour, "opacity": 0.35},
-            hovertemplate=f"{name}: %{{y:.2f}} um at %{{x:.4g}}<extra></extra>",
+            hovertemplate=f"{name}: %{{y:.3g}} {unit} at %{{x:.4g}}<extra></extra>",
         ),
         row=row,
         col=col,
@@ -117,7 +131,7 @@ def add_dots_and_means(
             showlegend=legend,
             line={"color": colour, "width": 2},
             marker={"size": 5, "color": colour},
-            hovertemplate=f"{name}, mean: %{{y:.3f}} um<extra></extra>",
+            hovertemplate=f"{name}, mean: %{{y:.3g}} {unit}<extra></extra>",
         ),
         row=row,
         col=col,

@@ -17,7 +17,7 @@ An effect is linear in its parameters, which are fitted. What it is not linear i
 is a constant: it is taken from the configuration where a key there gives it, and searched otherwise. The plausible
 range of a parameter comes from the source that is named beside it; a parameter that is fitted far outside it says that
 the cause is another one. "Needs" are the quantities that have to be measured; where one is missing the effect is not
-tried.
+tried. Telescopes, stages and other machines have [effects of their own](effect-files.md).
 """
 _PER = {"machine": "the machine", "link": "each link", "axis": "each axis", "link_axis": "each link and axis"}
 

@@ -8,7 +8,8 @@ from typing import Any
 from compd.live.record.recording_part import CYCLES_SUFFIX
 from compd.recording import ball_plate, checks, plan_file
 from compd.recording.columns import COLUMN_KINDS, DECIMALS
-from compd.recording.sidecar import EXTERNAL, SECTIONS, Exclusion, Reference, sidecar_contents, sidecar_text
+from compd.recording.reference import Reference
+from compd.recording.sidecar import EXTERNAL, SECTIONS, Exclusion, sidecar_contents, sidecar_text
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, term
 from docs.generate.schema import ModelSchema
 

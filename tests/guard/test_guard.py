@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from tests.scoreboard.trial import run_in_process
+from tests.support.command import run_in_process
 from tests.support.live_machine import machine
 from tests.support.paths import SHARED
 

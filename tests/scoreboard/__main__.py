@@ -1,97 +1,98 @@
-"""`python -m tests.scoreboard`: run the cases that are not in the results yet, on all cores; then print the tables.
+"""`python -m tests.scoreboard`: prepare cases, diagnose them on all cores, print the tables and write the page.
 
-Every result is a line of --out, written when its case is done, so that an interrupted run can be continued.
+With --set the cases of that set are made, where they are not on disk, and diagnosed; without it, those that are in
+--campaigns. Every result is a line of --out, written when its case is done: a run that was interrupted goes on.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import TextIO
+from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-from tests.scoreboard.cases import KINDS, NOTHING, OUTSIDE, PAIRS, SEEDS, STRENGTHS, Case, cases, parse_cases
+from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
+from tests.scoreboard.page import write_page
+from tests.scoreboard.parallel import append_results, in_parallel, read_results
+from tests.scoreboard.real import FAMILY as REAL
+from tests.scoreboard.real import PLACE, prepare_real
 from tests.scoreboard.table import report
-from tests.scoreboard.trial import prepare, run
+from tests.scoreboard.trial import prepared, read_answer, run
+
+# A case to prepare, or the directory of one that is prepared.
+Item = Case | Path
 
 
 def main() -> None:
     options = _options()
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    wanted = (
-        parse_cases(options.case)
-        if options.case
-        else cases(options.kinds, options.strengths, options.seeds, options.nothing, options.outside, options.pairs)
-    )
+    options.campaigns.mkdir(parents=True, exist_ok=True)
+    wanted = dict(_wanted(options))
     if options.prepare:
-        failed = _in_parallel(prepare, wanted[: options.most], options, lambda _: None)
-        raise SystemExit(str(failed) if failed else 0)
-    with options.out.open("a+", encoding="utf-8") as file:
-        failed = _in_parallel(run, _missing(wanted, options.out)[: options.most], options, partial(_write, file))
-    results = [json.loads(line) for line in options.out.read_text(encoding="utf-8").splitlines()]
-    names = {case.name for case in wanted}
-    results = [result for result in results if result["case"] in names]
-    print(f"\n{len(results)} of {len(wanted)} cases, {len(failed)} failed\n")
-    print(report(results))
+        outcomes = in_parallel(partial(_directory, campaigns=options.campaigns), list(wanted.values()), options.jobs)
+        failed = [(str(item), str(error)) for item, _, error in outcomes if error]
+    else:
+        done = {result["case"] for result in read_results(options.out)}
+        todo = [item for name, item in wanted.items() if name not in done]
+        failed = append_results(options.out, partial(_run, campaigns=options.campaigns), todo, options.jobs)
+        results = [result for result in read_results(options.out) if result["case"] in wanted]
+        page = options.out.with_suffix(".html")
+        write_page(page, results, options.campaigns)
+        print(report(results))
+        print(f"\n{len(results)} of {len(wanted)} cases; those that are not right, with what was said: {page}")
     for name, why in failed:
-        print(f"\nfailed: {name}: {why}")
+        print(f"failed: {name}: {why}")
     raise SystemExit(bool(failed))
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.scoreboard", description=__doc__)
     add = parser.add_argument
-    add("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    add("--strengths", nargs="+", type=float, default=list(STRENGTHS), help="times the floor")
-    add("--seeds", type=int, default=SEEDS, help="machines per effect and strength")
-    add("--nothing", type=int, default=NOTHING, help="machines with nothing hidden")
-    add("--outside", type=int, default=OUTSIDE, help="machines per cause outside the library")
-    add("--pairs", type=int, default=PAIRS, help="machines with two effects")
+    add("--set", choices=list(FIRST_SEED), help="prepare the cases of this set; without it, those on disk are used")
+    add("--family", nargs="+", choices=[*FAMILIES, REAL], default=[*FAMILIES, REAL], help="these families alone")
     add("--case", action="append", help="this case alone, as the results name it; may be given again")
-    add("--most", type=int, default=None, help="run so many cases at most")
+    add("--most", type=int, default=None, help="so many cases at most")
     add("--jobs", type=int, default=os.cpu_count(), help="side by side")
-    add("--prepare", action="store_true", help="make the campaigns alone, and keep them")
+    add("--prepare", action="store_true", help="prepare the campaigns, and diagnose nothing")
     add("--campaigns", type=Path, default=Path("out/campaigns"), help="where they are kept")
-    add("--out", type=Path, default=Path("out/scoreboard.jsonl"))
+    add("--real", type=Path, default=PLACE, help="where the recordings of real machines are, with answers.yaml")
+    add("--out", type=Path, default=Path("out/scoreboard.jsonl"), help="results; the page is written beside them")
     return parser.parse_args()
 
 
-def _missing(wanted: Sequence[Case], out: Path) -> list[Case]:
-    done = {json.loads(line)["case"] for line in out.read_text(encoding="utf-8").splitlines()}
-    return [case for case in wanted if case.name not in done]
+def _wanted(options: argparse.Namespace) -> Iterator[tuple[str, Item]]:
+    """Name and item of each wanted case."""
+    if not options.case and not options.set:
+        answers = ((read_answer(path), path) for path in prepared(options.campaigns))
+        found = [(answer["case"], path) for answer, path in answers if answer["family"] in options.family]
+        yield from found[: options.most]
+        return
+    is_real = {name: name.startswith(f"{REAL}:") for name in options.case or ()}
+    if any(is_real.values()) or (not options.case and REAL in options.family):
+        for path in prepare_real(options.campaigns, options.real):
+            if is_real.get(name := read_answer(path)["case"], not options.case):
+                yield name, path
+    simulated = (
+        [parse_case(name) for name, real in is_real.items() if not real]
+        if options.case
+        else cases([name for name in options.family if name != REAL], options.set)
+    )
+    yield from ((case.name, case) for case in simulated[: options.most])
 
 
-def _write(file: TextIO, result: object) -> None:
-    file.write(json.dumps(result) + "\n")
-    file.flush()
+def _directory(item: Item, campaigns: Path) -> Path:
+    """Where the case is, which is prepared where it is not there yet."""
+    if isinstance(item, Path):
+        return item
+    # the simulated machine is needed only where cases are made
+    from tests.scoreboard.prepare import prepare
+
+    return prepare(item, campaigns)
 
 
-def _in_parallel(
-    work: Callable[[Case, Path], object],
-    todo: Sequence[Case],
-    options: argparse.Namespace,
-    done: Callable[[object], None],
-) -> list[tuple[str, str]]:
-    """Run `work` on every case; `done` is called with each result. Returns (name, error) of the cases that failed."""
-    failed: list[tuple[str, str]] = []
-    columns = (TextColumn("scoreboard"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with ProcessPoolExecutor(options.jobs) as pool, Progress(*columns, transient=True) as progress:
-        bar = progress.add_task("", total=len(todo))
-        running = {pool.submit(work, case, options.campaigns): case for case in todo}
-        for future in as_completed(running):
-            error = future.exception()
-            if error is None:
-                done(future.result())
-            else:
-                failed.append((running[future].name, str(error)))
-            progress.advance(bar)
-    return failed
+def _run(item: Item, campaigns: Path) -> dict[str, Any]:
+    return run(_directory(item, campaigns))
 
 
 if __name__ == "__main__":

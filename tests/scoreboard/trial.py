@@ -1,113 +1,109 @@
-"""One case of the scoreboard: campaigns with hidden causes, then the commands that a user would run."""
+"""One case of the scoreboard: the diagnosis of a prepared recording, and the other recording with its result."""
 
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-from typer.testing import CliRunner
+from compd.arrays import FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.compare import compare
+from compd.comparison.open import open_recording
+from compd.comparison.shape_search import search_constants
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import diagnose
+from compd.errors import CompdError
+from compd.model.effect import Effect, FittedEffect
+from compd.model.library import load_library
+from tests.scoreboard.two_axes import effects_of_file
 
-from compd.cli.main import app
-from compd.configuration import load
-from compd.recording.writer import write_recording
-from compd.simulation.campaign.simulated_recording import simulate_recording
-from compd.simulation.causes.hidden_cause import HiddenCause, write_answer
-from tests.scoreboard.cases import Case
-from tests.support.paths import ROOT
-
-CONFIG = ROOT / "config" / "tripod-cmm.yaml"
-TIMEOUT_S = 300.0
-
-
-def prepare(case: Case, campaigns: Path) -> Path:
-    """Directory of the case's two campaigns, on the same machine on different days; made once."""
-    directory = campaigns / case.name.replace(":", "_")
-    if not (directory / "other.answer.json").exists():
-        directory.mkdir(parents=True, exist_ok=True)
-        wanted = [HiddenCause(cause, None, size) for cause, size in zip(case.causes, case.floors, strict=True)]
-        sized = write_campaign(case, wanted, directory, "train", 0)
-        write_campaign(case, sized, directory, "other", 1)
-    return directory
+ANSWER = "answer.json"
+# The family for which it is computed what the true effects, fitted, leave on the other recording: a bound, set by the
+# disturbances and by heat that no thermometer sees.
+BOUNDED = "library"
 
 
-def run(case: Case, campaigns: Path) -> dict[str, Any]:
-    """One result: what was hidden, the diagnosis, and the floor ratio of its model on the other campaign."""
-    prepared = prepare(case, campaigns)
-    with tempfile.TemporaryDirectory(prefix="compd-score-") as temporary:
-        directory = Path(temporary)
-        for name in ("train.csv", "train.yaml", "other.csv", "other.yaml"):
-            # the answer files are not copied
-            shutil.copy(prepared / name, directory)
-        output, took_s = run_timed(directory, "diagnose", "train.csv", "--json")
-        verdict = json.loads(output)
-        ratio, fitted = add_all(directory, [step["effect"] for step in verdict["steps"]])
-    secret = json.loads((prepared / "train.answer.json").read_text(encoding="utf-8"))
+def prepared(campaigns: Path) -> list[Path]:
+    """Directories of the cases that are on disk, in the order of their names."""
+    return sorted(path.parent for path in campaigns.glob(f"*/{ANSWER}"))
+
+
+def read_answer(directory: Path) -> dict[str, Any]:
+    answer: dict[str, Any] = json.loads((directory / ANSWER).read_text(encoding="utf-8"))
+    return answer
+
+
+def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
+    """One result: the diagnosis of the case in this directory beside its answer, which is opened afterwards."""
+    train, other = _open(directory, "train"), _open(directory, "other")
+    if train is None:
+        raise FileNotFoundError(directory / "train.csv")
+    effects = _effects(directory)
+    known, covariance = _known(directory, train, effects)
+    begin_s = time.process_time()
+    diagnosis = diagnose(train, known, covariance, effects, criteria=criteria)
+    took_s = time.process_time() - begin_s
+    answer = read_answer(directory)
+    expected = answer["expected"]
+    bounded = answer["family"] == BOUNDED
+    true_effects = _fitted(answer["answers"], train, effects)[0] if bounded else ()
     return {
-        "case": case.name,
-        "kind": case.kind,
-        "verdict": verdict,
-        "took_s": took_s,
-        "other_floor_ratio": ratio,
-        "fitted": fitted,
-        "secret": secret,
+        "case": answer["case"],
+        "family": answer["family"],
+        "directory": directory.name,
+        "verdict": diagnosis.as_json(),
+        "took_s": round(took_s, 3),
+        "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted),
+        "true_floor_ratio": _floor_ratio(other, true_effects) if bounded else None,
+        "times_s": train.rows.time_s.tolist() if "change" in expected else [],
+        "expected": expected,
+        "answer": answer,
     }
 
 
-def write_campaign(
-    case: Case, hidden: list[HiddenCause], directory: Path, name: str, other_days: int
-) -> list[HiddenCause]:
-    """Write a campaign with these causes and its answer file; returns the causes with the strengths that they got."""
-    recorded = simulate_recording(load(CONFIG), case.seed, hidden, other_days=other_days)
-    write_recording(directory / f"{name}.csv", recorded.columns, recorded.sidecar, overwrite=True)
-    write_answer(directory / f"{name}.answer.json", recorded.hidden, recorded.weak, case.seed)
-    return [HiddenCause(sized.cause.id, sized.cause.strength) for sized in recorded.hidden]
+def _open(directory: Path, name: str) -> AlignedRecording | None:
+    """A recording of the case; None where there is none."""
+    path, machine = directory / f"{name}.csv", directory / "machine.yaml"
+    return open_recording(path, machine if machine.exists() else None) if path.exists() else None
 
 
-def add_all(directory: Path, effects: list[str]) -> tuple[float, list[dict[str, Any]]]:
-    """Floor ratio on the other campaign with these effects added to the model, and the fitted effects."""
-    model = directory / "model.yaml"
-    model_option = ["--model", str(model)] if effects else []
-    for effect in effects:
-        run_in_process("effect", "add", effect, "--recording", str(directory / "train.csv"), *model_option)
-    compared = json.loads(run_in_process("compare", str(directory / "other.csv"), "--json", *model_option))
-    fitted = yaml.safe_load(model.read_text(encoding="utf-8"))["effects"] if effects else []
-    return float(compared["floor_ratio"]), fitted
+def _floor_ratio(other: AlignedRecording | None, fitted: Sequence[FittedEffect]) -> float | None:
+    """Floor ratio of the other recording with these effects; None without one, or where it lacks what they need."""
+    if other is None:
+        return None
+    try:
+        return compare(other, fitted).floor_ratio
+    except CompdError:
+        return None
 
 
-def run_in_process(*arguments: str) -> str:
-    """Output of a command, run in this process to save its start. Raises RuntimeError with the output if it fails."""
-    done = CliRunner().invoke(app, arguments)
-    if done.exit_code:
-        raise RuntimeError(f"compd {' '.join(arguments)}: {done.output}") from done.exception
-    return done.stdout
+def _effects(directory: Path) -> Sequence[Effect]:
+    """The library, and the effects of effects.yaml beside the recording."""
+    own = directory / "effects.yaml"
+    return [*load_library().values(), *(effects_of_file(own) if own.exists() else ())]
 
 
-def run_timed(directory: Path, *arguments: str) -> tuple[str, float]:
-    """Output of a command in a process of its own, and its duration from start to end in seconds.
+def _known(
+    directory: Path, aligned: AlignedRecording, effects: Sequence[Effect]
+) -> tuple[tuple[FittedEffect, ...], FloatArray | None]:
+    """The effects that the model has already (known.json), fitted on the recording."""
+    path = directory / "known.json"
+    names = json.loads(path.read_text(encoding="utf-8")) if path.exists() else ()
+    return _fitted(names, aligned, effects)
 
-    Raises RuntimeError as `run_in_process` does.
-    """
-    # one thread each, because cases run side by side
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    start_s = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-m", "compd", *arguments],
-        cwd=directory,
-        env=environment,
-        timeout=TIMEOUT_S,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    took_s = time.perf_counter() - start_s
-    if done.returncode:
-        raise RuntimeError(f"compd {' '.join(arguments)}: {done.stderr or done.stdout}")
-    return done.stdout, took_s
+
+def _fitted(
+    names: Sequence[str], aligned: AlignedRecording, effects: Sequence[Effect]
+) -> tuple[tuple[FittedEffect, ...], FloatArray | None]:
+    """These effects, fitted on the recording one after the other, with their covariance."""
+    fitted: tuple[FittedEffect, ...] = ()
+    covariance: FloatArray | None = None
+    for name in names:
+        effect = next(effect for effect in effects if effect.id == name)
+        sigma_um = compare(aligned, fitted, covariance).floor.by_axis_um
+        result = search_constants(aligned, fitted, effect, sigma_um)
+        fitted, covariance = result.fitted, result.covariance
+    return fitted, covariance

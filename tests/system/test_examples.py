@@ -65,6 +65,15 @@ def test_an_external_machine_learns_what_its_model_lacks(tmp_path: Path) -> None
     assert "temperature_spindle_degC" in said
 
 
+def test_an_arms_wrong_length_and_zero_are_found_among_eight(tmp_path: Path) -> None:
+    said = run("arm_parameters.py", tmp_path)
+    before_um, after_um, floor_um = fall_um(said)
+    assert before_um > 10 * floor_um
+    assert after_um < 1.1 * floor_um
+    found = {name: float(value) for name, value in re.findall(r"^ +(\w+) = ([-\d.]+) \+-", said, re.MULTILINE)}
+    assert found == pytest.approx({"zero_3": 0.04, "forearm": 0.6}, rel=0.05)
+
+
 def test_without_an_argument_nothing_is_left_behind(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "examples" / "external_machine.py"],

@@ -20,7 +20,7 @@ import yaml
 from compd.simulation.causes.catalogue import CAUSES
 from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
-from tests.scoreboard.scoring import follows
+from tests.scoreboard.expectation import covariates
 from tests.support.hidden_run import HiddenRun, hidden_run, parse_output
 from tests.support.hidden_visits import check_visits, survey_visits
 from tests.support.simulated import run_directory, tripod
@@ -142,7 +142,7 @@ def check_described(outcome: Outcome) -> None:
     assert outcome.compared["floor_ratio"] > PLAIN_RATIO
     assert (verdict["verdict"], verdict["steps"]) == ("unexplained", [])
     proposed = {trend["covariate"] for trend in verdict["depends_on"][:2]}
-    assert proposed & follows(outcome.secret), (outcome.secret, proposed)
+    assert proposed & set(covariates(outcome.secret["follows"])), (outcome.secret, proposed)
     assert outcome.after_um < floor_um < outcome.before_um
 
 

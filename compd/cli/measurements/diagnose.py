@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import EffectsOption, MachineOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -34,6 +34,7 @@ def diagnose(
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with what is known already; it is not changed.")
     ] = None,
+    effects: EffectsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
 ) -> None:
@@ -52,7 +53,7 @@ def diagnose(
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
     with steps_shown(quiet=as_json) as progress:
-        diagnosis = diagnose_recording(aligned, model, progress=progress)
+        diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis_page

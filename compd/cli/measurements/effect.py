@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import EffectsOption, MachineOption
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from compd.comparison.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
+    from compd.errors import Problem
     from compd.model.effect import Effect
     from compd.model_document import Declaration
     from compd.model_file import ModelFile
@@ -21,47 +22,48 @@ if TYPE_CHECKING:
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
 RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
-EFFECT_HELP = "An id from `compd effect list`, /absolute/file.py:NAME, or a YAML file with a formula."
+EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
 
 effect = typer.Typer(no_args_is_help=True, help="List and show physical causes, and add them to a model file.")
 
 
 @effect.command(name="list")
-def list_effects() -> None:
-    """List every effect that is installed: where it acts, what it needs, what it is."""
+def list_effects(effects: EffectsOption = None) -> None:
+    """List every effect that is installed, or those of --effects: where each acts, what it needs, what it is."""
     from rich.console import Console
     from rich.table import Table
 
     from compd.model.library import load_library
+    from compd.model.library.effects_file import gather_effects
 
     table = Table("effect", "port", "needs", "physics")
     table.columns[0].no_wrap = True
     table.columns[2].overflow = "fold"  # names of quantities are to be copied whole
-    for entry in load_library().values():
+    for entry in (gather_effects(effects) if effects else load_library()).values():
         table.add_row(entry.id, entry.port, ", ".join(entry.needs) or "-", entry.physics)
     Console().print(table)
 
 
 @effect.command()
 def show(
-    name: Annotated[
-        str, typer.Argument(metavar="ID", help="An id from `compd effect list`, or /absolute/file.py:NAME.")
-    ],
+    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
     machine: Annotated[
         Path | None, typer.Option("--machine", help="Machine configuration (YAML); the shipped tripod if left out.")
     ] = None,
+    effects: EffectsOption = None,
     html: Annotated[Path | None, typer.Option("--html", help="Draw the effect's signature into this page.")] = None,
 ) -> None:
     """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
     from rich.console import Console
 
     from compd.configuration.shipped import load_machine
-    from compd.model.library import find_effect
+    from compd.model.library.effects_file import gather_effects, named_effect
 
-    shown = find_effect(name, "compd effect show")
+    shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
-    Console().print(_card(shown, configuration))
+    # an effect of one's own may be of another machine than the shipped one
+    Console().print(_card(shown, configuration if machine or not shown.declared else None))
     if html is not None:
         from compd.report.effect_page import write_effect_page
 
@@ -75,6 +77,7 @@ def add(
     recording: RecordingOption,
     model: ModelOption,
     machine: MachineOption = None,
+    effects: EffectsOption = None,
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
@@ -83,7 +86,7 @@ def add(
 
     aligned = open_recording(recording, machine)
     before = _read_model(model, aligned) if model.exists() else None
-    changed = add_effect(before, name, aligned)
+    changed = add_effect(before, name, aligned, effects=effects or ())
     _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
 
 
@@ -147,6 +150,7 @@ def _finish(
     from rich.table import Table
 
     from compd.api import compare
+    from compd.comparison.display_unit import format_error
 
     if dry_run:
         done = f"not written: would have {done}"
@@ -155,7 +159,8 @@ def _finish(
     before, after = compare(aligned, model), compare(aligned, changed)
     console = Console(highlight=False)
     console.print(
-        f"{path}: {done}; residual {before.rms_um:.3g} um -> {after.rms_um:.3g} um, floor ratio "
+        f"{path}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
+        f"{format_error(after.rms_um, aligned.unit, 3)}, floor ratio "
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )
     table = Table("effect", "parameter", "value", "standard error", "unit", "plausible")
@@ -173,20 +178,12 @@ def _finish(
     typer.echo(after.verdict)
 
 
-def _card(effect: Effect, configuration: Configuration) -> RenderableType:
-    """Everything that the effect declares, and whether the machine has what it needs."""
+def _card(effect: Effect, configuration: Configuration | None) -> RenderableType:
+    """Everything that the effect declares, and whether the machine, if any, has what it needs."""
     from rich.console import Group
     from rich.table import Table
 
-    from compd.machine_builder import build_model
     from compd.model.effect import PORTS
-    from compd.model.effect_needs import unmet_needs
-    from compd.model.observations import available_settings
-
-    model = build_model(configuration.geometry, configuration.wiring)
-    assert model.constants is not None
-    measured = {wire.name for wire in configuration.wiring.quantities}
-    lacking = unmet_needs(effect, measured | available_settings(model.constants), model.links)
 
     card = Table.grid(padding=(0, 2))
     card.add_row("[bold]effect", effect.id)
@@ -200,7 +197,9 @@ def _card(effect: Effect, configuration: Configuration) -> RenderableType:
     card.add_row("needs", ", ".join(effect.needs) or "nothing but the links' gauges")
     card.add_row("mistaken for", ", ".join(effect.mistaken_for) or "-")
     card.add_row("separated by", effect.separated_by)
-    card.add_row(f"on {configuration.machine}", "\n".join(map(str, lacking)) or "has all that it needs")
+    if configuration is not None:
+        lacking = _lacking(effect, configuration)
+        card.add_row(f"on {configuration.machine}", "\n".join(map(str, lacking)) or "has all that it needs")
 
     numbers = Table("parameter", "unit", "plausible", "one per", "where the range comes from")
     for parameter in effect.parameters:
@@ -215,3 +214,15 @@ def _card(effect: Effect, configuration: Configuration) -> RenderableType:
         how = f"from {constant.setting}, else searched" if constant.setting else "searched"
         numbers.add_row(constant.name, constant.unit, f"{constant.low:g} to {constant.high:g}", how, constant.source)
     return Group(card, numbers)
+
+
+def _lacking(effect: Effect, configuration: Configuration) -> list[Problem]:
+    """What the effect needs and the machine's gauges do not measure."""
+    from compd.machine_builder import build_model
+    from compd.model.effect_needs import unmet_needs
+    from compd.model.observations import available_settings
+
+    model = build_model(configuration.geometry, configuration.wiring)
+    assert model.constants is not None
+    measured = {wire.name for wire in configuration.wiring.quantities}
+    return unmet_needs(effect, measured | available_settings(model.constants), model.links)

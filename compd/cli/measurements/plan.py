@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import EffectsOption, MachineOption
 
 
 def plan(
@@ -18,6 +18,11 @@ def plan(
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
     machine: MachineOption = None,
     model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
+    effects: EffectsOption = None,
+    beside: Annotated[
+        str | None,
+        typer.Option(help="Other effects that were found and are not in the model, by id: C,D. They are fitted along."),
+    ] = None,
     workspace: Annotated[
         str | None,
         typer.Option(help="Where the tip may go, in mm: x0,x1,y0,y1,z0,z1; as in the recording if left out."),
@@ -31,8 +36,16 @@ def plan(
     speed: Annotated[
         float | None, typer.Option(min=0, help="Highest speed in mm/s; as in the recording if left out.")
     ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="COLUMN=LOW,HIGH",
+            help="With `machine: external`: lowest and highest value of a column; as in the recording if left out. "
+            "May be repeated.",
+        ),
+    ] = None,
 ) -> None:
-    """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most."""
+    """Plan the rows (poses, loads, temperatures, speeds, other settings) on which two rival effects differ most."""
     from compd.api import plan_measurement
     from compd.comparison.open import open_recording
 
@@ -44,16 +57,19 @@ def plan(
         (first, second),
         rows=rows,
         model=model,
+        effects=effects or (),
+        beside=[name.strip() for name in beside.split(",")] if beside else (),
         workspace_M_mm=None if box is None else ((box[0], box[1]), (box[2], box[3]), (box[4], box[5])),
         force_N=force,
         temperature_degC=None if heat is None else (heat[0], heat[1]),
         speed_mm_per_s=speed,
+        limits=_by_column(limit or []),
     )
     if out is None:
         planned.write_to(sys.stdout)
     else:
         planned.write(out)
-    typer.echo(planned.summary, err=out is None)
+    typer.echo(f"{planned.summary}\n{planned.instructions}", err=out is None)
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -72,6 +88,20 @@ def _pair(text: str) -> tuple[str, str]:
             )
         )
     return names[0], names[1]
+
+
+def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:
+    """The limits COLUMN=LOW,HIGH by column. Raises CompdError with the first that is not understood."""
+    from compd.errors import CompdError, Problem
+
+    limits: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        name, _, numbers = text.partition("=")
+        low, high = _numbers(f"--limit {name}", numbers, 2)
+        if name in limits:
+            raise CompdError(Problem(where=f"--limit {name}", what="is given twice", next_step="leave one out"))
+        limits[name] = low, high
+    return limits
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:

@@ -92,8 +92,9 @@ def _summary(contents: Recording) -> list[str]:
     needed = (*contents.gauge_columns, *contents.reference_columns, *contents.model_columns)
     usable = contents.usable(needed)
     hours = (contents.time_s[-1] - contents.time_s[0]) / 3600.0
+    when = f"over {hours:.2f} h" if contents.has_time else "in order, without time"
     lines = [
-        f"{contents.path}: {contents.machine}, {contents.rows} rows over {hours:.2f} h, {_sessions(contents)}",
+        f"{contents.path}: {contents.machine}, {contents.rows} rows {when}, {_sessions(contents)}",
         f"    gauges: {', '.join(gauges) or 'none'}; {len(contents.quantities)} other quantities; "
         f"approach {'recorded' if contents.approach_measured else 'from the scales' if gauges else 'not known'}",
         f"    reference: {_reference(contents)}",
@@ -107,7 +108,8 @@ def _summary(contents: Recording) -> list[str]:
 
 def _sessions(contents: Recording) -> str:
     if contents.session is None:
-        return f"no sessions: {len(set(contents.fold.tolist()))} blocks of time"
+        blocks = "blocks of time" if contents.has_time else "blocks of rows"
+        return f"no sessions: {len(set(contents.fold.tolist()))} {blocks}"
     return f"{len(set(contents.session.tolist()))} sessions"
 
 
@@ -118,6 +120,6 @@ def _reference(contents: Recording) -> str:
     parts = [reference.quantity, ", ".join(contents.reference_columns)]
     if reference.quantity != "link_length":
         parts.append(f"in the {reference.frame}'s frame")
-    sigma = ", ".join(f"{value:g}" for value in reference.sigma_um)
-    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} um")
+    sigma = ", ".join(f"{value:g}" for value in reference.standard_uncertainty)
+    parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} {reference.unit}")
     return "; ".join(parts)

@@ -35,10 +35,10 @@ ANYWHERE: Mapping[str, str] = {
 _NEEDS_OF_LINK: Mapping[str, tuple[str, ...]] = {
     "direction": ("direction",),
     "velocity_mm_per_s": ("motion",),
-    "axial_force_N": ("force",),
+    "axial_force_N": ("kinematics", "force"),
     "temperature_link": ("temperature_link_{link}_degC",),
-    "scale_mm": (),
-    "link_mm": (),
+    "scale_mm": ("scale",),
+    "link_mm": ("kinematics",),
 }
 _PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
 _QUANTITY = re.compile(r"^[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+$")
@@ -49,7 +49,7 @@ def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
     if name in ANYWHERE:
         return ("time",) if name == "time_s" else ()
     if name in OF_READING and port in READING_PORTS:
-        return ()
+        return ("scale",) if port == "scale" else ()
     per_link = name in OF_LINK or _PER_LINK_COLUMN.match(name) is not None
     if per_link and port not in PER_LINK:
         return Problem(where="", what=f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))

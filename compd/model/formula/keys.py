@@ -79,8 +79,7 @@ class FormulaDeclaration(BaseModel):
         """Axis -> formula; the axis is "" at a port without direction. Empty where there is a sensitivity instead."""
         if isinstance(self.formula, str):
             return {self.axis or "": self.formula}
-        by_axis: dict[str, str] = {**(self.formula or {})}
-        return by_axis
+        return {str(axis): formula for axis, formula in (self.formula or {}).items()}
 
 
 def read_declaration(source: Mapping[str, Any], where: str) -> FormulaDeclaration:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,7 +44,8 @@ def load_effects(source: str | Path) -> dict[str, Effect]:
     Examples
     --------
     >>> import compd
-    >>> _ = open("growth.yaml", "w").write('''
+    >>> from pathlib import Path
+    >>> _ = Path("growth.yaml").write_text('''
     ... - {id: ram_growth, port: reference, axis: z, formula: "k * (temperature_ram_degC - 20)",
     ...    parameters: {k: {unit: um/K, plausible: [-12, 12], source: drawing of the ram}}}
     ... ''')
@@ -64,10 +65,10 @@ def load_effects(source: str | Path) -> dict[str, Effect]:
     return _by_id(found)
 
 
-def gather_effects(effects: Iterable[Effect | str | Path]) -> dict[str, Effect]:
+def gather_effects(effects: str | Path | Effect | Sequence[Effect | str | Path]) -> dict[str, Effect]:
     """Effects and sources of effects together, by id. Raises as `load_effects`, and where an id is the library's."""
     found: list[tuple[Effect, str]] = []
-    for part in effects:
+    for part in [effects] if isinstance(effects, str | Path | Effect) else effects:
         if isinstance(part, Effect):
             found.append((part, f"effect {part.id}"))
         else:
@@ -89,7 +90,7 @@ def named_effect(name: str, where: str, given: Mapping[str, Effect] | None = Non
         return find_effect(f"{Path(source).resolve()}:{chosen}", where)
     if name in given:
         return given[name]
-    if not _is_source(source):
+    if not chosen and not _is_source(source):
         return find_effect(name, where, given)
     effects = load_effects(source)
     if not chosen and len(effects) == 1:

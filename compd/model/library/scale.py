@@ -56,7 +56,7 @@ EFFECTS = (
         equation="delta_i = k_i g_i",
         symbols={"k_i": "gain error of scale i, ppm", "g_i": "reading of scale i, mm"},
         source="Slocum, Precision Machine Design (1992), chapter 4: linear error of graduated scales",
-        needs=(),
+        needs=("scale",),
         parameters=(
             Parameter("k", "ppm", -50, 50, "accuracy grades of exposed scales: 3-10 um/m; steel tape: 50", "link"),
         ),
@@ -75,7 +75,7 @@ EFFECTS = (
             "dT_link_i": "temperature of link i above 20 degC, K",
         },
         source="Slocum, Precision Machine Design (1992), chapter 4; ISO 1 for the reference temperature",
-        needs=("temperature_link_{link}_degC",),
+        needs=("scale", "temperature_link_{link}_degC"),
         parameters=(Parameter("a", "ppm/K", 0, 23, "Zerodur 0, glass 8, steel 10.5-12, aluminium 23"),),
         mistaken_for=("scale_gain", "link_expansion"),
         separated_by="the same long and short links at two temperatures 3 K apart",
@@ -93,7 +93,7 @@ EFFECTS = (
             "p": "signal period, mm",
         },
         source="Heydemann, Applied Optics 20 (1981) 3382: errors of quadrature signals",
-        needs=(),
+        needs=("scale",),
         parameters=tuple(
             Parameter(
                 name, "um", -2, 2, "1 % of the period for a good scale (0.2 um at 20 um), 10 % for a bad one", "link"
@@ -138,7 +138,7 @@ EFFECTS = (
             "r": "0 where one spring slides at once, 1 where many slide one after another: a round loop",
         },
         source="stop operator: Visintin, Differential Models of Hysteresis (1994); friction: Dahl (1968)",
-        needs=("order", "direction"),
+        needs=("scale", "order", "direction"),
         parameters=(Parameter("h", "um", -5, 5, "rolling guides 0.1-1, plain guides 5; either sign"),),
         mistaken_for=("backlash",),
         separated_by="small reversals in growing steps: backlash jumps at once, friction builds up over d",

@@ -1,4 +1,9 @@
-"""What takes the tip from where the drawing has it on the platform; added to the tool vector in {P}, in mm."""
+"""What takes the tip from where the drawing has it; added to the tool vector, in mm, in the vector's own frame.
+
+A tool that the moving platform carries has its vector in {P} and feels the load on the tip. A tool that stands on the
+plate has it in {M}, whatever the platform's attitude, and feels the reaction of the work. Effects take vector and force
+from the arrangement (`compd.model.tool`), so that a parameter has the same meaning and sign in both.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,8 @@ UM = 1e-3  # mm
 
 
 def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.asarray(PPM * rows.constants.tool_P_mm * rows.warming_K("tool")[:, None])[:, :, None]
+    """Along the tool vector, from the origin of its frame: the platform's, or the plate's."""
+    return np.asarray(PPM * rows.constants.arrangement.tool_mm * rows.warming_K("tool")[:, None])[:, :, None]
 
 
 def _offset(rows: Observations, constants: ConstantValues) -> FloatArray:
@@ -21,8 +27,12 @@ def _offset(rows: Observations, constants: ConstantValues) -> FloatArray:
 
 
 def _bending(rows: Observations, constants: ConstantValues) -> FloatArray:
-    force_P_N = (rows.rotation_M_P * rows.force_M_N[:, :, None]).sum(axis=1)  # R^T F
-    return np.asarray(UM * force_P_N[:, :, None])
+    """Along the force that acts on the tool.
+
+    The external force F acts on what the platform carries. A tool on the platform gives way along F, R^T F in {P}. A
+    tool on the plate loads the work with F, is pressed back with -F, and gives way along that in {M}.
+    """
+    return np.asarray(UM * rows.force_on_tool_N[:, :, None])
 
 
 EFFECTS = (
@@ -30,10 +40,10 @@ EFFECTS = (
         id="tool_expansion",
         ports=("tool",),
         physics="The tool or stylus grows with temperature.",
-        equation="delta = a tool_P dT_tool",
+        equation="delta = a tool dT_tool",
         symbols={
             "a": "expansion coefficient of the tool, ppm/K",
-            "tool_P": "tool vector in {P}, mm",
+            "tool": "tool vector in {P}; of a tool that stands on the plate, in {M}; mm",
             "dT_tool": "temperature of the tool above 20 degC, K",
         },
         source="ISO 1; stylus stems: carbon fibre 0, tungsten carbide 5, ceramic 7, steel 12",
@@ -46,9 +56,9 @@ EFFECTS = (
     Effect(
         id="tool_offset",
         ports=("tool",),
-        physics="The tip sits elsewhere on the platform than the drawing says.",
+        physics="The tip sits elsewhere on the platform, or on the plate, than the drawing says.",
         equation="delta = d",
-        symbols={"d": "displacement of the tip in {P}, um"},
+        symbols={"d": "displacement of the tip in {P}; of a tool that stands on the plate, in {M}; um"},
         source="ISO 10360-5: qualification of a stylus on a sphere",
         needs=(),
         parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis"),),
@@ -60,10 +70,10 @@ EFFECTS = (
         id="tool_bending",
         ports=("tool",),
         physics="The tool gives way under the force on its tip.",
-        equation="delta = C F_P",
+        equation="delta = C F_tool",
         symbols={
             "C": "compliance of the tool, alike in all directions, um/N",
-            "F_P": "external force on the tip in {P}, N",
+            "F_tool": "load on the tip in {P}; on a tool that stands on the plate, the work's reaction in {M}; N",
         },
         source="cantilever: Young, Roark's Formulas for Stress and Strain, chapter 8",
         needs=("force",),

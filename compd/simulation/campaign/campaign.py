@@ -54,7 +54,6 @@ class Campaign:
         """
         weather = plan.weather
         self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
-        self._world.heat(plan.items[0].heat)
         self._mechanism = self._world.mechanism
         self._plan = plan
         self._rng = np.random.default_rng([seed, 2, plan.number])
@@ -67,12 +66,11 @@ class Campaign:
 
     def run(self) -> LoggedRows:
         """All rows of the plan. Raises KinematicsError where a point cannot be reached."""
-        session = self._plan.items[0].session
+        session = 0
         for item in self._plan.items:
             if item.session != session:
                 session = item.session
-                self._world.heat(switched_off(self._mechanism.links))
-                self._world.force_M_N = np.zeros(3)
+                self._switch_on(item)
             self._wait_until(item.start_s)
             self._world.heat(item.heat)
             self._world.force_M_N = item.force_M_N
@@ -87,6 +85,14 @@ class Campaign:
         return self._log.rows
 
     # --- motion ---------------------------------------------------------------------------------------
+
+    def _switch_on(self, first: CampaignItem) -> None:
+        """Wait, switched off and without a load, until the session of `first` begins or its warm-up does."""
+        self._world.heat(switched_off(self._mechanism.links))
+        self._world.force_M_N = np.zeros(3)
+        if self._plan.warm_up:
+            self._wait_until(first.start_s - self._plan.warm_up_s)
+            self._world.heat(self._plan.warm_up[first.session - 1])
 
     def _wait_until(self, time_s: float) -> None:
         while time_s - self._world.time_s > 1e-9:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -34,6 +34,8 @@ LOADED_SHARE = 0.45
 LOAD_LOW_N, LOAD_HIGH_N = np.array([-30.0, -30.0, -60.0]), np.array([30.0, 30.0, 10.0])
 # Upper limits of random heat, W: drives, electronics, cabinet, platform (a spindle), tool, lamps and sun.
 DRIVES_W, RING_W, CABINET_W, PLATFORM_W, TOOL_W, LAMPS_W = 3.0, 40.0, 25.0, 4.0, 0.2, 60.0
+# Heat of a drive that has run hard, before a session that begins warm: least and most.
+WARM_UP_W = (4.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,16 @@ class CampaignPlan:
     """A campaign's items in order of time.
 
     number : of the campaign on the same machine. points_mm : (points, n) scale values. weather : of all sessions.
+    warm_up_s, warm_up : for so long before each session the machine is on, with this heat (one per session); 0: it is
+    switched on as the session begins.
     """
 
     number: int
     items: tuple[CampaignItem, ...]
     points_mm: FloatArray
     weather: WorkshopWeather
+    warm_up_s: float = 0.0
+    warm_up: tuple[Heat, ...] = ()
 
     def thinned(self, keep_one_in: int) -> CampaignPlan:
         """The same campaign with one item of every `keep_one_in` of each kind."""
@@ -74,7 +80,13 @@ class CampaignPlan:
             kinds[item.kind] += 1
             if kinds[item.kind] % keep_one_in == 1:
                 kept.append(item)
-        return CampaignPlan(self.number, tuple(kept), self.points_mm, self.weather)
+        return replace(self, items=tuple(kept))
+
+    def single_visits(self, count: int) -> CampaignPlan:
+        """The same campaign with `count` of its visits, evenly spread, one row at each, and without passes."""
+        visits = [replace(item, repeated=False) for item in self.items if item.kind == "visit"]
+        kept = np.round(np.linspace(0, len(visits) - 1, count)).astype(int)
+        return replace(self, items=tuple(visits[k] for k in kept))
 
 
 def draw_campaign_plan(
@@ -84,23 +96,29 @@ def draw_campaign_plan(
     *,
     points_mm: FloatArray | None = None,
     passes: int = PASSES_PER_SESSION,
+    warm_up_s: float = 0.0,
 ) -> CampaignPlan:
     """Plan number `number` for the machine of `seed`.
 
-    points_mm : (points, n) scale values to use instead of random points. passes : per session.
+    points_mm : (points, n) scale values to use instead of random points. passes : per session. warm_up_s : time for
+    which the machine is on, with its drives hard at work, before the first row of each session.
     """
     rng = np.random.default_rng([seed, 1, number])
     if points_mm is None:
         points_mm = draw_points_mm(mechanism, rng, POINTS)
     session_s = (VISITS_PER_SESSION + passes) * VISIT_S
-    starts_s = [session * (session_s + GAP_S) for session in range(SESSIONS)]
+    starts_s = [warm_up_s + session * (session_s + GAP_S) for session in range(SESSIONS)]
     weather = WorkshopWeather(starts_s, session_s, rng)
     items = [
         item
         for session, start in enumerate(starts_s, 1)
         for item in _session(session, start, mechanism.links, len(points_mm), passes, rng)
     ]
-    return CampaignPlan(number, tuple(items), points_mm, weather)
+    if warm_up_s == 0:
+        return CampaignPlan(number, tuple(items), points_mm, weather)
+    warm_up_rng = np.random.default_rng([seed, 3, number])
+    warm_up = tuple(_heat(mechanism.links, warm_up_rng, WARM_UP_W) for _ in starts_s)
+    return CampaignPlan(number, tuple(items), points_mm, weather, warm_up_s, warm_up)
 
 
 def switched_off(links: int) -> Heat:
@@ -143,9 +161,9 @@ def _order(points: int, count: int, rng: np.random.Generator) -> list[int]:
     return order[: count + 1]
 
 
-def _heat(links: int, rng: np.random.Generator) -> Heat:
+def _heat(links: int, rng: np.random.Generator, drives_W: tuple[float, float] = (0.0, DRIVES_W)) -> Heat:
     return Heat(
-        rng.uniform(0, DRIVES_W, links),
+        rng.uniform(*drives_W, links),
         rng.uniform(0, RING_W),
         rng.uniform(0, CABINET_W, COLUMNS),
         rng.uniform(0, PLATFORM_W),

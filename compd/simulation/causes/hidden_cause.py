@@ -78,14 +78,15 @@ def draw_hidden(seed: int, mechanism: Mechanism) -> HiddenCause:
 
 
 def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause], seed: int) -> None:
-    """Write NAME.answer.json for a scorer: what is hidden, how strong it is, how large it makes the tip's error.
+    """Write NAME.answer.json for a scorer, as `answer` has it."""
+    case = {"case": path.name.removesuffix(".answer.json"), "seed": seed}
+    write_files({path: json.dumps(case | answer(hidden, weak), indent=1) + "\n"})
 
-    weak : disturbances that nobody asked for.
-    """
+
+def answer(hidden: Sequence[SizedCause], weak: Sequence[Cause]) -> dict[str, object]:
+    """What is hidden, how strong it is, how large it makes the tip's error; `weak` : disturbances in addition."""
     causes = [sized.cause for sized in hidden]
-    answer = {
-        "case": path.name.removesuffix(".answer.json"),
-        "seed": seed,
+    return {
         "effects": {cause.id: _strengths(cause) for cause in causes},
         "answers": [cause.id for cause in causes if cause.in_library],
         "follows": [name for cause in causes for name in cause.covariates],
@@ -94,7 +95,6 @@ def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause]
         "error_in_floors": {sized.cause.id: round(sized.floors, 3) for sized in hidden},
         "weak_disturbances": {cause.id: _strengths(cause) for cause in weak},
     }
-    write_files({path: json.dumps(answer, indent=1) + "\n"})
 
 
 def _strengths(cause: Cause) -> float | list[float]:

@@ -12,7 +12,7 @@ import pytest
 import compd
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison
-from compd.diagnosis.next_measurement import MeasurementPlan
+from compd.diagnosis.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, ConfigurationError, PluginError, RecordingError, StateError
 from compd.model.effect import Effect, Parameter
@@ -321,5 +321,3 @@ def test_recordings_of_links_name_their_columns(tmp_path: Path) -> None:
     recording = compd.open_recording(external)
     assert "measured_link_1_mm" in recording.to_dataframe()
     assert "residual_link_1_um" in compd.compare(recording).to_dataframe()
-    with pytest.raises(RecordingError, match="external"):
-        compd.plan_measurement(recording, ("reference_drift", "reference_registration"))

@@ -170,6 +170,25 @@ def test_a_formula_of_ones_own(tmp_path: Path) -> None:
     assert json.loads(run("compare", path, "--model", model, "--json"))["floor_ratio"] < 1.1
 
 
+def test_an_effect_of_a_file_of_several_is_added_with_its_whole_declaration(recording: Path, tmp_path: Path) -> None:
+    effects, model = tmp_path / "mine.yaml", tmp_path / "m.yaml"
+    effects.write_text(
+        """\
+- {id: growth, port: link, formula: "k * (temperature_link - 20) * link_mm / 1000",
+   parameters: {k: {unit: ppm/K, plausible: [0, 23], source: steel}}}
+- {id: shift, port: tool, formula: {x: "c", z: "-c"}, parameters: {c: {unit: um, plausible: [-9, 9], source: notes}}}
+"""
+    )
+    run("add", "growth", "--effects", effects, "--recording", recording, "--model", model)
+    run("add", f"{effects}:shift", "--recording", recording, "--model", model)
+    effects.unlink()
+    entries = yaml.safe_load(model.read_text())["effects"]
+    assert [entry["effect"]["id"] for entry in entries] == ["growth", "shift"]
+    assert entries[0]["parameters"][0]["value"] == pytest.approx(1.1, abs=0.1)
+    assert "&id" not in model.read_text()
+    assert "rms without shift" in run("compare", recording, "--model", model)
+
+
 def test_a_failed_step_writes_nothing(recording: Path, tmp_path: Path) -> None:
     model = tmp_path / "m.yaml"
     with pytest.raises(CompdError, match="no such effect"):

@@ -48,6 +48,43 @@ def test_the_card_says_what_the_machine_lacks() -> None:
     assert "only a tripod" in result.output
 
 
+TILT = """\
+- id: tilt
+  port: reference
+  formula: {x: "-k * sin(azimuth_deg * deg)", y: "k * cos(azimuth_deg * deg)"}
+  physics: The axis is not vertical.
+  parameters: {k: {unit: um, plausible: [-100, 100], source: a level}}
+- {id: offset, port: reference, axis: x, formula: c, parameters: {c: {unit: um, plausible: [-1, 1], source: homing}}}
+"""
+
+
+def printed(*arguments: object) -> str:
+    result = CliRunner().invoke(command, [str(argument) for argument in arguments], env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.exception
+    return result.output
+
+
+def test_effects_of_a_file_are_listed_and_shown(tmp_path: Path) -> None:
+    file = tmp_path / "mount.yaml"
+    file.write_text(TILT)
+    listed = printed("list", "--effects", file)
+    assert "tilt" in listed
+    assert "offset" in listed
+    assert "link_expansion" not in listed
+    for arguments in (["show", f"{file}:tilt"], ["show", "tilt", "--effects", file]):
+        card = printed(*arguments)
+        assert "delta_y = k * cos(azimuth_deg * deg)" in card
+        assert "needs         azimuth_deg" in card
+        assert "tripod-cmm" not in card, "nobody named a machine"
+    assert "on tripod-cmm" in printed("show", f"{file}:tilt", "--machine", CONFIG / "tripod-cmm.yaml")
+    refused = CliRunner().invoke(command, ["show", str(file)])
+    assert isinstance(refused.exception, CompdError)
+    assert "holds several effects: which one?" in str(refused.exception)
+    one = tmp_path / "one.yaml"
+    one.write_text(TILT.split("- {id: offset", maxsplit=1)[0].replace("\n  ", "\n").removeprefix("- "))
+    assert "The axis is not vertical." in printed("show", one)
+
+
 @pytest.mark.parametrize("effect", BUNDLED, ids=lambda effect: effect.id)
 def test_every_effect_has_a_signature(effect: object) -> None:
     one = next(candidate for candidate in BUNDLED if candidate is effect)

@@ -11,12 +11,19 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import compd
 from compd.cli.measurements.diagnose import diagnose as diagnose_command
 from compd.cli.measurements.plan import plan as plan_command
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.shape_search import search_constants
+from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement
 from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.next_measurement import MeasurementPlan, plan_measurement
+from compd.diagnosis.next_measurement import (
+    measurement_of_constant,
+    measurement_to_test,
+    next_measurement,
+    plan_measurement,
+)
 from compd.errors import CompdError, RecordingError
 from compd.model.effect import FittedEffect
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
@@ -89,6 +96,87 @@ def test_a_place_out_of_reach_is_refused(tmp_path: Path) -> None:
         plan_rivals(aligned, ("tool_offset", "link_zero"), 10, far)
 
 
+def test_an_instruments_frame_is_fitted_along(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"tool_offset": (0.5, -0.4, 0.3)})
+    sidecar = tmp_path / "run.yaml"
+    sidecar.write_text(sidecar.read_text().replace("frame: machine", "frame: instrument"))
+    framed = compd.open_recording(tmp_path / "run.csv")
+    strengths = {"tool_offset": (0.5, -0.4, 0.3), "link_elasticity": (1.0,)}
+    offset, spring = (FittedEffect(LIBRARY[name], np.array(theta)) for name, theta in strengths.items())
+    plans = [
+        plan_measurement(recording, (), (offset, spring), SIGMA_UM, recorded_limits(aligned), 12)
+        for recording in (aligned, framed)
+    ]
+    # a frame that lies elsewhere does nearly what the offset does
+    assert plans[1].before < 0.2 * plans[0].before
+    assert plans[1].separation < 0.2 * plans[0].separation
+
+
+def test_rivals_get_rows_and_what_they_will_do(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)}, visits=60)
+    found, _ = fit_rivals(aligned, "link_elasticity", "joint_contact")
+    answer = next_measurement(aligned, (), found, LIBRARY["joint_contact"], SIGMA_UM, rows=20)
+    assert answer.effects == ("link_elasticity", "joint_contact")
+    assert answer.plan is not None
+    assert answer.plan.separation >= max(LEAST_SEPARATION, answer.plan.before + 1)
+    assert len(answer.as_json()) == len(answer.plan.rows) <= 20
+    assert answer.promise.startswith("The rows under 'next' can")
+
+
+def test_rivals_that_no_rows_within_the_limits_part_get_words(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_zero": (0.5, -0.4, 0.3)})
+    found, _ = fit_rivals(aligned, "link_zero", "tool_offset")
+    answer = next_measurement(aligned, (), found, LIBRARY["reference_registration"], SIGMA_UM)
+    assert answer.plan is None
+    (words,) = answer.as_json()
+    assert words["measure"].startswith(LIBRARY["link_zero"].separated_by)
+    assert words["why"] in answer.promise
+    assert "The rows under" not in answer.promise
+
+
+def without_columns(aligned: AlignedRecording, path: Path, *words: str) -> AlignedRecording:
+    """The recording without the columns whose names begin with one of the words."""
+    header, *rows = (line.split(",") for line in aligned.recording.path.read_text().splitlines())
+    kept = [k for k, name in enumerate(header) if not name.startswith(words)]
+    path.write_text("\n".join(",".join(cells[k] for k in kept) for cells in (header, *rows)) + "\n")
+    path.with_suffix(".yaml").write_text(aligned.recording.path.with_suffix(".yaml").read_text())
+    return compd.open_recording(path)
+
+
+def test_an_untestable_effect_is_told_which_gauge_it_needs(tmp_path: Path) -> None:
+    whole = record_with_effects(tmp_path / "run.csv", 1, {}, visits=60)
+    aligned = without_columns(whole, tmp_path / "less.csv", "temperature_tool")
+    answer = measurement_to_test(aligned, (), LIBRARY["tool_expansion"], SIGMA_UM)
+    assert answer.plan is None
+    assert "temperature_tool_degC" in answer.measure
+    assert "thermometer" in answer.measure
+    assert "no gauge measures" in answer.why
+
+
+def test_an_effect_that_is_not_excited_gets_rows_that_excite_it(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {}, visits=60)
+    answer = measurement_to_test(aligned, (), LIBRARY["backlash"], SIGMA_UM)
+    assert answer.plan is not None
+    assert answer.plan.rivals == ("backlash",)
+    assert {row["approach_1"] for row in answer.plan.rows} == {-1, 1}
+    assert "seen" in answer.promise
+    still = measurement_to_test(aligned, (), LIBRARY["gauge_latency"], SIGMA_UM)
+    assert still.plan is None
+    assert still.measure == LIBRARY["gauge_latency"].separated_by
+
+
+def test_the_causes_of_a_constant_are_parted_where_they_are_none(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {}, visits=60)
+    causes = [LIBRARY[name] for name in ("tool_offset", "link_zero")]
+    answer = measurement_of_constant(aligned, (), causes, np.array([40.0, -30.0, 20.0]), SIGMA_UM)
+    assert isinstance(answer, NextMeasurement)
+    assert answer.plan is not None
+    assert set(answer.plan.rivals) == {"a constant", "tool_offset", "link_zero"}
+    small = measurement_of_constant(aligned, (), causes, np.array([0.01, 0.0, 0.0]), SIGMA_UM)
+    assert small.plan is None
+    assert small.measure
+
+
 def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
     record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)})
     out = tmp_path / "next.csv"
@@ -100,6 +188,7 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
     assert 12 <= len(rows) <= 24
     assert [row["row"] for row in rows] == [str(k + 1) for k in range(len(rows))]
     assert {"tip_x_mm", "force_z_N", "approach_3", "speed_mm_per_s"} <= set(rows[0])
+    assert "Set tip_x_mm" in result.output
     shown = CliRunner().invoke(app(), arguments)
     assert shown.stdout.startswith("row,purpose,time_s")
 
@@ -111,6 +200,9 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
         (["--rivals", "link_zero,no_such"], "no such effect"),
         (["--rivals", "link_zero,tool_offset", "--temperature", "25,20"], "is not understood"),
         (["--rivals", "link_zero,tool_offset", "--workspace", "1,2,3"], "is not understood"),
+        (["--rivals", "link_zero,tool_offset", "--limit", "force_x_N=0,3"], "is a limit of an external machine"),
+        (["--rivals", "link_zero,tool_offset", "--limit", "force_x_N"], "--limit force_x_N: is not understood"),
+        (["--rivals", "link_zero,tool_offset", "--limit", "a=0,3", "--limit", "a=0,4"], "is given twice"),
     ],
 )
 def test_mistakes_are_refused(tmp_path: Path, options: list[str], message: str) -> None:

@@ -1,17 +1,13 @@
-"""Losses on left-out folds, how rows are divided, and p-values, each against its definition."""
+"""Losses on left-out folds and p-values, each against its definition."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.significance import SIGN_FLIPS, OrthogonalComplement, p_values
-from tests.support.hidden_effects import record_with_effects
 
 
 def random_data(seed: int, rows: int = 120) -> RegressionData:
@@ -69,18 +65,6 @@ def test_a_column_that_acts_in_one_fold_alone_is_not_testable_there() -> None:
     values[data.splits[0] != 2] = 0.0
     equations, (index,) = normal_equations(data, [Regressors(values, np.full(1, np.inf))])
     assert equations.testable_splits(index, Criteria().most_in_one_fold).tolist() == [False, True]
-
-
-def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
-    aligned = record_with_effects(tmp_path / "run.csv", 1, {})
-    by_session, by_sector = row_splits(aligned, Criteria())
-    assert len(np.unique(by_session)) == 4
-    assert len(np.unique(by_sector)) == Criteria().sectors
-    point, session = aligned.recording.point, aligned.recording.session
-    assert point is not None
-    assert session is not None
-    for labels, fold in ((session, by_session), (point, by_sector)):
-        assert all(len(np.unique(fold[labels == label])) == 1 for label in np.unique(labels))
 
 
 def test_orthogonal_complement_leaves_what_least_squares_does_not_explain() -> None:

@@ -28,8 +28,9 @@ from compd.model_document import EffectEntry, ModelDocument, ModelStep, Paramete
 from compd.plugins import GAUGES, load, names
 from compd.recording.checks import LIMITS
 from compd.recording.columns import COLUMN_KINDS, parse_name
+from compd.recording.reference import Reference
 from compd.recording.sidecar import SECTIONS as SIDECAR
-from compd.recording.sidecar import Exclusion, Reference
+from compd.recording.sidecar import Exclusion
 from docs.generate import __main__ as generate
 from docs.generate.commands import CommandEntry, entries
 from docs.generate.live_examples import Exchange
@@ -216,7 +217,7 @@ def test_every_column_of_a_recording(kind: Any) -> None:
     assert kind.meaning
     for name in kind.names.split(", "):
         assert f"`{name}`" in page("recording")
-        column = parse_name(re.sub(r"<[ik]>", "1", name).replace("<place>", "room"))
+        column = parse_name(re.sub(r"<[ik]>", "1", name).replace("<place>", "room").replace("<name>", "arm"))
         assert column is not None
         assert column.unit == kind.unit
 

@@ -33,7 +33,7 @@ GRANITE = {
 }
 
 
-def written(formula: str, port: str = "link", parameters: str = "k", **more: Any) -> Effect:
+def written(formula: str | dict[str, str], port: str = "link", parameters: str = "k", **more: Any) -> Effect:
     """An effect with parameters of one letter each, plausible from 1 to 100."""
     declared = {name: {"unit": "um", "plausible": [1, 100], "source": "notes"} for name in parameters.split()}
     return formula_effect({"id": "mine", "port": port, "formula": formula, "parameters": declared, **more}, "a.yaml:7")
@@ -392,6 +392,103 @@ def test_one_parameter_per_link() -> None:
     assert effect.needs == ("direction",)
 
 
+AXIS_TILT = {"x": "-k * sin(a_deg * deg) * tan(e_deg * deg)", "y": "-k * cos(a_deg * deg)"}
+
+
+def test_formulas_on_several_axes_share_their_parameters() -> None:
+    effect = written(AXIS_TILT, port="reference")
+    assert effect.needs == ("a_deg", "e_deg")
+    assert "delta_y = -k * cos(a_deg * deg)" in effect.equation
+    rows = row_at_zero(values={"a_deg": 30.0, "e_deg": 45.0})
+    found, _ = effect_deltas(FittedEffect(effect, np.array([2.0])), rows)
+    np.testing.assert_allclose(found["reference"][0], [-1e-3, -math.sqrt(3) * 1e-3, 0, 0, 0, 0], atol=1e-15)
+
+
+def test_a_parameter_that_one_axis_is_not_linear_in_is_searched_on_all() -> None:
+    effect = written({"x": "a * sin(w * x_mm)", "z": "a * w + b * lag(x_mm, w)"}, port="tool", parameters="a b w")
+    assert [parameter.name for parameter in effect.parameters] == ["a", "b"]
+    assert [constant.name for constant in effect.constants] == ["w"]
+    rows = row_at_zero(values={"x_mm": 0.5})
+    basis, memory = effect.basis(rows, {"w": 3.0}, None)
+    np.testing.assert_allclose(basis[0], 1e-3 * np.array([[math.sin(1.5), 0], [0, 0], [3.0, 0.5]]))
+    assert len(memory or ()) == 3
+    with pytest.raises(ConfigurationError, match="formula of mine, z: a term of the formula holds no parameter"):
+        written({"x": "a * sin(w * x_mm)", "z": "w * x_mm"}, port="tool", parameters="a w")
+
+
+def test_formulas_on_all_axes_of_each_joint_with_one_parameter_per_link() -> None:
+    declared = {
+        name: {"unit": "um", "plausible": [-1, 1], "source": "s", "per": per}
+        for name, per in (("k", "link"), ("m", "machine"))
+    }
+    effect = formula_effect(
+        {"id": "mine", "port": "base_joint", "formula": {"x": "k * direction", "y": "m"}, "parameters": declared}, "a"
+    )
+    basis, _ = effect.basis(row_at_zero(), {}, None)
+    expected = np.zeros((9, 4))
+    expected[[0, 3, 6], [0, 1, 2]] = 1e-3
+    expected[[1, 4, 7], 3] = 1e-3
+    np.testing.assert_allclose(basis[0], expected)
+
+
+def test_a_sensitivity_is_a_parameter_times_recorded_derivatives() -> None:
+    effect = sensitive(port="reference")
+    assert effect.needs == ("d_radius_{axis}_mm",)
+    rows = row_at_zero(values={"d_radius_x_mm": 0.4, "d_radius_z_mm": -2.0})
+    assert not unmet_needs(effect, rows.available, 3)
+    found, _ = effect_deltas(FittedEffect(effect, np.array([0.1])), rows)
+    np.testing.assert_allclose(found["reference"][0], [0.04, 0, -0.2, 0, 0, 0])
+    problems = unmet_needs(effect, row_at_zero().available, 3)
+    assert "d_radius_x_mm" in str(problems[0])
+    of_links = sensitive(port="link")
+    assert of_links.needs == ("d_radius_link_{link}_mm",)
+    rows = row_at_zero(values={f"d_radius_link_{i}_mm": float(i) for i in (1, 2, 3)})
+    np.testing.assert_allclose(of_links.basis(rows, {}, None)[0][0, :, 0], [1, 2, 3])
+
+
+def sensitive(**more: Any) -> Effect:
+    declared = {"dr": {"unit": "mm", "plausible": [-1, 1], "source": "drawing"}}
+    return formula_effect({"id": "radius", "sensitivity": "radius", "parameters": declared, **more}, "a.yaml:7")
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"port": "reference", "formula": "dr"}, "has a formula and a sensitivity"),
+        ({"port": "tool"}, "a.yaml:7, port: has no sensitivity"),
+        ({"port": "reference", "axis": "x"}, "a.yaml:7, axis: does not belong to a sensitivity"),
+        ({"port": "reference", "gives": "mm"}, "a.yaml:7, gives: does not belong"),
+        (
+            {
+                "port": "reference",
+                "parameters": {name: {"unit": "1", "plausible": [0, 1], "source": "s"} for name in "ab"},
+            },
+            "a sensitivity has one parameter",
+        ),
+        (
+            {"port": "reference", "parameters": {"a": {"unit": "1", "plausible": [1, 0], "source": "s"}}},
+            "range is empty",
+        ),
+    ],
+)
+def test_a_wrong_sensitivity_is_refused(more: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=said):
+        sensitive(**more)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("tan(45 * deg)", 1.0),
+        ("atan2(1, -1)", 0.75 * math.pi),
+        ("sin(2 * (15 * deg))", 0.5),
+        ("180 * deg / pi", 1.0),
+    ],
+)
+def test_angles(text: str, value: float) -> None:
+    assert value_of(parse(f"k * {text}", ("k",), "test")) == pytest.approx(value)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -407,6 +504,14 @@ def test_one_parameter_per_link() -> None:
         ({"formula": "k * humidity"}, "is no column"),
         ({"formula": "humidity_pct"}, "a parameter is not in the formula"),
         ({"id": "Not an id"}, "pattern"),
+        ({"formula": {"x": "k"}}, "the port link has no axes"),
+        ({"formula": {"w": "k"}, "port": "tool"}, "formula.w: is none of the choices"),
+        ({"formula": {}, "port": "tool"}, "at least 1"),
+        ({"formula": {"x": "k"}, "port": "tool", "axis": "x"}, "axis: is said twice"),
+        ({"formula": {"x": "k", "y": "k +"}, "port": "tool"}, "formula of granite_swelling, y, character"),
+        ({"formula": None}, "`formula:` or `sensitivity:`"),
+        ({"paramters": {}}, "did you mean `parameters`"),
+        ({"parameters": {"deg": {"unit": "um", "plausible": [-1, 1], "source": "s"}}, "formula": "deg"}, "a number's"),
     ],
 )
 def test_a_wrong_declaration_is_refused_with_its_place(change: dict[str, Any], said: str) -> None:

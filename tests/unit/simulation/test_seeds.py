@@ -91,7 +91,7 @@ def test_weak_disturbances_change_only_by_the_added_cause(monkeypatch: pytest.Mo
 
 def test_pairs_of_the_scoreboard_change_only_by_the_added_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     def pairs() -> list[scoreboard.Case]:
-        return scoreboard.cases(["pair"], (), 0, 0, 0, 40)
+        return scoreboard.cases(["pair"], "full")
 
     before = pairs()
     add_cause(monkeypatch)

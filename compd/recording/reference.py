@@ -1,0 +1,136 @@
+"""The section `reference:` of a sidecar: what the reference instrument measured, in which unit and how well."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
+
+from compd.configuration.section import Section, refusal
+from compd.units import REFERENCE_UNITS
+
+Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
+Frame = Literal["machine", "instrument"]
+
+_SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
+StandardUncertainty = Annotated[
+    tuple[float, ...], WithJsonSchema({"anyOf": [_SIGMA_SCHEMA, {"type": "array", "items": _SIGMA_SCHEMA}]})
+]
+
+
+def sigma_key(unit: str) -> str:
+    """The key that holds the standard uncertainty of a reference in `unit`."""
+    return "sigma_um" if unit == "um" else "sigma"
+
+
+class Reference(Section):
+    """What the reference instrument measured. An unknown uncertainty is nan; `balls` is relative to the sidecar."""
+
+    quantity: Quantity = Field(
+        description="what was measured: the tip, the tip and the attitude, the links' change, or balls of a ball plate"
+    )
+    unit: Annotated[str, WithJsonSchema({"enum": list(REFERENCE_UNITS)})] = Field(
+        default="um",
+        description="unit of every error. um: the columns are in mm. Another unit, with `machine: external` only: the "
+        "columns reference_... and model_... are in this unit too, and their names end in it: reference_x_arcsec, "
+        "model_x_arcsec (um/m is written _um_per_m). A formula gives the error in this unit",
+    )
+    frame: Frame = Field(
+        default="machine",
+        validate_default=True,
+        description="machine: the coordinates are in {M}; instrument: in the instrument's own frame, so that a "
+        "registration of six parameters is always fitted; of a ball plate always instrument unless it is written",
+    )
+    sigma_um: StandardUncertainty = Field(
+        default=(math.nan,),
+        description="standard uncertainty of the reference, um: one number, or one for each axis; left out where it is "
+        "not known",
+    )
+    sigma: StandardUncertainty = Field(
+        default=(math.nan,), description="in place of `sigma_um` where `unit` is not um: the same in that unit"
+    )
+    balls: Path | None = Field(
+        default=None,
+        validate_default=True,
+        description="ball_plate only: the ball plate's file, relative to the sidecar",
+    )
+
+    @property
+    def standard_uncertainty(self) -> tuple[float, ...]:
+        """One number, or one for each axis, in `unit`; nan where it is not known."""
+        return self.sigma_um if self.unit == "um" else self.sigma
+
+    @field_validator("quantity", mode="before")
+    @classmethod
+    def _known_quantity(cls, quantity: Any) -> Any:
+        return _one_of(quantity, get_args(Quantity), "say what the instrument measured")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mapping(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            raise refusal("must hold `quantity:` and what belongs to it", next_step="see the format")
+        # a key without a value is a missing key; the frame's default depends on the quantity
+        return {"quantity": None, "frame": None, **{key: value for key, value in data.items() if value is not None}}
+
+    @field_validator("unit", mode="before")
+    @classmethod
+    def _unit_of_the_quantity(cls, unit: Any, info: ValidationInfo) -> Any:
+        quantity = info.data.get("quantity")
+        if quantity in ("tool_pose", "ball_plate") and unit != "um":
+            raise refusal(f"of {quantity} is um", "um, or nothing", "delete it")
+        return _one_of(unit, tuple(REFERENCE_UNITS), "give the values in one of these")
+
+    @field_validator("frame", mode="before")
+    @classmethod
+    def _frame_of_the_quantity(cls, frame: Any, info: ValidationInfo) -> Any:
+        quantity, unit = info.data.get("quantity"), info.data.get("unit", "um")
+        if frame is None and quantity in ("link_length", "ball_plate"):
+            return "instrument" if quantity == "ball_plate" else "machine"
+        if quantity == "link_length" and frame == "instrument":
+            raise refusal("a link's length has no frame", "machine, or nothing", "delete it")
+        if unit != "um" and frame in (None, "machine"):
+            return "machine"
+        if unit != "um" and frame == "instrument":
+            raise refusal(f"only lengths have a frame to be fitted, not {unit}", "machine, or nothing", "delete it")
+        return _one_of(frame, get_args(Frame), "say in which frame the reference columns are")
+
+    @field_validator("sigma_um", "sigma", mode="before")
+    @classmethod
+    def _standard_uncertainties(cls, sigma: Any, info: ValidationInfo) -> Any:
+        unit = info.data.get("unit", "um")
+        key = sigma_key(unit)
+        if info.field_name != key:
+            raise refusal(f"does not go with the unit {unit}", f"{key}, in {unit}", f"write `{key}:`")
+        sigmas = sigma if isinstance(sigma, list) else [sigma]
+        numbers = [value for value in sigmas if isinstance(value, int | float) and not isinstance(value, bool)]
+        if not sigmas or len(numbers) != len(sigmas) or not all(0 < number < math.inf for number in numbers):
+            raise refusal(
+                "is no standard uncertainty",
+                f"a number greater than 0 in {'micrometres' if unit == 'um' else unit}, or one for each axis: "
+                "[0.1, 0.1, 0.3]",
+                "leave it out where it is not known",
+            )
+        return tuple(numbers)
+
+    @field_validator("balls", mode="before")
+    @classmethod
+    def _balls_of_a_ball_plate(cls, balls: Any, info: ValidationInfo) -> Any:
+        quantity = info.data.get("quantity")
+        if quantity == "ball_plate" and (not isinstance(balls, str) or not balls):
+            raise refusal(
+                "is missing" if balls is None else "is no file name",
+                "a CSV file: ball, x_mm, y_mm, z_mm",
+                "name the plate's file, beside the sidecar",
+            )
+        if quantity not in (None, "ball_plate") and balls is not None:
+            raise refusal(f"belongs to ball_plate, not to {quantity}", next_step="delete it")
+        return balls
+
+
+def _one_of(value: Any, names: tuple[str, ...], next_step: str) -> Any:
+    if value not in names:
+        raise refusal("is missing" if value is None else "is unknown", ", ".join(names), next_step)
+    return value

@@ -1,0 +1,121 @@
+"""The measures that have a target: how often what was wanted was reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.scoreboard import scoring
+from tests.scoreboard.scoring import Result
+
+# Sizes of errors, over the noise floor, that the targets are stated for: 1 to 6, with the tolerance of sizing.
+LEAST_FLOORS, MOST_FLOORS = 0.95, 6.3
+# Floor ratio on the other recording.
+MOST_RATIO = 1.1
+
+
+@dataclass(frozen=True)
+class Measure:
+    """what : in words. cases : how many count. reached, wanted : as text, with their unit."""
+
+    what: str
+    cases: int
+    reached: str
+    wanted: str
+
+
+def floors(result: Result) -> tuple[float, ...]:
+    """Size of each hidden cause's error over the noise."""
+    return tuple(result["answer"].get("error_in_floors", {}).values())
+
+
+def plain(result: Result) -> bool:
+    """Whether every hidden cause has a size that the targets are stated for."""
+    return all(LEAST_FLOORS <= size <= MOST_FLOORS for size in floors(result))
+
+
+def measures(results: Sequence[Result]) -> list[Measure]:
+    """All measures of these results."""
+    of = {
+        name: [result for result in results if result["family"] == name and plain(result)]
+        for name in ("library", "pair", "nothing", "outside")
+    }
+    library, outside = of["library"], of["outside"]
+    named = [result for result in library if named_first(result)]
+    can_be = [result for result in named if reaches(result, "true_floor_ratio")]
+    covered = [inside for result in named for _, inside in scoring.intervals(result)]
+    took_s = [result["took_s"] for result in results]
+    bound = _percent([reaches(result, "true_floor_ratio") for result in named])
+    return [
+        _share("right effect named first, error 1 to 6 times the floor", library, named_first, ">= 97 %"),
+        _share("the same, constants not taken as one family", library, named_first_exactly, ""),
+        _share("right effect named or among the rivals", library, named_or_rival, "100 %"),
+        _share("an effect named that is not there", library, named_wrongly, ""),
+        _share("two hidden effects, both named or among the rivals", of["pair"], named_or_rival, ">= 90 %"),
+        _share("nothing hidden: says adequate", of["nothing"], is_adequate, ">= 98 %"),
+        _share("outside the library: names none", outside, lambda result: not scoring.steps(result), ""),
+        _share("outside: names none, right covariate first or second", outside, described, ">= 95 %"),
+        Measure(f"other recording <= {MOST_RATIO}, with the true effect fitted: the bound", len(named), bound, ""),
+        _share(
+            f"other recording <= {MOST_RATIO}, of those that can be",
+            can_be,
+            lambda result: reaches(result, "other_floor_ratio"),
+            "all",
+        ),
+        Measure("95 % interval holds the true parameter", len(covered), _percent(covered), "93-97 %"),
+        Measure("processor time of a diagnosis: median, 95 %", len(took_s), _times(took_s), "<= 5 s"),
+    ]
+
+
+def named_first(result: Result) -> bool:
+    """Whether the first thing said is what was hidden; of constants, any of their family."""
+    groups = {name for group in result["expected"].get("groups", ()) for name in group}
+    first = scoring.names(result)[:1] or sorted(scoring.constant_effects(result))
+    return bool(groups & set(first))
+
+
+def named_first_exactly(result: Result) -> bool:
+    answers: list[str] = result["answer"]["answers"]
+    return scoring.names(result)[:1] == answers[:1]
+
+
+def named_or_rival(result: Result) -> bool:
+    """Whether all that was hidden is named, a rival, or what a constant may come from."""
+    said = {*scoring.names(result), *scoring.rivals(result), *scoring.constant_effects(result)}
+    return all(said & set(group) for group in result["expected"].get("groups", ()))
+
+
+def named_wrongly(result: Result) -> bool:
+    """Whether something is named of which neither effect nor rival is there."""
+    there = {name for group in result["expected"].get("groups", ()) for name in group}
+    there |= {*result["expected"].get("may_name", ()), *result["answer"].get("weak_disturbances", ())}
+    return any(not there & {step["effect"], *step["rivals"]} for step in scoring.steps(result))
+
+
+def is_adequate(result: Result) -> bool:
+    return bool(result["verdict"]["verdict"] == "adequate")
+
+
+def described(result: Result) -> bool:
+    """Whether nothing is named, and the right covariate is first or second."""
+    return not scoring.steps(result) and not any("follows" in text for text in scoring.score(result).missing)
+
+
+def reaches(result: Result, key: str) -> bool:
+    """Whether this floor ratio is known and small enough."""
+    ratio = result.get(key)
+    return ratio is not None and ratio <= MOST_RATIO
+
+
+def _share(what: str, group: Sequence[Result], right: Callable[[Result], bool], wanted: str) -> Measure:
+    return Measure(what, len(group), _percent([right(result) for result in group]), wanted)
+
+
+def _percent(values: Sequence[bool]) -> str:
+    return f"{100 * float(np.mean(values)):.0f} %" if len(values) else "-"
+
+
+def _times(took_s: Sequence[float]) -> str:
+    return f"{np.median(took_s):.1f} s, {np.quantile(took_s, 0.95):.1f} s" if len(took_s) else "-"

@@ -1,0 +1,61 @@
+"""Recordings of real machines, beside the project: what an honest analysis finds is known from their authors."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tests.scoreboard.expectation import Expectation
+from tests.support.paths import SHARED
+
+PLACE = SHARED / "real"
+FAMILY = "real"
+HERE = Path(__file__).parent
+# "... with ia ie an aw in the model": effects that the model has already.
+_WITH, _IN_THE_MODEL = " with ", " in the model"
+# Where nobody planted anything, any word but these may be right if the answers do not say.
+_WORDS = ("identified", "ambiguous", "partial", "unexplained")
+
+
+def prepare_real(campaigns: Path, place: Path = PLACE) -> list[Path]:
+    """Directories of the real recordings of `place`; none where that is absent."""
+    answers = place / "answers.yaml"
+    if not answers.exists():
+        return []
+    entries: Mapping[str, Any] = yaml.safe_load(answers.read_text(encoding="utf-8"))
+    return [_prepare(name, dict(entry), campaigns, place) for name, entry in entries.items()]
+
+
+def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> Path:
+    recording, _, model = name.partition(_WITH)
+    directory = campaigns / f"{FAMILY}_{name.replace(' ', '-')}"
+    directory.mkdir(parents=True, exist_ok=True)
+    for suffix in (".csv", ".yaml"):
+        _link(place / f"{recording}{suffix}", directory / f"train{suffix}")
+    if library := entry.pop("library"):
+        own = HERE / f"{library}-effects.yaml"
+        _link(own if own.exists() else place / library, directory / "effects.yaml")
+    known = model.removesuffix(_IN_THE_MODEL).split()
+    if known:
+        (directory / "known.json").write_text(json.dumps(known), encoding="utf-8")
+    entry["verdicts"] = entry.pop("verdict", _WORDS)
+    entry["groups"] = entry.pop("right", ())
+    answer = {
+        "case": f"{FAMILY}:{name}",
+        "family": FAMILY,
+        "effects": {},
+        "known": known,
+        "expected": Expectation.from_json(entry).as_json(),
+    }
+    (directory / "answer.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+    return directory
+
+
+def _link(source: Path, target: Path) -> None:
+    """A link in place of a copy: the recordings are not the project's."""
+    target.unlink(missing_ok=True)
+    target.symlink_to(source.resolve())

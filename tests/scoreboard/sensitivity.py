@@ -1,0 +1,134 @@
+"""`python -m tests.scoreboard.sensitivity`: what each number of the diagnosis does to its results.
+
+Every threshold of `Criteria` is halved and doubled, one at a time, and the prepared cases are diagnosed with it. The
+table says for each how many are right, near and dangerous then; a number without an effect on these cases can be any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import Field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from compd.diagnosis.criteria import Criteria
+from tests.scoreboard.parallel import append_results, read_results
+from tests.scoreboard.scoring import Result, score
+from tests.scoreboard.trial import prepared, read_answer, run
+
+FACTORS = {"half": 0.5, "twice": 2.0}
+UNCHANGED = "as it is"
+
+
+class Variant(NamedTuple):
+    """A threshold, "comparison.outlier_sigmas" for one of the comparison's, and what is done to it."""
+
+    name: str
+    change: str
+
+
+class Trial(NamedTuple):
+    """A case with a variant of the criteria."""
+
+    directory: Path
+    variant: Variant
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.scoreboard.sensitivity", description=__doc__)
+    add = parser.add_argument
+    add("--campaigns", type=Path, default=Path("out/campaigns"), help="prepared cases")
+    add("--out", type=Path, default=Path("out/sensitivity.jsonl"), help="results, one line each")
+    add("--name", nargs="+", default=None, help="these thresholds alone")
+    add("--every", type=int, default=1, help="one of so many cases, evenly spread over the families")
+    add("--jobs", type=int, default=os.cpu_count(), help="side by side")
+    options = parser.parse_args()
+    directories = prepared(options.campaigns)[:: options.every]
+    wanted = [variant for variant in variants() if not options.name or variant.name in ("", *options.name)]
+    cases = {read_answer(directory)["case"]: directory for directory in directories}
+    done = {(result["case"], result["name"], result["change"]) for result in read_results(options.out)}
+    todo = [
+        Trial(directory, variant)
+        for variant in wanted
+        for case, directory in cases.items()
+        if (case, *variant) not in done
+    ]
+    failed = append_results(options.out, run_variant, todo, options.jobs)
+    results = [result for result in read_results(options.out) if result["case"] in cases]
+    print("\n".join(table(results)))
+    for name, why in failed:
+        print(f"failed: {name}: {why}")
+    raise SystemExit(bool(failed))
+
+
+def thresholds() -> dict[str, Field[Any]]:
+    """Every number of `Criteria` by its name, those of the comparison too."""
+    numbers: dict[str, Field[Any]] = {}
+    for field in fields(Criteria):
+        value = getattr(Criteria(), field.name)
+        inner = fields(value) if is_dataclass(value) else ()
+        numbers |= {f"{field.name}.{part.name}": part for part in inner} if inner else {field.name: field}
+    return numbers
+
+
+def variants() -> list[Variant]:
+    """The criteria as they are, then every threshold halved and doubled."""
+    return [Variant("", UNCHANGED), *(Variant(name, change) for name in thresholds() for change in FACTORS)]
+
+
+def changed(variant: Variant) -> Criteria:
+    """The criteria with this variant. Of a confidence above one half its distance from 1 is halved or doubled."""
+    criteria: Any = Criteria()
+    if not variant.name:
+        return Criteria()
+    *outer, name = variant.name.split(".")
+    owner: Any = getattr(criteria, outer[0]) if outer else criteria
+    value, factor = getattr(owner, name), FACTORS[variant.change]
+    if thresholds()[variant.name].metadata["unit"] == "probability" and value > 0.5:
+        new: float = 1 - (1 - value) * factor
+    else:
+        new = max(1, round(value * factor)) if isinstance(value, int) else value * factor
+    owner = replace(owner, **{name: new})
+    changed_criteria: Criteria = replace(criteria, **{outer[0]: owner}) if outer else owner
+    return changed_criteria
+
+
+def run_variant(trial: Trial) -> dict[str, Any]:
+    """The score of one case with a variant of the criteria."""
+    scored = score(run(trial.directory, changed(trial.variant)))
+    return {
+        "case": read_answer(trial.directory)["case"],
+        "name": trial.variant.name,
+        "change": trial.variant.change,
+        "right": scored.right,
+        "near": scored.near,
+        "dangerous": scored.dangerous,
+    }
+
+
+def table(results: Sequence[Result]) -> Iterator[str]:
+    """A Markdown table: right/near/dangerous with every threshold halved and doubled."""
+    counts = {variant: _counts(results, variant) for variant in variants()}
+    yield f"As it is, right/near/dangerous of all: {counts[Variant('', UNCHANGED)]}."
+    yield ""
+    yield "| number | default | half | twice |"
+    yield "|---|---|---:|---:|"
+    for name, threshold in thresholds().items():
+        unit = threshold.metadata["unit"]
+        default = f"{threshold.default:g}" + ("" if unit == "1" else f" {unit}")
+        cells = " | ".join(counts[Variant(name, change)] for change in FACTORS)
+        yield f"| `{name}` | {default} | {cells} |"
+
+
+def _counts(results: Sequence[Result], variant: Variant) -> str:
+    group = [result for result in results if (result["name"], result["change"]) == variant]
+    if not group:
+        return "-"
+    right, near, dangerous = (sum(result[key] for result in group) for key in ("right", "near", "dangerous"))
+    return f"{right}/{near}/{dangerous} of {len(group)}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""Recordings of a machine of an external model whose error is known, for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from compd.arrays import FloatArray
+from compd.comparison.aligned_recording import AlignedRecording, align_recording
+from compd.model.effect import Effect
+from compd.model.formula.declaration import formula_effect
+from compd.recording.reader import read_recording
+
+SIGMA_UM = 0.5
+
+
+def record_external(
+    path: Path,
+    columns: Mapping[str, FloatArray],
+    errors_um: Mapping[str, FloatArray],
+    *,
+    model_mm: Mapping[str, FloatArray] | None = None,
+    sigma_um: float = SIGMA_UM,
+    seed: int = 1,
+    frame: str = "machine",
+) -> AlignedRecording:
+    """A recording, written and read: what was measured besides, and the error along each axis to which noise is added.
+
+    columns : without `time_s` a row is measured every ten seconds.  model_mm : the prediction by axis; 0 if left out.
+    """
+    rng = np.random.default_rng(seed)
+    count = len(next(iter(errors_um.values())))
+    table = {"time_s": 10.0 * np.arange(count), **columns}
+    for axis, error_um in errors_um.items():
+        predicted_mm = np.zeros(count) if model_mm is None else model_mm[axis]
+        table[f"model_{axis}_mm"] = predicted_mm
+        table[f"reference_{axis}_mm"] = predicted_mm + 1e-3 * (error_um + rng.normal(0, sigma_um, count))
+    lines = [",".join(table), *(",".join(f"{value:.9g}" for value in row) for row in zip(*table.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    reference = {"quantity": "tool_position", "frame": frame, "sigma_um": sigma_um}
+    path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": "external", "reference": reference}))
+    return align_recording(read_recording(path, None), None)
+
+
+def along(axis: str, effect_id: str, formula: str, **keys: Any) -> Effect:
+    """An effect along one axis with one parameter k; keys : others of its declaration."""
+    parameters = {"k": {"unit": "um", "plausible": [-100, 100], "source": "a test"}}
+    declaration = {"id": effect_id, "port": "reference", "axis": axis, "formula": formula, "parameters": parameters}
+    return formula_effect({**declaration, **keys}, "a test")
