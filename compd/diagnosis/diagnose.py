@@ -129,7 +129,7 @@ def _verdict(
     Where the noise is not known, whether something is missing can be told only by finding it.
     """
     found = bool(explanation.described)
-    if problem.floor_known and not found and explanation.loss <= problem.criteria.most_at_floor:
+    if problem.floor_known and not found and explanation.loss <= problem.most_at_floor:
         if not steps:
             return "adequate"
         return "ambiguous" if any(step.rivals for step in steps) else "identified"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -35,7 +36,7 @@ class DiagnosisProblem:
     known : (N,) rows in which the residual and all candidates are known.
     gross : (N,) rows that nothing explains; rows : (N,) those that count: known and not gross.
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
-    residual : (N, m) whitened, 0 where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
+    residual : (N, m) whitened, nan where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
     """
 
@@ -62,6 +63,16 @@ class DiagnosisProblem:
     def floor_known(self) -> bool:
         """Whether the noise was measured or declared."""
         return self.comparison.floor.known
+
+    @property
+    def most_at_floor(self) -> float:
+        """Largest loss at which nothing is left: the criterion's, or what chance makes of a floor from few repeats.
+
+        The latter is a quantile of the F distribution, by which a comparison too is at the floor.
+        """
+        dof = min(self.comparison.floor.dof, 1e9)
+        by_chance = f_distribution.ppf(self.comparison.criteria.at_floor_confidence, self.data.value_count, dof)
+        return max(self.criteria.most_at_floor, float(by_chance))
 
     @property
     def unit_um(self) -> float:
@@ -104,7 +115,7 @@ def build_problem(
     constant = constant_candidate(aligned)
     if constant is not None:
         candidates = (*candidates, constant)
-    residual = np.where(known[:, None], comparison.residual_um, 0.0) / sigma_um
+    residual = comparison.residual_um / sigma_um
     nuisance = nuisance_um / sigma_um[:, None]
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
