@@ -17,9 +17,9 @@ from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error, residual_ending
-from compd.comparison.fit import frame_motion_um
 from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
+from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
@@ -36,8 +36,8 @@ from compd.units import UM_PER_MM
 if TYPE_CHECKING:
     import pandas as pd
 
-# Outliers bend the fitted frame a little, and the frame decides which rows are outliers: two rounds settle it.
-FRAME_ROUNDS = 3
+# Outliers bend nuisance terms a little, and these decide which rows are outliers: two rounds settle it.
+NUISANCE_ROUNDS = 3
 # Why a row does not count, beside the reasons of the recording itself.
 NO_QUANTITY = "a quantity that an effect needs is empty"
 OUTLIER = "beyond all noise"
@@ -291,7 +291,7 @@ def compare(
     criteria: ComparisonCriteria = ComparisonCriteria(),
     outlier: BoolArray | None = None,
 ) -> Comparison:
-    """Compare a recording with the model and its effects; nothing of the model is fitted here.
+    """Compare a recording with the model and its effects; nothing of these is fitted here, but the nuisance terms are.
 
     covariance : (P, P) of the effects' parameters jointly; where None, from each effect's own.
     outlier : (N,) rows that do not count; None to find them.
@@ -302,8 +302,7 @@ def compare(
     known, left_out = _known_rows(aligned, predicted_mm, criteria)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
     residual_um[~known] = np.nan
-    measured_um = residual_um
-    residual_um, outlier = _remove_frame_motion(aligned, residual_um, known, criteria, outlier)
+    residual_um, along, outlier = _without_nuisance(aligned, fitted, residual_um, known, criteria, outlier)
     used = known & ~outlier
     gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
     floor = noise_floor(
@@ -331,20 +330,13 @@ def compare(
         floor=floor,
         uncertainty=uncertainty,
         gauges=gauges,
-        contributions=contributions(aligned, by_effect, used),
+        contributions=contributions(aligned, fitted, by_effect, used),
         trends=find_trends(aligned, residual_um, links_um, used, floor, criteria),
         link_residual_um=links_um,
         attitude_residual_urad=aligned.attitude_residual_urad(total),
         criteria=criteria,
-        constant_um=_constant_um(aligned, measured_um - residual_um, used),
+        constant_um=np.asarray(along.registration_um[used].mean(axis=0)),
     )
-
-
-def _constant_um(aligned: AlignedRecording, removed_um: FloatArray, used: BoolArray) -> FloatArray:
-    """(m,) mean of what was fitted along (N, m) over the rows used; zeros where nothing is."""
-    if not aligned.registration_columns.shape[2]:
-        return np.zeros(removed_um.shape[1])
-    return np.asarray(removed_um[used].mean(axis=0))
 
 
 def _known_rows(
@@ -369,28 +361,29 @@ def _known_rows(
     return known, left_out
 
 
-def _remove_frame_motion(
+def _without_nuisance(
     aligned: AlignedRecording,
+    fitted: Sequence[FittedEffect],
     residual_um: FloatArray,
     known: BoolArray,
     criteria: ComparisonCriteria,
     given: BoolArray | None,
-) -> tuple[FloatArray, BoolArray]:
-    """The residual (N, m) without what a motion of the instrument's frame explains, and the outliers (N,).
+) -> tuple[FloatArray, FittedAlong, BoolArray]:
+    """The residual (N, m) without what nuisance terms explain, that, and the outliers (N,).
 
     given : the outliers where they are known.
     """
     if given is not None:
-        return residual_um - frame_motion_um(aligned, residual_um, known & ~given), given & known
+        along = fit_along(aligned, fitted, residual_um, known & ~given)
+        return residual_um - along.total_um, along, given & known
     outlier = np.zeros(len(known), dtype=bool)
-    rest_um = residual_um
-    for _ in range(FRAME_ROUNDS):
-        rest_um = residual_um - frame_motion_um(aligned, residual_um, known & ~outlier)
-        new_outlier = outlier_rows(rest_um, known, aligned.recording.visit, criteria)
+    for _ in range(NUISANCE_ROUNDS):
+        along = fit_along(aligned, fitted, residual_um, known & ~outlier)
+        new_outlier = outlier_rows(residual_um - along.total_um, known, aligned.recording.visit, criteria)
         if (new_outlier == outlier).all():
             break
         outlier = new_outlier
-    return rest_um, outlier
+    return residual_um - along.total_um, along, outlier
 
 
 def _uncertainty(

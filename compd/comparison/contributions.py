@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import BoolArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import frame_motion_um
+from compd.comparison.nuisance import fit_along
 from compd.model.deltas import Deltas, sum_deltas
+from compd.model.effect import FittedEffect
 from compd.units import UM_PER_MM
 
 
@@ -22,13 +23,13 @@ class Contribution(NamedTuple):
 
 
 def contributions(
-    aligned: AlignedRecording, by_effect: Mapping[str, Deltas], used: BoolArray
+    aligned: AlignedRecording, fitted: Sequence[FittedEffect], by_effect: Mapping[str, Deltas], used: BoolArray
 ) -> dict[str, Contribution]:
     """The contribution of each source: "joints" and "frame" where they were recorded, then each effect by its id.
 
-    by_effect : what each effect adds at its ports.  used : (N,) the rows that count.
+    fitted : the effects of the model.  by_effect : what each adds at its ports.  used : (N,) the rows that count.
     A source is switched off by predicting again without it: comparators as if unmoved, the effect left out of the sum.
-    Where the instrument's frame is fitted, it is fitted anew without each source, as a user without it would have done.
+    Nuisance terms are fitted anew without each source, as a user without it would have done.
     """
     total = sum_deltas(list(by_effect.values()))
     predicted_mm = aligned.predicted_mm(total)
@@ -44,6 +45,7 @@ def contributions(
         without_mm = aligned.predicted_mm(added)
         rows = used & np.isfinite(without_mm).all(axis=1)
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
-        residual_um = residual_um - frame_motion_um(aligned, residual_um, rows)
+        others = [effect for effect in fitted if effect.effect.id != name]
+        residual_um = residual_um - fit_along(aligned, others, residual_um, rows).total_um
         result[name] = Contribution(rms(((predicted_mm - without_mm) * UM_PER_MM)[rows]), rms(residual_um[rows]))
     return result

@@ -14,6 +14,15 @@ from compd.comparison.display_unit import in_place_unit, place_unit
 from compd.recording.columns import is_sensitivity
 from compd.units import unit_of
 
+# Units of pure numbers, and words by which people call a number that names something.
+_PURE = ("", "1", "counts")
+_LABEL_WORDS = frozenset(
+    [
+        *("row", "line", "index", "number", "no", "nr", "id", "point", "visit", "session", "run", "sample", "sequence"),
+        *("star", "target", "hole", "image", "exposure"),
+    ]
+)
+
 
 class Covariate(NamedTuple):
     """Something that the residual may follow.
@@ -39,7 +48,7 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         if np.isfinite(column).any()
     ]
     for name, column in quantities.items():
-        if is_sensitivity(name):
+        if why_no_covariate(name, column[np.isfinite(column)]):
             continue
         unit = unit_of(name)
         if link := _link_of_approach(name):
@@ -59,6 +68,23 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         for i, direction in enumerate(recording.approach.T, start=1):
             result.append(Covariate(f"direction of link {i}", "1", direction, i))
     return result
+
+
+def why_no_covariate(name: str, values: FloatArray) -> str:
+    """Why nothing can depend on a measured quantity, in words; "" where something can.
+
+    A label is a whole number without unit that names rows or counts up by ones through the recording, as a column
+    `star_1` or `run_1` does: everything that changed in time follows it. Two values, off and on, are no label.
+
+    values : (R,) those that are known.
+    """
+    if is_sensitivity(name):
+        return "a derivative of the model's prediction, which belongs to an effect"
+    if unit_of(name) in _PURE and (values == np.rint(values)).all():
+        counts = len(np.unique(values)) > 2 and bool(np.isin(np.diff(values), (0.0, 1.0)).all())
+        if counts or _LABEL_WORDS & set(name.lower().split("_")):
+            return "only counts or names rows"
+    return ""
 
 
 def _link_of_approach(name: str) -> int:

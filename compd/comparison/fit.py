@@ -1,7 +1,8 @@
 """Fitting effects: robust Gauss-Newton on the forward model, jointly with the effects that the model has already.
 
-The prediction f(theta) is nearly linear in the parameters theta of all effects and in the registration r of the
-instrument's frame. Each step solves the weighted linear problem
+The prediction f(theta) is nearly linear in the parameters theta of all effects and in the nuisance terms r, which are
+the instrument's frame and the unknown states at the start of each session (`compd.comparison.nuisance`). Each step
+solves the weighted linear problem
 
     minimise  sum_i w_i | (y_i - f_i(theta) - R_i r - G_i (d_theta, d_r)) / sigma |^2
 
@@ -30,9 +31,10 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.cluster_covariance import cluster_covariance, neighbour_blocks
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.least_squares import column_norms, solve_least_squares
+from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
-from compd.comparison.robust import huber_weights, robust_regression
+from compd.comparison.robust import huber_weights
 from compd.errors import CompdError, Problem
 from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
@@ -43,8 +45,6 @@ STEPS = 10
 ROUNDS = 8
 # A step that changes the prediction by less than this share of the residual ends the iteration.
 CONVERGED = 1e-6
-# What is fitted along is an effect's own where the effect leaves less of it than this share.
-LEAST_SHARE = 1e-4
 # um; below this a residual is rounding.
 LEAST_RMS_UM = 1e-9
 
@@ -89,7 +89,7 @@ def fit(
     criteria: ComparisonCriteria = ComparisonCriteria(),
     outlier: BoolArray | None = None,
 ) -> FitResult:
-    """Fit the effects together, and with them the instrument's frame where it is not known.
+    """Fit the effects together, and with them the nuisance terms: the instrument's frame, initial states of lags.
 
     effects : with the parameters to start from; nonlinear constants stay as they are.
     weight_sigma_um : (m,) standard deviation of each coordinate's noise; all alike if None.
@@ -108,16 +108,16 @@ def fit(
     usable = usable & np.isfinite(own_um).all(axis=(1, 2)) & np.isfinite(aligned.registration_columns).all(axis=(1, 2))
     if outlier is not None:
         usable = usable & ~outlier
-    G_um = np.concatenate([own_um, registration_beside(aligned, own_um, usable)], axis=2)
+    G_um = np.concatenate([own_um, nuisance_beside(aligned, initial, own_um, usable)], axis=2)
     _check_rows(aligned, usable, G_um.shape[2])
 
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in initial)])
-    registration = np.zeros(G_um.shape[2] - len(theta))
+    nuisance = np.zeros(G_um.shape[2] - len(theta))
     left_out = np.zeros(len(usable), dtype=bool)
     earlier: set[bytes] = set()
     for _ in range(ROUNDS):
-        theta, registration, residual_um = _gauss_newton(
-            aligned, initial, ends, G_um, theta, registration, usable & ~left_out, sigma_um
+        theta, nuisance, residual_um = _gauss_newton(
+            aligned, initial, ends, G_um, theta, nuisance, usable & ~left_out, sigma_um
         )
         if outlier is not None:
             break
@@ -150,32 +150,6 @@ def fit(
     )
 
 
-def registration_beside(aligned: AlignedRecording, own_um: FloatArray, use: BoolArray) -> FloatArray:
-    """(N, m, Q) columns in um of what is fitted along, without what the effects' own columns (N, m, P) make of it.
-
-    An effect of the model that is nothing but a constant takes the constant; else the two would share it.
-    """
-    columns_um = aligned.registration_columns * UM_PER_MM
-    if not columns_um.shape[2] or not own_um.shape[2] or not use.any():
-        return columns_um
-    A = own_um[use].reshape(-1, own_um.shape[2])
-    R = columns_um[use].reshape(len(A), -1)
-    R = R / column_norms(R)
-    _, sizes, combinations = np.linalg.svd(R - A @ solve_least_squares(A, R), full_matrices=False)
-    return np.asarray(columns_um @ combinations[sizes > LEAST_SHARE].T)
-
-
-def frame_motion_um(aligned: AlignedRecording, residual_um: FloatArray, use: BoolArray) -> FloatArray:
-    """(N, m) the part of a residual (N, m) that a small motion of the instrument's frame explains.
-
-    Fitted to the rows `use` (N,) by robust regression; zeros where the reference came in {M} or no row is left.
-    """
-    G = aligned.registration_columns
-    if not G.shape[2] or not use.any():
-        return np.zeros_like(residual_um)
-    return np.asarray(G @ robust_regression(G[use], residual_um[use]))
-
-
 def _check_rows(aligned: AlignedRecording, usable: BoolArray, parameters: int) -> None:
     measured = int(usable.sum()) * len(aligned.labels)
     if measured <= parameters:
@@ -196,25 +170,25 @@ def _gauss_newton(
     ends: IntArray,
     G_um: FloatArray,
     theta: FloatArray,
-    registration: FloatArray,
+    nuisance: FloatArray,
     use: BoolArray,
     sigma_um: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Parameters (P,), registration (6 or fewer,) and residual in um (N, m) after convergence on the rows `use`.
+    """Parameters (P,), nuisance terms (Q,) and residual in um (N, m) after convergence on the rows `use`.
 
-    ends : (E + 1,) where each effect's parameters begin in theta.  G_um : (N, m, P + registration).
+    ends : (E + 1,) where each effect's parameters begin in theta.  G_um : (N, m, P + Q).
     """
     P = len(theta)
     G = (G_um[use] / sigma_um[:, None]).reshape(use.sum() * len(sigma_um), G_um.shape[2])
     for _ in range(STEPS):
         effects = [replace(effect, theta=theta[a:b]) for effect, a, b in zip(initial, ends[:-1], ends[1:], strict=True)]
         _, total = effect_deltas(effects, aligned.rows)
-        residual_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - G_um[:, :, P:] @ registration
+        residual_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - G_um[:, :, P:] @ nuisance
         whitened = residual_um[use] / sigma_um
         weights = np.repeat(huber_weights(whitened), len(sigma_um))
         step = solve_least_squares(G, whitened.ravel(), weights)
-        theta, registration = theta + step[:P], registration + step[P:]
+        theta, nuisance = theta + step[:P], nuisance + step[P:]
         change_um = rms(G_um[use] @ step)
         if change_um <= CONVERGED * max(rms(residual_um[use]), LEAST_RMS_UM):
             break
-    return theta, registration, residual_um
+    return theta, nuisance, residual_um

@@ -11,32 +11,28 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
-from compd.comparison.shape_search import search_constants
+from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
 from compd.diagnosis.candidates import library_pool
 from compd.diagnosis.constant import describe_constant, name_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, Rival, UntestedEffect
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
 from compd.diagnosis.gross_rows import gross_rows
-from compd.diagnosis.measurement_programmes import recorded_limits
-from compd.diagnosis.next_measurement import plan_measurement
 from compd.diagnosis.plausibility import estimate_parameters
 from compd.diagnosis.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.proxies import proxy_candidates
 from compd.diagnosis.rivals import find_rivals
 from compd.diagnosis.significance import OrthogonalComplement, p_values
 from compd.diagnosis.subset_losses import SubsetLosses
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
-from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 
-# Rows of the next measurement that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
-NEXT_ROWS = 12
-# Covariates that the proposal of a next measurement names.
-NEXT_COVARIATES = 2
+# A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
+MOST_ROWS = 5000
 
 
 def diagnose(
@@ -59,6 +55,8 @@ def diagnose(
     progress : called with a text when a stage begins.
     criteria : numbers of the verdict.
 
+    A recording of more than MOST_ROWS rows is thinned evenly; the result is of the rows that were kept.
+
     Raises CompdError as `compare` does.
 
     Example::
@@ -68,6 +66,7 @@ def diagnose(
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
     progress("comparing the model with the recording")
+    aligned = thinned(aligned, MOST_ROWS)
     before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
     present = [effect.effect.id for effect in fitted]
@@ -115,7 +114,7 @@ def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: 
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
     )
-    return replace(diagnosis, next_measurement=_next_measurement(problem, losses, diagnosis))
+    return replace(diagnosis, next_measurement=propose_measurement(problem, explanation, diagnosis))
 
 
 def _verdict(
@@ -207,26 +206,3 @@ def _untested(
     likely |= {rival.name for step in steps for rival in step.rivals}
     untested = [UntestedEffect(name, why, name in likely) for name, why in problem.pool.untestable.items()]
     return tuple(sorted(untested, key=lambda effect: not effect.likely))
-
-
-def _next_measurement(problem: DiagnosisProblem, losses: SubsetLosses, diagnosis: Diagnosis) -> list[dict[str, object]]:
-    """Rows that tell the first rivals apart; where nothing explains the residual, what to vary."""
-    aligned, model = problem.aligned, problem.comparison.fitted
-    for step in diagnosis.steps:
-        if step.rivals and aligned.model is not None:
-            rival = losses.candidates[step.rivals[0].member]
-            try:
-                fitted_rival = search_constants(aligned, model, rival.effect, problem.sigma_um).fitted[-1]
-                pair = (step.fitted, fitted_rival)
-                limits = recorded_limits(aligned)
-                return list(plan_measurement(aligned, model, pair, problem.sigma_um, limits, NEXT_ROWS).rows)
-            except CompdError as error:
-                return [{"measure": step.effect.separated_by, "why": str(error.problems[0].what)}]
-    return [_to_vary(finding) for finding in diagnosis.depends_on[:NEXT_COVARIATES] if not finding.effect]
-
-
-def _to_vary(finding: EmpiricalFinding) -> dict[str, object]:
-    return {
-        "measure": f"vary {finding.covariate} alone, everything else as it is, at three places and back again",
-        "why": f"the rest follows it ({finding.form}, at the {finding.port})",
-    }

@@ -26,6 +26,8 @@ REFINED_FORMS = ("step", "knee", "periodic")
 PROMISING, PER_COVARIATE = 14, 3
 # What a number explains of pure noise, in variances, twice: terms are compared after its deduction (Akaike).
 SQUARES_PER_NUMBER = 2.0
+# Rows on which all terms are compared, about: which are promising shows on few.
+SCREENED_ROWS = 1500
 # Terms that are computed at once: a balance of memory and overhead.
 BATCH = 64
 
@@ -82,14 +84,16 @@ class EmpiricalSearch:
 
     def __init__(self, problem: DiagnosisProblem) -> None:
         self._problem = problem
+        # which term is worth a contest shows on few rows
+        self._screened = slice(None, None, max(1, len(problem.data.y) // SCREENED_ROWS))
         self._fits: list[EmpiricalFit] = []
-        for term in empirical_terms(problem.aligned):
+        for term in empirical_terms(problem.aligned, problem.comparison.residual_um):
             effect = term.effect()
             searched = SEARCHED_CONSTANT if term.constant else 0
             for constant in term.grid or (None,):
                 values = self._columns(term, effect, constant)
                 if np.isfinite(values).all() and values.any():
-                    self._fits.append(EmpiricalFit(term, effect, constant, values, searched))
+                    self._fits.append(EmpiricalFit(term, effect, constant, values[self._screened], searched))
 
     def best_fits(self, nuisance: FloatArray) -> list[EmpiricalFit]:
         """The PROMISING terms that explain most of the residual beside nuisance columns (R, m, Q), the best first.
@@ -97,8 +101,8 @@ class EmpiricalSearch:
         Each is at its best constant; steps, knees and periods are then refined between the values of the grid. Not
         more than PER_COVARIATE are of one covariate: else forms of the first would leave no place for the second.
         """
-        complement = OrthogonalComplement(nuisance)
-        residual = complement(self._problem.data.y)
+        complement = OrthogonalComplement(nuisance[self._screened])
+        residual = complement(self._problem.data.y[self._screened])
         best: dict[EmpiricalTerm, tuple[float, EmpiricalFit]] = {}
         squares = explained_squares([fit.values for fit in self._fits], residual, complement).tolist()
         for fit, explained in zip(self._fits, squares, strict=True):
@@ -109,7 +113,8 @@ class EmpiricalSearch:
         for _, fit in sorted(best.values(), key=lambda pair: SQUARES_PER_NUMBER * pair[1].parameter_count - pair[0]):
             taken[fit.term.covariate] += 1
             if taken[fit.term.covariate] <= PER_COVARIATE and len(promising) < PROMISING:
-                promising.append(self._refined(fit, residual, complement))
+                refined = self._refined(fit, residual, complement)
+                promising.append(replace(refined, values=self._columns(fit.term, fit.effect, refined.constant)))
         return promising
 
     def _refined(self, fit: EmpiricalFit, residual: FloatArray, complement: OrthogonalComplement) -> EmpiricalFit:
@@ -117,7 +122,7 @@ class EmpiricalSearch:
             return fit
         fits = [fit]
         for constant in fit.term.refined_grid(fit.constant, REFINED_VALUES):
-            values = self._columns(fit.term, fit.effect, constant)
+            values = self._columns(fit.term, fit.effect, constant)[self._screened]
             fits.append(replace(fit, constant=constant, values=values))
         return fits[int(np.argmax(explained_squares([fit.values for fit in fits], residual, complement)))]
 

@@ -9,36 +9,36 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.candidates import MOST_EMPTY
+from compd.diagnosis.search_covariates import (
+    STAYED_THE_SAME,
+    Kind,
+    SearchCovariate,
+    round_middle,
+    round_within,
+    search_covariates,
+    untried_quantities,
+)
+from compd.diagnosis.term_formula import CONSTANTS, PARAMETERS, formula_text
+from compd.diagnosis.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
 from compd.model.effect import Effect
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
-# Times at which a step is looked for first; then between the best one's neighbours.
-STEP_TIMES = 48
-# Time constants of a lag, from a fan's minutes to a granite plate's morning.
-LAGS_S = (120.0, 300.0, 700.0, 1700.0, 4000.0, 10000.0)
-# Values of a covariate at which a slope may change: a cable comes taut, a stop is reached, a preload is used up.
-KNEES = 8
-# A period must span so many rows, and fit into the recording so many times.
-ROWS_PER_PERIOD = 6
-FEWEST_TURNS = 2
-MOST_PERIODS = 160
 _LINK = re.compile(r"^(?P<what>[a-z][a-z0-9_]*)_link_(?P<link>\d+)_(?P<unit>[A-Za-z]\w*)$")
 
-# form -> formula; {q} covariate about its middle, {r} the covariate itself, {m} its middle; k.. per unit, c constant.
-FORMS = {
-    "linear": "k * {q} + c",
-    "proportional": "k * {r}",
-    "strain": "(k * {q} + c) * link_mm / 1000",
-    "square": "k * {q} + k2 * {q}**2 + c",
-    "knee": "k * {q} + m * maximum({r} - knee, 0) + c",
-    "lagged": "k * (lag({r}, tau) - {m}) + c",
-    "step": "k * (1 + sign(time_s - start)) / 2 + c",
-    "periodic": "a * sin(2 * pi * time_s / period) + b * cos(2 * pi * time_s / period) + c",
+# In which forms a residual may follow a covariate beside linear: only what warms or wets a body arrives late, only
+# along a way or an angle something repeats, stops and comes taut.
+FORMS_BY_KIND: Mapping[Kind, tuple[str, ...]] = {
+    "place": ("square", "periodic"),
+    "angle": ("square", "periodic"),
+    "load": ("square", "knee"),
+    "flow": ("square", "lagged"),
+    "other": ("square",),
 }
+# A parabola needs three values of its covariate, a knee with two slopes four.
+FEWEST_VALUES = {"square": 3, "knee": 4}
 # Unit of a parameter by its name, {} for the covariate's; um where it is not here.
 _UNITS = {"k": "um/{}", "m": "um/{}", "k2": "um/{}^2"}
 _UNITS_OF_STRAIN = {"k": "ppm/{}", "c": "ppm"}
@@ -52,25 +52,32 @@ SOURCE = "describes a residual; its cause is not known"
 class EmpiricalTerm:
     """One formula of one covariate at one port.
 
-    form : a key of FORMS.  middle : of the covariate, about which the formula is written.
+    form : a key of FORMS.  middle : of the covariate, about which the formula is written.  span : of the covariate.
     per_link : whether each link has parameters of its own.
     axes : of a port that takes a vector, one effect each; ("",) for the links.
-    constant : name of the nonlinear constant, "" for none.  grid : its values.
+    with_constant : whether the formula has a constant of its own; none where every fit has one along each coordinate.
+    grid : values of the nonlinear constant; empty for a form without one.
     """
 
     covariate: str
     form: str
     port: str
     middle: float
+    span: float
     per_link: bool = False
     axes: tuple[str, ...] = ("",)
-    constant: str = ""
+    with_constant: bool = True
     grid: tuple[float, ...] = ()
 
     @property
     def unit(self) -> str:
         """Unit of the covariate, from the end of its name; "1" for none."""
         return unit_of(self.covariate) or "1"
+
+    @property
+    def constant(self) -> str:
+        """Name of the nonlinear constant, "" for none."""
+        return CONSTANTS.get(self.form, "")
 
     def effect(self) -> Effect:
         """The formula as an effect, its constant a parameter; along the first axis where there are several."""
@@ -83,9 +90,10 @@ class EmpiricalTerm:
     def columns_um(self, aligned: AlignedRecording, effect: Effect, value: float | None) -> FloatArray:
         """(N, m, P) by how many um each parameter moves the prediction: all of the first axis, then of the next.
 
-        effect : as from `effect`.  value : of the nonlinear constant; None for a term without one.
+        effect : as from `effect`.  value : of the nonlinear constant; None for a term without one. The few empty cells
+        of a covariate are filled.
         """
-        constants = self.constant_values(value)
+        aligned, constants = aligned.gaps_filled, self.constant_values(value)
         if self.axes == ("",):
             return aligned.columns(effect, constants) * UM_PER_MM
         basis, _ = effect.basis(aligned.rows, constants, None)
@@ -109,15 +117,9 @@ class EmpiricalTerm:
         value : of the nonlinear constant, to be written into the formula; None leaves it a parameter.
         sizes : largest fitted size by parameter; the plausible range is RANGE_PER_SIZE times that.
         """
-        covariate = self.covariate
-        about = covariate
-        if self.middle:
-            about = f"({covariate} {'-' if self.middle > 0 else '+'} {abs(self.middle):g})"
-        formula = FORMS[self.form].format(q=about, r=covariate, m=f"{self.middle:g}")
-        if value is not None and self.constant:
-            formula = re.sub(rf"\b{self.constant}\b", f"{value:.6g}", formula)
+        formula = formula_text(self.form, self.covariate, self.middle, value, with_constant=self.with_constant)
         parameters: dict[str, Any] = {}
-        for name in ("k", "k2", "m", "a", "b", "c"):
+        for name in PARAMETERS:
             if not re.search(rf"\b{name}\b", formula):
                 continue
             size = RANGE_PER_SIZE * abs((sizes or {}).get(name, 0.0)) or UNKNOWN_RANGE
@@ -130,11 +132,10 @@ class EmpiricalTerm:
             if self.per_link:
                 parameters[name]["per"] = "link"
         if self.constant and value is None:
-            unit = self.unit if self.form == "knee" else "s"
-            parameters[self.constant] = {"unit": unit, "plausible": [min(self.grid), max(self.grid)], "source": SOURCE}
-        subject = re.sub(r"[^a-z0-9]+", "_", f"{self.port}_follows_{covariate}".lower())
+            unit = "s" if self.form == "lagged" else self.unit
+            parameters[self.constant] = {"unit": unit, "plausible": list(self._constant_range()), "source": SOURCE}
         return {
-            "id": f"{subject}_{self.form}" + (f"_{axis}" if axis else ""),
+            "id": self._id(axis),
             "port": self.port,
             "formula": formula,
             **({"axis": axis} if axis else {}),
@@ -142,104 +143,116 @@ class EmpiricalTerm:
             "parameters": parameters,
         }
 
+    def _id(self, axis: str) -> str:
+        """Where and what: link_follows_humidity, z_follows_temperature_frame_lagged, tool_x_follows_force_y_square."""
+        place = "_".join(part for part in ("" if self.port == "reference" else self.port, axis) if part)
+        covariate = self.covariate.removesuffix(f"_{self.unit}")
+        form = "" if self.form in ("linear", "proportional") else f"_{self.form}"
+        return re.sub(r"[^a-z0-9]+", "_", f"{place}_follows_{covariate}{form}".lower())
+
+    def _constant_range(self) -> tuple[float, float]:
+        """Wider than the grid, which may hold a single value."""
+        low, high = min(self.grid), max(self.grid)
+        return (low - self.span, high + self.span) if self.form in ("step", "knee") else (low / 2, 2 * high)
+
     def refined_grid(self, value: float, count: int) -> Sequence[float]:
-        """`count` values of the constant between the neighbours of one of the grid."""
+        """`count` values of the constant about one of the grid: between its neighbours; of a period, near it."""
+        if self.form == "periodic":
+            return refined_periods(value, self.unit, self.span, count)
         grid = sorted(self.grid)
         place = grid.index(value)
         low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
-        space = np.linspace if self.form in ("step", "knee") else np.geomspace
-        return [float(refined) for refined in space(low, high, count)]
+        if self.form == "lagged":
+            return [float(f"{refined:.3g}") for refined in np.geomspace(low, high, count)]
+        return [round_within(refined, ROUNDING * self.span) for refined in np.linspace(low, high, count).tolist()]
 
 
-def empirical_terms(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
-    """Every term that can be tried on a recording."""
-    usable = aligned.usable.mask
-    time_s = aligned.rows.time_s[usable]
+def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Iterator[EmpiricalTerm]:
+    """Every term that can be tried on a recording; without times none but a step, which needs only the rows' order.
+
+    residual_um : (N, m) what is to be described; periods are looked for in it. nan where a row does not count.
+    """
+    rows = aligned.usable.mask & np.isfinite(residual_um).all(axis=1)
     ports = list(_ports(aligned))
-    for name, values in _machine_covariates(aligned):
-        column = values[usable]
-        if not _varies(column, MOST_EMPTY):
-            continue
-        middle = 0.0 if name.startswith("force_") else float(f"{np.nanmean(column):.3g}")
+    timed = aligned.recording.has_time
+    for covariate in search_covariates(aligned, rows):
+        yield from _terms_of(covariate, ports, residual_um[rows], timed=timed)
+    time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
+    grids = {"step": step_times_s(time.values)}
+    if timed:
+        grids |= {"linear": (), "periodic": periods(time, residual_um[rows])}
+    for form, grid in grids.items():
         for port in ports:
-            for form in ("linear", "square"):
-                yield replace(port, covariate=name, form=form, middle=middle)
-            if name.startswith(("force_", "tip_")):
-                if len(knees := _knees(column)) > 1:
-                    yield replace(port, covariate=name, form="knee", middle=middle, constant="knee", grid=knees)
-                continue
-            if port.port == "link":  # expansion is proportional to length
-                yield replace(port, covariate=name, form="strain", middle=middle)
-            yield replace(port, covariate=name, form="lagged", middle=middle, constant="tau", grid=LAGS_S)
-    for port in ports:
-        yield replace(port, covariate="time_s", form="linear", middle=float(f"{time_s.mean():.3g}"))
-        yield replace(port, covariate="time_s", form="step", constant="start", grid=_step_times_s(time_s))
-        if not port.per_link and port.port != "tool":  # a tool that swings looks like an instrument that does
-            yield replace(port, covariate="time_s", form="periodic", constant="period", grid=_periods_s(time_s))
+            if _repeats_along(port, form) and (grid or form not in CONSTANTS):
+                yield _term(port, time, form, grid)
     if aligned.model is None:
         return
-    link_ports = [port for port in ports if port.port == "link"]
-    for name, middle, form in _link_covariates(aligned):
-        for port in link_ports:
-            yield replace(port, covariate=name, form=form, middle=middle)
+    for port in ports:
+        if port.port == "link":
+            for name, middle, form in _link_covariates(aligned, rows):
+                yield replace(port, covariate=name, form=form, middle=middle)
+
+
+def _terms_of(
+    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray, *, timed: bool
+) -> Iterator[EmpiricalTerm]:
+    """Every form of one covariate at every port; timed : whether the rows have times, which a lag needs."""
+    grids: dict[str, tuple[float, ...]] = {"linear": ()}
+    for form in FORMS_BY_KIND[covariate.kind]:
+        if covariate.distinct >= FEWEST_VALUES.get(form, 2):
+            grids[form] = _grid(form, covariate, residual_um)
+    for form, grid in grids.items():
+        for port in ports:
+            if _repeats_along(port, form) and (grid or form not in CONSTANTS) and (timed or form != "lagged"):
+                yield _term(port, covariate, form, grid)
+            if form == "lagged" and port.port == "link":  # expansion is proportional to length
+                yield _term(port, covariate, "strain", ())
+
+
+def _grid(form: str, covariate: SearchCovariate, residual_um: FloatArray) -> tuple[float, ...]:
+    if form == "knee":
+        return knees(covariate)
+    if form == "periodic":
+        return periods(covariate, residual_um)
+    return LAGS_S if form == "lagged" else ()
+
+
+def _term(port: EmpiricalTerm, covariate: SearchCovariate, form: str, grid: tuple[float, ...]) -> EmpiricalTerm:
+    return replace(port, covariate=covariate.name, form=form, middle=covariate.middle, span=covariate.span, grid=grid)
+
+
+def _repeats_along(port: EmpiricalTerm, form: str) -> bool:
+    """A tool that swings looks like an instrument that does, and links that swing apart like a machine that does."""
+    return form != "periodic" or not (port.per_link or port.port == "tool")
 
 
 def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
     """Where terms may act, without covariate and form: at the reference, and of a known machine at links and tool."""
     if aligned.model is not None:
-        yield EmpiricalTerm("", "", "link", 0.0)
-        yield EmpiricalTerm("", "", "link", 0.0, per_link=True)
+        yield EmpiricalTerm("", "", "link", 0.0, 0.0)
+        yield EmpiricalTerm("", "", "link", 0.0, 0.0, per_link=True)
         if not aligned.of_links:
-            yield EmpiricalTerm("", "", "tool", 0.0, axes=("x", "y", "z"))
+            yield EmpiricalTerm("", "", "tool", 0.0, 0.0, axes=("x", "y", "z"))
     if aligned.model is None or not aligned.of_links:
-        yield EmpiricalTerm("", "", "reference", 0.0, axes=tuple("xyz"[axis] for axis in aligned.axes[:3]))
+        axes = tuple("xyz"[axis] for axis in aligned.axes[:3])
+        fitted_along = aligned.registration_columns.shape[2] > 0
+        yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=not fitted_along)
 
 
-def _machine_covariates(aligned: AlignedRecording) -> Iterator[tuple[str, FloatArray]]:
-    """Measured quantities and the position of the tip."""
-    yield from aligned.recording.quantities.items()
-    if np.isfinite(aligned.rows.tip_M_mm).all(axis=1).any():
-        for axis in range(3):
-            yield f"tip_{'xyz'[axis]}_mm", aligned.rows.tip_M_mm[:, axis]
-
-
-def _link_covariates(aligned: AlignedRecording) -> Iterator[tuple[str, float, str]]:
+def _link_covariates(aligned: AlignedRecording, rows: BoolArray) -> Iterator[tuple[str, float, str]]:
     """Covariates that each link has of its own, with their middle and form."""
-    rows = aligned.rows
+    machine, reasons = aligned.rows, untried_quantities(aligned)
     links_by_quantity: dict[tuple[str, str], set[int]] = {}
     for name in aligned.recording.quantities:
-        if match := _LINK.match(name):
+        # one link's quantity may have stayed the same: the others' did not
+        if (match := _LINK.match(name)) and reasons.get(name, STAYED_THE_SAME) == STAYED_THE_SAME:
             links_by_quantity.setdefault((match["what"], match["unit"]), set()).add(int(match["link"]))
     for (what, unit), links in links_by_quantity.items():
-        if links >= set(range(1, rows.links + 1)):
-            values = [rows.quantity(f"{what}_link_{i + 1}_{unit}") for i in range(rows.links)]
+        if links >= set(range(1, machine.links + 1)):
+            values = [machine.quantity(f"{what}_link_{i + 1}_{unit}")[rows] for i in range(machine.links)]
             name = "temperature_link" if (what, unit) == ("temperature", "degC") else f"{what}_link_{unit}"
-            yield name, float(f"{np.nanmean(values):.3g}"), "linear"
+            yield name, round_middle(np.array(values)), "linear"
     yield "direction", 0.0, "proportional"
     yield "velocity_mm_per_s", 0.0, "proportional"
     if {"force_x_N", "force_y_N", "force_z_N"} <= set(aligned.recording.quantities):
-        yield "axial_force_N", float(f"{np.nanmean(rows.axial_force_N):.3g}"), "linear"
-
-
-def _varies(values: FloatArray, most_empty: float) -> bool:
-    """Whether a covariate is known in enough rows and not constant."""
-    known = values[np.isfinite(values)]
-    return len(known) >= (1 - most_empty) * len(values) > 0 and float(np.ptp(known)) > 1e-9 * max(1.0, float(known[0]))
-
-
-def _knees(column: FloatArray) -> tuple[float, ...]:
-    places = np.quantile(column[np.isfinite(column)], np.linspace(0, 1, KNEES + 2)[1:-1])
-    return tuple(float(f"{place:.4g}") for place in np.unique(places))
-
-
-def _step_times_s(time_s: FloatArray) -> tuple[float, ...]:
-    times_s = np.quantile(time_s, np.linspace(0, 1, STEP_TIMES + 2)[1:-1])
-    return tuple(float(step_time_s) for step_time_s in np.unique(times_s))
-
-
-def _periods_s(time_s: FloatArray) -> tuple[float, ...]:
-    """Periods that differ by half a turn over the recording: closer ones look the same there."""
-    span_s = float(np.ptp(time_s))
-    shortest_s = ROWS_PER_PERIOD * max(float(np.median(np.diff(time_s))), span_s / 1e5)
-    count = int(min(2 * span_s / shortest_s, MOST_PERIODS + 1))
-    return tuple(2 * span_s / turns for turns in range(2 * FEWEST_TURNS, max(count, 2 * FEWEST_TURNS + 1)))
+        yield "axial_force_N", round_middle(machine.axial_force_N[rows]), "linear"

@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.least_squares import solve_least_squares
-from compd.diagnosis.measurement_plan import LEAST_SEPARATION, MeasurementPlan
+from compd.diagnosis.measurement_plan import MeasurementPlan
 from compd.diagnosis.programme_rows import ProgrammeRows, at_rows
 from compd.diagnosis.t_optimal import Predictions, RivalRefit, choose_programmes
 from compd.model.effect import ConstantValues, Effect, FittedEffect
@@ -43,7 +43,7 @@ class MeasurementPlanner:
 
         planner = MeasurementPlanner(aligned, (), sigma_um, possible)
         spring, contact = planner.contender(fitted_spring), planner.contender(fitted_contact)
-        plan = planner.plan([(spring, contact), (contact, spring)], rows=30)
+        plan = planner.plan([(spring, contact), (contact, spring)], 30)
     """
 
     def __init__(
@@ -97,11 +97,6 @@ class MeasurementPlanner:
             left = float(((y - A @ theta) ** 2).sum())
             trials.append((left, FittedEffect(effect, theta[: columns.shape[2]], trial)))
         return self.contender(min(trials, key=lambda pair: pair[0])[1])
-
-    def separable(self, contest: Contest) -> bool:
-        """Whether all possible rows together would tell the two apart."""
-        refit, _ = self._refit(contest)
-        return refit.discrepancy_with_all() >= LEAST_SEPARATION**2
 
     def plan(self, contests: Sequence[Contest], most_rows: int, separated_by: str = "") -> MeasurementPlan:
         """At most so many rows, on which the truth of each contest differs most from its rival.

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, step_times_s
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.errors import Problem, RecordingError
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -26,9 +26,6 @@ from compd.recording.plan_file import plan_row
 PLACES_PER_EDGE = 3
 # Loads as shares of the largest: a straight line and a curve differ in the middle.
 LOADS = (1 / 6, 1 / 2, 1.0)
-# Travel after a reversal: the distance over which an error builds up is not known, so from what a scale resolves to
-# a hand's width.
-REVERSALS_MM = (0.02, 0.1, 0.5, 2.0, 10.0, 30.0)
 # Speeds as shares of the fastest.
 SPEEDS = (0.25, 1.0)
 ROW_EVERY_S = 30.0
@@ -103,20 +100,22 @@ def machine_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     possible = list(_programmes(aligned, limits, names))
     observations = _observe_programmes(aligned.model, aligned.rows.constants, possible, aligned)
     purposes = [programme.purpose for programme in possible for _ in range(len(programme))]
-    held = (
-        zip(*(observations.quantities[name].tolist() for name in names), strict=True) if names else [()] * len(purposes)
+    # lists, of which single numbers are taken faster than of arrays
+    time_s, tip_M_mm, direction = (
+        values.tolist() for values in (observations.time_s, observations.tip_M_mm, observations.direction)
     )
+    speed_mm_per_s = np.abs(observations.velocity_mm_per_s).max(axis=1).tolist()
+    held = {name: observations.quantities[name].tolist() for name in names}
     to_set = [
-        plan_row(purpose, time_s, tip_M_mm, dict(zip(names, values, strict=True)), direction, speed_mm_per_s)
-        for purpose, time_s, tip_M_mm, values, direction, speed_mm_per_s in zip(
-            purposes,
-            observations.time_s.tolist(),
-            observations.tip_M_mm.tolist(),
-            held,
-            observations.direction.tolist(),
-            np.abs(observations.velocity_mm_per_s).max(axis=1).tolist(),
-            strict=True,
+        plan_row(
+            purpose,
+            time_s[k],
+            tip_M_mm[k],
+            {name: values[k] for name, values in held.items()},
+            direction[k],
+            speed_mm_per_s[k],
         )
+        for k, purpose in enumerate(purposes)
     ]
     return ProgrammeRows(observations, np.array([len(programme) for programme in possible]), to_set)
 
@@ -178,8 +177,7 @@ def _motion_programmes(middle: FloatArray, n: int, limits: ProgrammeLimits) -> I
     half_edge_mm = (limits.tip_high_M_mm - limits.tip_low_M_mm) / 2
     for axis in range(3):
         unit = np.eye(3)[axis]
-        travels_mm = [travel for travel in REVERSALS_MM if travel <= half_edge_mm[axis]]
-        path_mm = np.array([0.0, *(sign * travel for travel in travels_mm for sign in (1.0, -1.0))])
+        path_mm = reversals_mm(half_edge_mm[axis])
         count = len(path_mm)
         # the directions of the links follow from their lengths, once these are known
         yield Programme(

@@ -72,8 +72,11 @@ def next_measurement(
     found : the effect as fitted.  rival : taken with the numbers by which it imitates `found` best.
     sigma_um : (m,) noise; where more is left than noise, what is left.
     constants : nonlinear constants of the rival; None for those of its grid by which it imitates best.
+    Of a rival of which a quantity was not measured, the words say what to measure.
     """
     effects = [found.effect, rival]
+    if problems := _unmet(aligned, rival):
+        return _gauges_to_add(effects, problems)
     try:
         possible = _programmes(aligned, effects, model)
     except CompdError as error:
@@ -81,7 +84,7 @@ def next_measurement(
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
     first = planner.contender(found)
     second = planner.imitation(first, rival, constants)
-    return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)))
+    return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)), effects)
 
 
 def measurement_of_constant(
@@ -96,8 +99,7 @@ def measurement_of_constant(
 
     causes : effects that make nothing but a constant on the recording.  constant_um : (m,) the constant.
     Each cause is taken with the numbers by which it imitates the constant best, and contends with every other one and
-    with what is constant everywhere, such as the zero of the instrument. Two causes that no rows within the limits part
-    are left out.
+    with what is constant everywhere, such as the zero of the instrument. Two that no such rows part are left out.
     """
     try:
         possible = _programmes(aligned, causes, model)
@@ -106,11 +108,11 @@ def measurement_of_constant(
     planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False)
     constant = planner.constant(constant_um)
     contenders = [constant, *(planner.imitation(constant, cause) for cause in causes)]
-    contests = [contest for contest in permutations(contenders, 2) if planner.separable(contest)]
+    contests = [pair for pair in permutations(contenders, 2) if planner.plan([pair], rows).tells_apart]
     if not contests:
-        names = tuple(cause.id for cause in causes)
-        return NextMeasurement(names, None, _words(causes), "they remain the same constant on all of them")
-    return _rows_or_words(planner.plan(contests, rows, _words(causes)))
+        why = "on all of them these remain one constant, but for less than the noise"
+        return NextMeasurement(_ids(causes), None, _words(causes), why)
+    return _rows_or_words(planner.plan(contests, rows, _words(causes)), causes)
 
 
 def measurement_to_test(
@@ -125,15 +127,11 @@ def measurement_to_test(
     Words where a quantity is not measured or stayed as it was; rows where the effect would be seen on them, at half of
     its largest plausible size.
     """
-    names = (effect.id,)
-    problems = unmet_needs(effect, aligned.rows.available, aligned.rows.links)
-    if problems:
-        measure = "; ".join(dict.fromkeys(problem.next_step for problem in problems))
-        return NextMeasurement(names, None, measure, "; ".join(problem.what for problem in problems))
-    unvaried = _unvaried(aligned, effect)
-    if unvaried:
+    if problems := _unmet(aligned, effect):
+        return _gauges_to_add([effect], problems)
+    if unvaried := _unvaried(aligned, effect):
         stayed = ", ".join(f"{name} stayed at {value:g}" for name, value in unvaried.items())
-        return NextMeasurement(names, None, f"vary {', '.join(unvaried)}", stayed)
+        return NextMeasurement((effect.id,), None, f"vary {', '.join(unvaried)}", stayed)
     try:
         possible = _programmes(aligned, [effect], model)
     except CompdError as error:
@@ -148,7 +146,7 @@ def measurement_to_test(
         )
         for constants in effect.constant_grid(aligned.rows)
     ]
-    return _rows_or_words(max(plans, key=lambda plan: plan.separation))
+    return _rows_or_words(max(plans, key=lambda plan: plan.separation), [effect])
 
 
 def _programmes(
@@ -194,22 +192,36 @@ def _unvaried(aligned: AlignedRecording, effect: Effect) -> dict[str, float]:
     return values
 
 
+def _unmet(aligned: AlignedRecording, effect: Effect) -> list[Problem]:
+    return unmet_needs(effect, aligned.rows.available, aligned.rows.links)
+
+
+def _gauges_to_add(effects: Sequence[Effect], problems: Sequence[Problem]) -> NextMeasurement:
+    measure = "; ".join(dict.fromkeys(problem.next_step for problem in problems))
+    why = "; ".join(f"{problem.where} {problem.what}" for problem in problems)
+    return NextMeasurement(_ids(effects), None, measure, why)
+
+
+def _ids(effects: Sequence[Effect]) -> tuple[str, ...]:
+    return tuple(effect.id for effect in effects)
+
+
 def _words(effects: Sequence[Effect]) -> str:
     """What tells the effects from others, as they say it themselves."""
-    return "; ".join(dict.fromkeys(effect.separated_by for effect in effects))
+    return "; ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
 
 
 def _words_alone(effects: Sequence[Effect], error: CompdError) -> NextMeasurement:
-    return NextMeasurement(tuple(effect.id for effect in effects), None, _words(effects), error.problems[0].what)
+    return NextMeasurement(_ids(effects), None, _words(effects), error.problems[0].what)
 
 
-def _rows_or_words(plan: MeasurementPlan) -> NextMeasurement:
+def _rows_or_words(plan: MeasurementPlan, effects: Sequence[Effect]) -> NextMeasurement:
     """The plan where it is worth measuring; else what is, and why, in words."""
     if plan.tells_apart:
-        return NextMeasurement(plan.rivals, plan)
+        return NextMeasurement(_ids(effects), plan)
     if plan.separation < LEAST_SEPARATION:
         why = f"the best {len(plan.rows)} rows make a difference of {as_factor(plan.separation)} times the noise"
         why += f", and it takes {LEAST_SEPARATION:.2g}"
     else:
         why = f"the best {len(plan.rows)} rows add little to a difference of {as_factor(plan.before)} times the noise"
-    return NextMeasurement(plan.rivals, None, plan.separated_by, why)
+    return NextMeasurement(_ids(effects), None, plan.separated_by, why)

@@ -16,6 +16,9 @@ from compd.model.observations import Observations
 WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)
 # The step itself takes a second: no instant, and short beside all that is watched.
 STEP_S = 1.0
+# Travel after a reversal: the distance over which an error builds up is not known, so from what a scale resolves to
+# a hand's width.
+REVERSALS_MM = (0.02, 0.1, 0.5, 2.0, 10.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,12 @@ def programme_starts(lengths: IntArray) -> BoolArray:
 def step_times_s(watched_s: float) -> FloatArray:
     """Times of the rows of a step that is watched so long: one before it, then one for each of WAITS."""
     return np.array([0.0, *(STEP_S + watched_s * share for share in WAITS)])
+
+
+def reversals_mm(most_mm: float) -> FloatArray:
+    """A path about 0 that turns back after growing travels, of `most_mm` at most."""
+    travels_mm = [travel for travel in REVERSALS_MM if travel <= most_mm]
+    return np.array([0.0, *(sign * travel for travel in travels_mm for sign in (1.0, -1.0))])
 
 
 def at_rows(aligned: AlignedRecording, rows: Observations) -> AlignedRecording:

@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
-from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, step_times_s
+from compd.diagnosis.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.errors import CompdError, Problem
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities
@@ -45,9 +45,9 @@ class _Programmes(NamedTuple):
 def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], limits: SettingLimits) -> ProgrammeRows:
     """Settings of the columns that `effects` are computed from, within the limits.
 
-    A grid of all settings, one row each. Where an effect remembers, also steps of one setting that are watched; where
-    one changes with time, the same settings again later. Where an effect is computed from derivatives of the external
-    model's prediction, which are known where that was computed, the recorded rows again.
+    A grid of all settings, one row each. Where an effect remembers, also reversals of a link, and steps of one setting
+    that are watched; where one changes with time, the same settings again later. Where an effect is computed from
+    derivatives of the external model's prediction, which are known where that was computed, the recorded rows again.
 
     limits : by column, where they are not those of the recording.
     Raises CompdError where a limit is given for a column that none of the effects is computed from, or leaves no value.
@@ -62,6 +62,8 @@ def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     settings = settings_of({name: recorded[name][usable] for name in names}, limits)
     programmes = [_grid(settings)] if settings else []
     if any(effect.remembers for effect in effects):
+        programmes += _reversals(settings, aligned.rows.links)
+    if any(effect.remembers and "time" in effect.needs for effect in effects):
         programmes += _watched_steps(settings)
     if any("time" in effect.needs for effect in effects):
         programmes += [_later(settings, watched_s) for watched_s in WATCHED_S]
@@ -81,12 +83,19 @@ def _column_names(aligned: AlignedRecording, effects: Sequence[Effect]) -> list[
 
 
 def _depends_on(effect: Effect, rows: Observations, field: str, k: int) -> bool:
-    """Whether what an effect does changes with column k of an array of the observations."""
+    """Whether what an effect does changes with column k of an array of the observations.
+
+    That is another number in each row, because some effects follow what changes from row to row.
+    """
     moved: dict[str, Any] = {field: np.array(getattr(rows, field))}
-    moved[field][:, k] += 1.0
-    constants = effect.constant_grid(rows)[0]
-    (here, _), (there, _) = (effect.basis(known, constants, None) for known in (rows, replace(rows, **moved)))
-    return not np.array_equal(here, there, equal_nan=True)
+    moved[field][:, k] += 1.0 + np.arange(len(rows))
+    grid = effect.constant_grid(rows)
+    # at one end of its grid an effect may be so quick or so short that it forgets everything between two rows
+    for constants in (grid[0], grid[-1]):
+        (here, _), (there, _) = (effect.basis(known, constants, None) for known in (rows, replace(rows, **moved)))
+        if not np.array_equal(here, there, equal_nan=True):
+            return True
+    return False
 
 
 def _motion_names(rows: Observations) -> dict[str, Sequence[str]]:
@@ -150,6 +159,22 @@ def _watched_steps(settings: Sequence[Setting]) -> list[_Programmes]:
                 purpose = f"a step of {setting.name}, watched"
                 steps.append(_Programmes(purpose, np.array([len(time_s)]), time_s, columns))
     return steps
+
+
+def _reversals(settings: Sequence[Setting], links: int) -> list[_Programmes]:
+    """Reversals of one link in growing steps, the others in the middle, where its place and its direction are set."""
+    by_name = {setting.name: setting for setting in settings}
+    reversals = []
+    for scale, approach in zip(scale_columns(links), approach_columns(links), strict=True):
+        if scale in by_name and approach in by_name:
+            place = by_name[scale]
+            path_mm = reversals_mm((place.values[-1] - place.values[0]) / 2)
+            others = _in_the_middle([other for other in settings if other.name not in (scale, approach)], len(path_mm))
+            columns = others | place.columns((place.values[0] + place.values[-1]) / 2 + path_mm)
+            columns |= by_name[approach].columns(np.sign(np.diff(path_mm, prepend=-1.0)))
+            purpose = f"reversals of {scale} in growing steps"
+            reversals.append(_Programmes(purpose, np.array([len(path_mm)]), np.zeros(len(path_mm)), columns))
+    return reversals
 
 
 def _later(settings: Sequence[Setting], after_s: float) -> _Programmes:

@@ -70,11 +70,6 @@ class RivalRefit:
         normal, score = self._normal + self._normals, self._score + self._scores
         return np.asarray(self._square + self._squares - (score * self._solve(normal, score)).sum(axis=-1))
 
-    def discrepancy_with_all(self) -> float:
-        """T after adding every programme once: more than any choice among them can reach without repeats."""
-        normal, score = self._normal + self._normals.sum(axis=0), self._score + self._scores.sum(axis=0)
-        return float(self._square + self._squares.sum() - score @ self._solve(normal, score))
-
     def add(self, k: int) -> None:
         """Add the rows of programme k."""
         self._normal = self._normal + self._normals[k]

@@ -10,8 +10,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult, registration_beside
+from compd.comparison.fit import FitResult
 from compd.comparison.least_squares import normal_inverse
+from compd.comparison.nuisance import nuisance_beside
 from compd.diagnosis.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.units import UM_PER_MM
@@ -56,7 +57,8 @@ def with_disturbances(
         return result
     own_um = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in result.fitted]
     own = np.concatenate(own_um, axis=2)
-    A = _whitened(np.concatenate([own, registration_beside(aligned, own, result.used)], axis=2), result, sigma_um)
+    nuisance = nuisance_beside(aligned, result.fitted, own, result.used)
+    A = _whitened(np.concatenate([own, nuisance], axis=2), result, sigma_um)
     inverse = normal_inverse(A, RANK_CUT)
     added = np.zeros((A.shape[1], A.shape[1]))
     variance = criteria.disturbance**2

@@ -117,6 +117,9 @@ class Constant:
         The values that a search tries, in `unit`; two of them are a choice, with nothing between them.
     setting : str
         Name of the machine's setting that gives the value, which is then not searched; ``""`` for none.
+    period_of : str
+        Of a period, the quantity that it is a period of, as a formula names it (``"scale_mm"``, a measured column):
+        other periods than those of the grid are then looked for in a residual. ``""`` for what is no period.
     """
 
     name: str
@@ -126,6 +129,7 @@ class Constant:
     source: str
     grid: tuple[float, ...]
     setting: str = ""
+    period_of: str = ""
 
     @property
     def choice(self) -> bool:
@@ -176,6 +180,10 @@ class Effect:
         What the effect is not linear in.
     remembers : bool
         A row's value depends on earlier rows; memory goes in and comes out.
+    unknown_states : tuple of int
+        Which arrays of the memory nobody knows when a session begins, by their place: what a body had in it then.
+        These states are fitted along, for each session of a recording. The memory of a lag is (time, x, y), of which
+        y is unknown: 2.
     follows_reading : bool
         What it adds depends on its comparators' own readings.
     registration : bool
@@ -215,6 +223,7 @@ class Effect:
     basis: Basis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
+    unknown_states: tuple[int, ...] = ()
     follows_reading: bool = False
     registration: bool = False
     declared: str | Mapping[str, Any] = ""

@@ -83,7 +83,9 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
     """
     problems = [
         Problem(
-            where=f"effect {effect.id}", what=f"needs {name}, which no gauge measures", next_step=_gauge_to_add(name)
+            where=f"effect {effect.id}",
+            what=f"needs {name}, which no gauge measures",
+            next_step=_gauge_to_add(name, "kinematics" in available),
         )
         for name in _missing_quantities(effect, available, links)
     ]
@@ -135,6 +137,9 @@ def _missing_quantities(effect: Effect, available: Collection[str], links: int) 
     return [name for name in needed_quantities(effect, links) if name not in available and name not in enough]
 
 
-def _gauge_to_add(name: str) -> str:
+def _gauge_to_add(name: str, wired: bool) -> str:
+    """What to do where a quantity is missing. wired : whether compd can read the machine's gauges."""
     gauge = _GAUGE_OF_QUANTITY.get(name.partition("_")[0], "a gauge")
+    if not wired:
+        return f"read {gauge} along and record a column `{name}`"
     return f"wire {gauge} under `wiring: quantities:` as `name: {name}`, or record a column of that name"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -119,6 +119,17 @@ class Recording:
     def rows(self) -> int:
         """N."""
         return len(self.time_s)
+
+    def select(self, index: IntArray) -> Recording:
+        """The rows of this index (R,), in its order."""
+        chosen: dict[str, Any] = {}
+        for column in fields(self):
+            value = getattr(self, column.name)
+            if isinstance(value, np.ndarray):
+                chosen[column.name] = value[index]
+            elif column.name in ("quantities", "columns"):
+                chosen[column.name] = {name: values[index] for name, values in value.items()}
+        return replace(self, **chosen)
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:

@@ -61,6 +61,7 @@ INTERNAL = (
     "columns",
     "gauge_objects",
     "predicted_mm",
+    "propagated",
     "registration_columns",
     "sensitivity",
     "state",

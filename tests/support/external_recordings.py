@@ -30,7 +30,8 @@ def record_external(
 ) -> AlignedRecording:
     """A recording, written and read: what was measured besides, and the error along each axis to which noise is added.
 
-    columns : without `time_s` a row is measured every ten seconds.  model_mm : the prediction by axis; 0 if left out.
+    columns : without `time_s` a row is measured every ten seconds; nan is an empty cell.
+    model_mm : the prediction by axis; 0 if left out.
     """
     rng = np.random.default_rng(seed)
     count = len(next(iter(errors_um.values())))
@@ -39,7 +40,8 @@ def record_external(
         predicted_mm = np.zeros(count) if model_mm is None else model_mm[axis]
         table[f"model_{axis}_mm"] = predicted_mm
         table[f"reference_{axis}_mm"] = predicted_mm + 1e-3 * (error_um + rng.normal(0, sigma_um, count))
-    lines = [",".join(table), *(",".join(f"{value:.9g}" for value in row) for row in zip(*table.values(), strict=True))]
+    lines = [",".join(table)]
+    lines += [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     reference = {"quantity": "tool_position", "frame": frame, "sigma_um": sigma_um}
     path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": "external", "reference": reference}))

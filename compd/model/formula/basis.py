@@ -79,6 +79,11 @@ def sensitivity_columns(name: str, port: Port) -> str:
     return _SENSITIVITY_COLUMNS[port].format(name=name)
 
 
+def lagged_states(lags: int) -> tuple[int, ...]:
+    """Where in the memory of a formula with so many lags what is behind each of them stands."""
+    return tuple(3 * i + 2 for i in range(lags))
+
+
 def _lag_states(memory: Memory, lags: int) -> tuple[tuple[FloatArray, ...] | None, ...]:
     """The states of so many lags, three arrays each, from an effect's memory."""
     return tuple(None if memory is None else memory[3 * i : 3 * i + 3] for i in range(lags))

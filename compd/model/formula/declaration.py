@@ -15,6 +15,7 @@ from compd.model.formula.basis import (
     SENSITIVITY_PORTS,
     VECTORS,
     formula_basis,
+    lagged_states,
     sensitivity_basis,
     sensitivity_columns,
 )
@@ -22,6 +23,7 @@ from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK,
 from compd.model.formula.evaluator import NUMBERS, Formula
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
 from compd.model.formula.parser import LARGEST_EXPONENT, parse_together
+from compd.model.formula.periods import find_periods
 
 # How many values of a nonlinear parameter are tried within its plausible range.
 GRID = 9
@@ -70,6 +72,7 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
     linear = [name for name in declaration.parameters if name not in constants]
     per_link = [name for name in linear if declaration.parameters[name].per == "link"]
     columns = dict.fromkeys(name for formula in parsed for name in formula.columns)
+    periods = {name: column for formula in parsed for name, column in find_periods(formula).items()}
     return _effect(
         declaration,
         equation=_equation(declaration),
@@ -79,8 +82,9 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
         basis=formula_basis(
             dict(zip(texts, parsed, strict=True)), declaration.port, TO_MM[declaration.gives], linear, per_link
         ),
-        constants=tuple(_constant(name, declaration.parameters[name]) for name in constants),
+        constants=tuple(_constant(name, declaration.parameters[name], periods.get(name, "")) for name in constants),
         remembers=any(formula.lags for formula in parsed),
+        unknown_states=lagged_states(sum(formula.lags for formula in parsed)),
     )
 
 
@@ -215,10 +219,11 @@ def _parameter_problems(declaration: FormulaDeclaration, formulas: tuple[Formula
     return problems
 
 
-def _constant(name: str, parameter: FormulaParameter) -> Constant:
+def _constant(name: str, parameter: FormulaParameter, period_of: str) -> Constant:
     """A nonlinear parameter as a constant that is searched: evenly, or in equal ratios over more than a decade and a
     half."""
     low, high = parameter.plausible
     wide = low > 0 and high / low >= 30
     grid = np.geomspace(low, high, GRID) if wide else np.linspace(low, high, GRID)
-    return Constant(name, parameter.unit, low, high, parameter.source, tuple(float(value) for value in grid))
+    values = tuple(float(value) for value in grid)
+    return Constant(name, parameter.unit, low, high, parameter.source, values, period_of=period_of)

@@ -72,7 +72,7 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient, ppm/K",
             "l_i": "length of link i, mm",
-            "y_i": "warming of the rod in link i, K; dT_link_i at the start of a session",
+            "y_i": "warming of the rod in link i, K; fitted along at the start of a session, dT_link_i in the daemon",
             "dT_link_i": "temperature of link i above 20 degC, K",
             "tau": "time constant of warming up, s",
         },
@@ -93,6 +93,7 @@ EFFECTS = (
             ),
         ),
         remembers=True,
+        unknown_states=(2,),
     ),
     Effect(
         id="link_elasticity",

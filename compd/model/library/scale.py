@@ -104,7 +104,16 @@ EFFECTS = (
         separated_by="twenty steps of a twentieth of a period on one link; what looks like noise repeats",
         basis=memoryless_basis(_cyclic),
         constants=(
-            Constant("p", "mm", 0.0001, 10, "periods of scales on the market", PERIODS_MM, "scale_signal_period_mm"),
+            Constant(
+                "p",
+                "mm",
+                0.0001,
+                10,
+                "periods of scales on the market, pitches of screws",
+                PERIODS_MM,
+                setting="scale_signal_period_mm",
+                period_of="scale_mm",
+            ),
         ),
     ),
     Effect(

@@ -153,6 +153,17 @@ def test_an_untestable_effect_is_told_which_gauge_it_needs(tmp_path: Path) -> No
     assert "no gauge measures" in answer.why
 
 
+def test_a_rival_whose_thermometer_is_missing_is_parted_by_that_thermometer(tmp_path: Path) -> None:
+    whole = record_with_effects(tmp_path / "run.csv", 1, {"link_expansion": (1.0,)}, visits=60)
+    aligned = without_columns(whole, tmp_path / "less.csv", "temperature_tool")
+    found, _ = fit_rivals(aligned, "link_expansion", "link_zero")
+    answer = next_measurement(aligned, (), found, LIBRARY["tool_expansion"], SIGMA_UM)
+    assert answer.effects == ("link_expansion", "tool_expansion")
+    assert answer.plan is None
+    assert "temperature_tool_degC" in answer.measure
+    assert "tool_expansion needs temperature_tool_degC" in answer.promise
+
+
 def test_an_effect_that_is_not_excited_gets_rows_that_excite_it(tmp_path: Path) -> None:
     aligned = record_with_effects(tmp_path / "run.csv", 1, {}, visits=60)
     answer = measurement_to_test(aligned, (), LIBRARY["backlash"], SIGMA_UM)

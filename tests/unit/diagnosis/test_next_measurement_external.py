@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import compd
 from compd.arrays import FloatArray
+from compd.cli.measurements.plan import plan as plan_command
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import fit, initial_effect
-from compd.diagnosis.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
+from compd.diagnosis.next_measurement import (
+    measurement_of_constant,
+    measurement_to_test,
+    next_measurement,
+    plan_measurement,
+)
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
+from compd.model.formula.declaration import formula_effect
+from compd.model.library import load_library
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 
 ROWS = 60
@@ -162,22 +173,47 @@ def test_what_changes_with_time_is_measured_again_later(tmp_path: Path) -> None:
 
 def test_derivatives_of_the_model_are_planned_at_recorded_rows(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
-    columns = {
-        "angle_deg": rng.uniform(0, 90, ROWS),
-        "d_radius_x_mm": rng.normal(size=ROWS),
-        "d_offset_x_mm": rng.normal(size=ROWS),
-    }
-    aligned = record_external(tmp_path / "arm.csv", columns, {"x": 3 * columns["d_radius_x_mm"]})
-    radius, offset = (along("x", name, f"k * d_{name}_x_mm") for name in ("radius", "offset"))
-    plan = compd.plan_measurement(aligned, ("radius", "offset"), effects=[radius, offset], rows=6)
+    names = ("radius", "offset")
+    columns = {f"d_{name}_{axis}_mm": rng.normal(size=ROWS) for name in names for axis in "xy"}
+    columns["angle_deg"] = rng.uniform(0, 90, ROWS)
+    errors = {axis: 3 * columns[f"d_radius_{axis}_mm"] for axis in "xy"}
+    aligned = record_external(tmp_path / "arm.csv", columns, errors)
+    parameters = {"k": {"unit": "um", "plausible": [-1, 1], "source": "a test"}}
+    effects = [
+        formula_effect({"id": name, "port": "reference", "sensitivity": name, "parameters": parameters}, "a test")
+        for name in names
+    ]
+    plan = compd.plan_measurement(aligned, names, effects=effects, rows=6)
+    assert len(plan.rows) == 6
     for row in plan.rows:
         number = int(row["purpose"].split()[1])
         assert row["purpose"] == f"row {number} of arm.csv again"
         assert row["angle_deg"] == pytest.approx(columns["angle_deg"][number - 2])
         assert not any(name.startswith("d_") for name in row)
-    limits = {"angle_deg": (0.0, 45.0)}
-    with pytest.raises(CompdError, match="limit of angle_deg"):
-        compd.plan_measurement(aligned, ("radius", "offset"), effects=[radius, offset], rows=6, limits=limits)
+
+
+def test_links_of_an_external_model_are_reversed_in_growing_steps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    scale = rng.uniform(0, 80, ROWS)
+    approach = rng.choice([-1.0, 1.0], ROWS)
+    reference = scale + 1e-3 * (2 * approach + rng.normal(0, SIGMA_UM, ROWS))
+    table = np.stack([10.0 * np.arange(ROWS), scale, approach, scale, reference], axis=1)
+    header = "time_s,scale_1_mm,approach_1,model_link_1_mm,reference_link_1_mm"
+    np.savetxt(tmp_path / "axis.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
+    sidecar = f"{{machine: external, reference: {{quantity: link_length, sigma_um: {SIGMA_UM}}}}}"
+    (tmp_path / "axis.yaml").write_text(sidecar)
+    aligned = compd.open_recording(tmp_path / "axis.csv")
+    play, friction = (
+        FittedEffect(load_library()[name], np.array([2.0]), constants)
+        for name, constants in (("backlash", {}), ("friction_hysteresis", {"d": 5.0, "r": 0.0}))
+    )
+    plan = plan_measurement(aligned, (), (friction, play), sigma_um(aligned), {}, rows=26)
+    assert plan.tells_apart
+    reversals = [row for row in plan.rows if row["purpose"] == "reversals of scale_1_mm in growing steps"]
+    assert {row["approach_1"] for row in reversals} == {-1, 1}
+    assert len({row["scale_1_mm"] for row in reversals}) > 10
+    loaded = compd.plan_measurement(aligned, ("backlash", "scale_gain"), rows=8)
+    assert all(scale.min() <= row["scale_1_mm"] <= scale.max() for row in loaded.rows)
 
 
 def test_places_are_set_where_the_instruments_frame_is_fitted_along(tmp_path: Path) -> None:
@@ -246,7 +282,7 @@ def test_an_effect_without_its_column_is_told_what_to_record(tmp_path: Path) -> 
     wind = along("y", "wind", "k * wind_m_per_s")
     answer = measurement_to_test(aligned, (), wind, sigma_um(aligned))
     assert answer.plan is None
-    assert "wind_m_per_s" in answer.measure
+    assert answer.measure == "read a gauge along and record a column `wind_m_per_s`"
     assert "wind_m_per_s" in answer.why
 
 
@@ -278,3 +314,45 @@ def test_the_plans_file_has_the_settings(tmp_path: Path) -> None:
         rows = list(csv.DictReader(stream))
     assert list(rows[0]) == ["row", "purpose", "time_s", "moved_1", "tip_x_mm"]
     assert {row["moved_1"] for row in rows} == {"-1", "1"}
+
+
+EFFECTS = """\
+- {id: tube, port: reference, axis: y, formula: "k * cos(elevation_deg * pi / 180)", separated_by: the horizon,
+   parameters: {k: {unit: um, plausible: [-100, 100], source: a test}}}
+- {id: angle, port: reference, axis: y, formula: "k / sin(elevation_deg * pi / 180)", separated_by: the zenith,
+   parameters: {k: {unit: um, plausible: [-100, 100], source: a test}}}
+"""
+
+
+def run_plan(tmp_path: Path, *options: str) -> Any:
+    telescope(tmp_path / "sky.csv")
+    (tmp_path / "own.yaml").write_text(EFFECTS, encoding="utf-8")
+    commands = typer.Typer()
+    commands.command("plan")(plan_command)
+    arguments = [str(tmp_path / "sky.csv"), "--effects", str(tmp_path / "own.yaml"), "--rivals", "tube,angle"]
+    return CliRunner().invoke(commands, [*arguments, *options])
+
+
+def test_the_command_writes_the_settings_and_says_what_to_set(tmp_path: Path) -> None:
+    out = tmp_path / "next.csv"
+    result = run_plan(tmp_path, "--limit", "elevation_deg=20,85", "--rows", "12", "--out", str(out))
+    assert result.exit_code == 0, result.output
+    assert "tube and angle differ by" in result.output
+    assert "Set elevation_deg from 20 to 85." in result.output
+    lines = out.read_text().splitlines()
+    assert lines[0] == "row,purpose,time_s,elevation_deg"
+    assert len(lines) == 13
+
+
+def test_the_command_says_where_no_rows_within_the_limits_would_do(tmp_path: Path) -> None:
+    result = run_plan(tmp_path, "--rows", "4")
+    assert result.exit_code == 0, result.output
+    assert "Widen the limits" in result.output
+    assert "the horizon; the zenith" in result.output
+
+
+def test_the_command_refuses_a_limit_of_a_column_that_does_not_matter(tmp_path: Path) -> None:
+    result = run_plan(tmp_path, "--limit", "humidity_pct=20,85")
+    assert isinstance(result.exception, CompdError)
+    assert "limit of humidity_pct" in str(result.exception)
+    assert "elevation_deg" in str(result.exception)

@@ -1,4 +1,4 @@
-"""Which parameters are plausible: inside their range, or as much weaker as noise and nature allow, never the other way."""
+"""Which parameters are plausible: inside their range, or weaker than usual, but never of the other sign."""
 
 from __future__ import annotations
 

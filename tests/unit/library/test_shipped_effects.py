@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import compd
 from compd.model.effect import Effect
-from compd.model.observe import observe_tip
+from compd.model.motion import Movement
+from compd.model.observe import observe_external
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED
 
@@ -30,8 +32,15 @@ def moved_um(
     time_s = quantities.pop("time_s", None)
     count = max([len(np.atleast_2d(tip_mm)), *map(len, quantities.values())])
     time_s = np.arange(count, dtype=float) if time_s is None else time_s
-    rows = observe_tip(
-        np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3)), quantities, time_s, np.arange(count) == 0
+    no_links = np.zeros((count, 0))
+    rows = observe_external(
+        np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3)),
+        scale_mm=no_links,
+        movement=Movement.unknown(no_links, no_links),
+        quantities=quantities,
+        time_s=time_s,
+        session_start=np.arange(count) == 0,
+        recorded=frozenset(),
     )
     basis, _ = compd.load_effects(library)[id_].basis(rows, constants or {}, None)
     assert not basis[:, 2:].any()
@@ -105,7 +114,7 @@ def test_a_tube_droops_by_its_weight_across_it() -> None:
 @pytest.mark.parametrize("library", ["stage", "axis"])
 def test_reversal_is_the_way_up_less_the_way_down(library: str) -> None:
     """ISO 230-2: B is the deviation approached upwards less that approached downwards."""
-    up, down = moved_um(library, f"{library}_backlash", moved_1=[1.0, -1.0])[:, 0, 0]
+    up, down = moved_um(library, f"{library}_backlash", approach_1=[1.0, -1.0])[:, 0, 0]
     assert up - down == pytest.approx(1.0)
     assert up + down == pytest.approx(0.0)
 
@@ -115,7 +124,7 @@ def test_a_wrong_lead_and_a_screw_that_winds_up_grow_with_the_travel(library: st
     gain = moved_um(library, f"{library}_gain", tip_mm=[[0.0, 0, 0], [500.0, 0, 0]])[:, 0, 0]
     assert gain == pytest.approx([0.0, 0.5]), "half a metre at 1 um/m"
     places = [[0.0, 0, 0], [500.0, 0, 0], [500.0, 0, 0]]
-    windup = moved_um(library, f"{library}_windup", tip_mm=places, moved_1=[1.0, 1.0, -1.0])[:, 0, 0]
+    windup = moved_um(library, f"{library}_windup", tip_mm=places, approach_1=[1.0, 1.0, -1.0])[:, 0, 0]
     assert windup == pytest.approx([0.0, 0.5, -0.5])
 
 
@@ -135,9 +144,8 @@ def test_a_cyclic_error_repeats_after_a_turn(library: str) -> None:
 
 def test_a_reading_20_ms_old_is_behind_a_moving_axis() -> None:
     """At 30 mm/s the axis has moved on by 0.6 mm."""
-    assert 20.0 * moved_um("axis", "axis_latency", speed_mm_per_s=[30.0, -30.0])[:, 0, 0] == pytest.approx(
-        [600.0, -600.0]
-    )
+    behind = moved_um("axis", "axis_latency", velocity_1_mm_per_s=[30.0, -30.0])[:, 0, 0]
+    assert 20.0 * behind == pytest.approx([600.0, -600.0])
 
 
 def test_a_steel_screw_grows_from_where_it_is_held() -> None:
@@ -189,12 +197,17 @@ def test_a_plate_turned_grown_and_drilled_askew() -> None:
 # --- real machines ---------------------------------------------------------------------------------------------------
 
 
-def fit_um(name: str, library: str, ids: list[str]) -> tuple[dict[str, float], Floats]:
-    """Plain least squares on a real recording: the numbers by name, and the residual (N, m), um."""
+def fit_um(name: str, library: str, ids: list[str], **renamed: str) -> tuple[dict[str, float], Floats]:
+    """Plain least squares on a real recording: the numbers by name, and the residual (N, m), um.
+
+    renamed : columns that the recording has under another name.
+    """
     path = REAL / f"{name}.csv"
     if not path.exists():
         pytest.skip(f"no real recordings: {path} is not there")
     aligned = compd.open_recording(path)
+    quantities = {renamed.get(column, column): values for column, values in aligned.rows.quantities.items()}
+    aligned = replace(aligned, rows=replace(aligned.rows, quantities=quantities))
     effects: list[Effect] = [compd.load_effects(library)[id_] for id_ in ids]
     residual_um = (aligned.measured_mm - aligned.predicted_mm({})) * 1e3
     columns_um = np.concatenate([aligned.columns(effect, {}) * 1e3 for effect in effects], axis=2)
@@ -226,6 +239,7 @@ def test_a_drilled_plate_is_explained_by_all_four() -> None:
 
 
 def test_a_stage_is_explained_by_zero_play_and_lead() -> None:
-    numbers, left_um = fit_um("slit-stage-11358-1", "stage", ["stage_offset", "stage_backlash", "stage_gain"])
+    ids = ["stage_offset", "stage_backlash", "stage_gain"]
+    numbers, left_um = fit_um("slit-stage-11358-1", "stage", ids, moved_1="approach_1")
     assert 0.1 < abs(numbers["B"]) < 2.6
     assert rms(left_um) < 0.13

@@ -54,7 +54,7 @@ def test_a_recording_with_gaps_filled_keeps_its_own_values(tmp_path: Path) -> No
     room = np.arange(120.0)
     room[7] = NAN
     aligned = open_recording(write_external(tmp_path, {**columns, "temperature_room_degC": room}))
-    whole = aligned.with_gaps_filled()
+    whole = aligned.gaps_filled
     assert whole.rows.quantities["temperature_room_degC"][7] in (6.0, 8.0)
     assert np.isnan(aligned.rows.quantities["temperature_room_degC"][7])
     assert np.isnan(whole.recording.quantities["temperature_room_degC"][7])

@@ -1,0 +1,78 @@
+"""Nuisance terms: what is fitted along with every model, because a recording cannot show it and no effect is to blame.
+
+They are where an instrument's frame lies, or the constant of each coordinate of an external model (`registration`), and
+the states that nobody knew when a session began, of the model's effects with memory (`initial_states`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.initial_states import initial_state_columns
+from compd.comparison.least_squares import column_norms, solve_least_squares
+from compd.comparison.robust import robust_regression
+from compd.model.effect import FittedEffect
+from compd.units import UM_PER_MM
+
+# What is fitted along is an effect's own where the effect leaves less of it than this share.
+LEAST_SHARE = 1e-4
+
+
+class FittedAlong(NamedTuple):
+    """(N, m) what nuisance terms explain of a residual, um.
+
+    registration_um : the instrument's frame, or a constant.  states_um : unknown states at the start of sessions.
+    """
+
+    registration_um: FloatArray
+    states_um: FloatArray
+
+    @property
+    def total_um(self) -> FloatArray:
+        """Both together."""
+        return self.registration_um + self.states_um
+
+
+def nuisance_columns(aligned: AlignedRecording, effects: Sequence[FittedEffect]) -> FloatArray:
+    """(N, m, Q) by how many um each nuisance term moves the prediction: of the registration, then of the states."""
+    states = [initial_state_columns(aligned, effect.effect, effect.constants) for effect in effects]
+    return np.concatenate([aligned.registration_columns * UM_PER_MM, *states], axis=2)
+
+
+def nuisance_beside(
+    aligned: AlignedRecording, effects: Sequence[FittedEffect], own_um: FloatArray, use: BoolArray
+) -> FloatArray:
+    """(N, m, Q) nuisance columns in um without what the effects' own columns (N, m, P) make of them on the rows `use`.
+
+    An effect of the model that is nothing but a constant takes the constant; else the two would share it.
+    """
+    columns_um = nuisance_columns(aligned, effects)
+    if not columns_um.shape[2] or not own_um.shape[2] or not use.any():
+        return columns_um
+    A = own_um[use].reshape(-1, own_um.shape[2])
+    R = columns_um[use].reshape(len(A), -1)
+    norms = column_norms(R)
+    R = R / norms
+    _, sizes, combinations = np.linalg.svd(R - A @ solve_least_squares(A, R), full_matrices=False)
+    return np.asarray((columns_um / norms) @ combinations[sizes > LEAST_SHARE].T)
+
+
+def fit_along(
+    aligned: AlignedRecording, effects: Sequence[FittedEffect], residual_um: FloatArray, use: BoolArray
+) -> FittedAlong:
+    """What the nuisance terms explain of a residual (N, m), fitted to the rows `use` (N,) by robust regression.
+
+    Zeros where there are none, or where no row is left.
+    """
+    none = np.zeros_like(residual_um)
+    G = nuisance_columns(aligned, effects)
+    if not G.shape[2] or not use.any():
+        return FittedAlong(none, none)
+    theta = robust_regression(G[use], residual_um[use])
+    count = aligned.registration_columns.shape[2]
+    return FittedAlong(G[:, :, :count] @ theta[:count], G[:, :, count:] @ theta[count:])

@@ -1,0 +1,135 @@
+"""Periods of an effect that are not known in advance: the few that a residual suggests, beside the effect's grid.
+
+At a wrong period an effect with a period (`Constant.period_of`) explains nothing, and a screw of 1.37 mm pitch is on no
+grid of round numbers. So the residual is pulled back to the places where the effect acts, the links' scales for
+instance, by the pseudoinverse of the prediction's derivatives there. A periodogram of it against the quantity shows the
+strongest periods, and the effect's own columns decide between each of them and its double: a peak may be the second
+harmonic.
+
+Example::
+
+    found = promising_constants(library["scale_cyclic"], aligned, comparison.residual_um, comparison.used)
+    found.constants           # [{"p": 1.370}, {"p": 2.740}, ...], the one that explains most first
+    found.searched_parameters # 9: the best of 5000 periods fits noise about as nine parameters do
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.periodogram import PeriodLimits, strongest_periods
+from compd.model.deltas import port_size
+from compd.model.effect import Constant, ConstantValues, Effect
+from compd.model.formula.columns import column_values
+from compd.units import UM_PER_MM
+
+# Periods that are tried with the effect's own columns; more would be chance.
+PEAKS = 5
+# Periods that differ by so many turns over the range of the quantity are neighbours.
+QUARTER_TURN = 0.25
+# Fewer rows show no period.
+FEWEST_ROWS = 12
+
+
+class PromisingConstants(NamedTuple):
+    """What a search for periods found.
+
+    constants : values of the effect's nonlinear constants, the one that explains most first; none for an effect without
+        a period, and where the rows resolve none.
+    independent : among how many periods that do not resemble one another.
+    """
+
+    constants: list[dict[str, float]]
+    independent: int
+
+    @property
+    def searched_parameters(self) -> int:
+        """For how many fitted parameters the search counts: the best of M fits noise about as log M parameters do."""
+        return round(math.log(max(self.independent, 1)))
+
+
+def promising_constants(
+    effect: Effect, aligned: AlignedRecording, residual_um: FloatArray, rows: BoolArray, count: int = 3
+) -> PromisingConstants:
+    """The nonlinear constants, with a searched period, at which an effect explains most of a residual.
+
+    The machine's setting of a period, where there is one, is in the effect's own grid: what is found here may differ.
+
+    residual_um : (N, m) to explain.  rows : (N,) those that count.  count : how many to return at most.
+    """
+    constant = next((constant for constant in effect.constants if constant.period_of), None)
+    if constant is None:
+        return PromisingConstants([], 0)
+    others = [
+        {name: value for name, value in constants.items() if name != constant.name}
+        for constants in effect.constant_grid(aligned.rows)
+    ]
+    others = [dict(items) for items in dict.fromkeys(tuple(other.items()) for other in others)]
+    quantity, series, usable = _at_places(effect, constant, others[0], aligned, residual_um, rows)
+    if usable.sum() < FEWEST_ROWS:
+        return PromisingConstants([], 0)
+    limits = PeriodLimits(constant.low, constant.high)
+    search = strongest_periods(quantity, series, limits, PEAKS)
+    periods = [period for peak in search.periods for period in (peak, 2 * peak) if period <= constant.high]
+    trials = [{**other, constant.name: period} for period in periods for other in others]
+    trials.sort(key=lambda trial: -_explained_um2(effect, trial, aligned, residual_um, usable))
+    return PromisingConstants(trials[:count], search.independent)
+
+
+def neighbouring_periods(
+    effect: Effect, constant: Constant, aligned: AlignedRecording, period: float
+) -> tuple[float, float]:
+    """The periods a quarter of a turn away over the range of the quantity: there a period fits half as well at best."""
+    quantity = column_values(aligned.rows, constant.period_of, effect.ports[0])
+    turns = float(np.nanmax(quantity) - np.nanmin(quantity)) / period
+    share = min(QUARTER_TURN / max(turns, QUARTER_TURN), 0.5)
+    return period / (1 + share), period / (1 - share)
+
+
+def _at_places(
+    effect: Effect,
+    constant: Constant,
+    others: ConstantValues,
+    aligned: AlignedRecording,
+    residual_um: FloatArray,
+    rows: BoolArray,
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The quantity (R, S) or (R, 1), the residual in um (R, S) at the S places where the effect acts, and the R rows.
+
+    Of an effect with several ports, at the first.
+    """
+    port = effect.ports[0]
+    size = port_size(port, aligned.rows)
+    basis, _ = effect.basis(aligned.rows, {**others, constant.name: constant.high}, None)
+    acts = (np.nan_to_num(basis[:, :size]) != 0).any(axis=(0, 2))
+    one_each = np.broadcast_to(np.eye(basis.shape[1], size), (len(rows), basis.shape[1], size))
+    derivatives = aligned.propagated(effect, one_each)[:, :, acts]
+    quantity = column_values(aligned.rows, constant.period_of, port)
+    if quantity.shape[1] > 1:
+        quantity = np.repeat(quantity, size // quantity.shape[1], axis=1)[:, acts]
+    usable = (
+        rows
+        & np.isfinite(residual_um).all(axis=1)
+        & np.isfinite(quantity).all(axis=1)
+        & np.isfinite(derivatives).all(axis=(1, 2))
+    )
+    series = (np.linalg.pinv(derivatives[usable]) @ residual_um[usable, :, None])[:, :, 0]
+    return quantity[usable], series, usable
+
+
+def _explained_um2(
+    effect: Effect, constants: ConstantValues, aligned: AlignedRecording, residual_um: FloatArray, rows: BoolArray
+) -> float:
+    """Sum of squares of the residual that the effect explains beside constants and the instrument's frame."""
+    own_um = aligned.columns(effect, constants)[rows] * UM_PER_MM
+    level = np.broadcast_to(np.eye(residual_um.shape[1]), (len(own_um), *[residual_um.shape[1]] * 2))
+    A = np.concatenate([own_um, level, aligned.registration_columns[rows]], axis=2)
+    A = A.reshape(residual_um[rows].size, -1)
+    y = residual_um[rows].ravel()
+    return float(y @ y - np.sum((y - A @ solve_least_squares(A, y)) ** 2))

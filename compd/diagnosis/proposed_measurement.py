@@ -1,0 +1,59 @@
+"""What a diagnosis proposes to measure next: what would settle the first question that it leaves open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from compd.diagnosis.explanation import Explanation
+from compd.diagnosis.findings import EmpiricalFinding
+from compd.diagnosis.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
+from compd.diagnosis.problem import DiagnosisProblem
+from compd.diagnosis.verdict import Diagnosis
+
+# Covariates that the proposal names.
+MOST_COVARIATES = 2
+
+
+def propose_measurement(
+    problem: DiagnosisProblem, explanation: Explanation, diagnosis: Diagnosis
+) -> list[dict[str, Any]]:
+    """Rows, or words under `measure` and `why`: about rivals, else about an effect without its gauge, else about what
+    the residual follows, else about where a constant comes from.
+    """
+    aligned, candidates = problem.aligned, explanation.losses.candidates
+    fitted = diagnosis.after.fitted
+    for step in diagnosis.steps:
+        if step.rivals:
+            others = [effect for effect in fitted if effect is not step.fitted]
+            rival = candidates[step.rivals[0].member]
+            found = next_measurement(
+                aligned, others, step.fitted, rival.effect, problem.sigma_um, constants=rival.constants
+            )
+            return found.as_json()
+    by_id = {candidate.effect.id: candidate.effect for candidate in candidates if candidate.kind == "proxy"}
+    likely = [by_id[untested.effect] for untested in diagnosis.untested if untested.likely]
+    if likely:
+        return measurement_to_test(aligned, fitted, likely[0], problem.sigma_um).as_json()
+    if not problem.floor_known:
+        return [
+            {
+                "measure": "one point twice in a row, at ten places, with the same number in a column `visit`",
+                "why": "without repeats or a declared uncertainty nobody knows how much of the error is noise",
+            }
+        ]
+    follows = [finding for finding in diagnosis.depends_on if not finding.effect]
+    if follows:
+        return [_to_vary(finding) for finding in follows[:MOST_COVARIATES]]
+    constant = diagnosis.constant
+    causes = [candidate.effect for candidate in problem.same_as_nuisance]
+    if constant is not None and len(causes) > 1:
+        by_axis = problem.comparison.constant_um
+        return measurement_of_constant(aligned, fitted, causes, by_axis, problem.sigma_um).as_json()
+    return []
+
+
+def _to_vary(finding: EmpiricalFinding) -> dict[str, Any]:
+    return {
+        "measure": f"vary {finding.covariate} alone, everything else as it is, at three places and back again",
+        "why": f"the residual follows it ({finding.form}, at the {finding.port})",
+    }
