@@ -62,7 +62,7 @@ def weigh_rows(
         G = G[:, :, :m]
     theta = robust_regression(G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
     left = residual - G @ theta
-    judged = np.isfinite(left).all(axis=1)
+    judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
     scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)
     distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)

@@ -21,6 +21,7 @@ from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.regression import RegressionData, Regressors
 from compd.diagnosis.subset_losses import SubsetLosses
+from compd.recording.gaps import filled
 from compd.units import UM_PER_MM
 
 
@@ -215,9 +216,10 @@ def _everything(
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
     for values in (time_s, time_s**2, *aligned.recording.quantities.values()):
-        column = values[known]
+        without_gaps = filled(values, time_s)
+        column = without_gaps[known]
         if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
-            scaled = np.nan_to_num(values - column.mean()) / np.ptp(column)
+            scaled = np.nan_to_num(without_gaps - column.mean()) / np.ptp(column)
             columns.append(scaled[:, None, None] * np.eye(len(aligned.labels)))
     return columns
 

@@ -250,7 +250,8 @@ def test_rows_count_in_the_order_of_time(tmp_path: Path) -> None:
     assert np.array_equal(recording.row, np.arange(21, 1, -1))
     assert recording.columns.keys() == sorted_file.columns.keys()
     assert all(np.array_equal(values, sorted_file.columns[name]) for name, values in recording.columns.items())
-    assert recording.scale_mm is not None and np.array_equal(recording.scale_mm, sorted_file.scale_mm)
+    assert recording.scale_mm is not None
+    assert np.array_equal(recording.scale_mm[:, 0], sorted_file.columns["scale_1_mm"])
     assert "column time_s (A), rows 3, 4, 5 and 16 more rows: time runs backwards" in str(recording.warnings[0])
 
 
