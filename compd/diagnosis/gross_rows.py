@@ -59,7 +59,7 @@ def weigh_rows(
     G = np.concatenate([constant, *columns], axis=2)[known]
     if G.shape[2] > MOST_COLUMNS * G.shape[0] * m:
         G = G[:, :, :m]
-    theta = robust_regression(G, residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
+    theta = robust_regression(G, residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale)
     left = np.full(residual.shape, np.nan)
     left[known] = residual[known] - G @ theta
     scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)

@@ -57,11 +57,22 @@ def test_gross_rows_neither_hide_one_another_nor_raise_the_scale() -> None:
     assert np.flatnonzero(weigh(residual).gross).tolist() == sorted(bad.tolist())
 
 
+def test_gross_rows_beside_effects_that_are_not_known_yet() -> None:
+    """A run of 18 rows of 240, and nothing but the effects' columns to tell them by."""
+    rng = np.random.default_rng(6)
+    columns = np.stack([rng.choice([-1.0, 1.0], 240), rng.uniform(0, 1, 240)], axis=1)[:, None, :]
+    residual = rng.standard_normal((240, 1)) + columns @ [6.0, 4.0]
+    residual[100:118, 0] += rng.normal(70, 20, 18)
+    weights = weigh_rows([columns], residual, np.ones(240, dtype=bool), None, 1.0, CRITERIA)
+    assert np.flatnonzero(weights.gross).tolist() == list(range(100, 118))
+
+
 def test_beyond_the_full_weight_it_falls_as_one_over_the_distance() -> None:
     residual = noise(1)
-    residual[7], residual[8] = 4.0, 0.1
-    weights = weigh(residual)
-    assert weights.weight[7] / weights.weight[8] == pytest.approx(2.0 / 4.0, rel=0.1)
+    residual[[7, 8, 9], 0] = 3.0, 4.2, 0.1
+    weight = weigh(residual).weight
+    assert weight[7] / weight[8] == pytest.approx(4.2 / 3.0, rel=0.02)
+    assert weight[9] == weight.max() == pytest.approx(1 / consistency(1, 2.0))
 
 
 def test_what_columns_explain_is_not_gross() -> None:
