@@ -72,6 +72,15 @@ def test_with_the_constant_an_effect_may_do_what_it_cannot_do_alone() -> None:
     assert rival.name == "link_elasticity"
 
 
+def test_what_the_constant_does_as_well_has_no_rivals_but_those_that_do_it_alone() -> None:
+    """Anything at all and the constant would do."""
+    shift = candidate("shift", CONSTANT @ np.ones((COORDINATES, 1)))
+    constant = candidate("constant", CONSTANT, np.inf, kind="constant")
+    y = noise(4) + 3.0
+    losses = subset_losses(y, [shift, candidate("other", A, effect=ELASTICITY), constant])
+    assert find_rivals(losses, (0,), 0) == ()
+
+
 def test_descriptions_and_the_constant_are_no_rivals_and_proxies_are() -> None:
     y = noise(4) + 1.5 * a
     others = [description("d", A), candidate("change", A, kind="change"), candidate("constant", A, kind="constant")]
