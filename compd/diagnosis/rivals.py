@@ -21,7 +21,8 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         L_other - L <= rival_share (L_without - L)
         l_other - l <= effect_price   or   L_other - L <= least_sigmas std(L_other - L)
 
-    Where the constant alone takes most of it, no effect is tried with the constant: any would do.
+    With the constant an effect counts where it gains its price beside the constant: what the constant does alone, any
+    effect does with it.
 
     An effect with more parameters that contains the member as a special case is bound to do about as well; for it the
     price is no excuse. Effects that on these rows do the same are always rivals, however far above the floor.
@@ -30,11 +31,12 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
     rest = tuple(k for k in members if k != member)
     loss, without = losses.loss(members), losses.loss(rest)
     constant = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "constant"]
-    most = loss + criteria.rival_share * (without - loss)
     substitutes = _substitutes(losses, rest, member)
     sets = {(*rest, k): k for k in substitutes}
-    if constant and constant[0] not in members and losses.loss((*rest, constant[0])) > most:
+    by_constant = float("inf")
+    if constant and constant[0] not in members:
         sets |= {(*rest, k, constant[0]): k for k in substitutes}
+        by_constant = losses.loss((*rest, constant[0]))
     by_key = {tuple(sorted(key)): (key, k) for key, k in sets.items()}
     rivals: list[Rival] = []
     for subset in sorted(losses.evaluate(sets), key=losses.score):
@@ -42,7 +44,10 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         name = losses.candidates[k].effect.id
         if name in [rival.name for rival in rivals]:
             continue
-        if subset.cv_loss > most:
+        if subset.cv_loss - loss > criteria.rival_share * (without - loss):
+            continue
+        with_constant = len(key) > len(members)
+        if with_constant and losses.log_loss(by_constant) - losses.log_loss(subset.cv_loss) < losses.price(k):
             continue
         more_general = losses.candidates[k].parameter_count > losses.candidates[member].parameter_count
         excess, std = losses.gain(members, key)
