@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 
 # Micrometres in a millimetre: what people read is in um, what is computed in mm.
 UM_PER_MM = 1e3
@@ -44,6 +45,7 @@ _OTHERS = (
 KNOWN_UNITS = frozenset([*(unit for kind in UNIT_KINDS for unit in kind), *_TEMPERATURES, *_OTHERS])
 
 
+@cache
 def unit_of(name: str) -> str:
     """The longest known unit in which `name` ends; "" if it ends in none. Example: "flow_l_per_min" -> "l_per_min"."""
     units = [unit for unit in KNOWN_UNITS if name.endswith(f"_{unit}")]

@@ -27,7 +27,7 @@ from compd.model.motion import Movement
 from compd.model.observations import Observations
 from compd.model.observe import observe
 from compd.model.prediction import predict
-from compd.model.sensitivity import Sensitivity, effect_sensitivity, sensitivities
+from compd.model.sensitivity import Sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
 from compd.recording.gaps import filled
 from compd.recording.recording import Recording, UsableRows
@@ -117,11 +117,15 @@ class AlignedRecording:
 
     def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:
         """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
+        added = split_by_port(effect, self.rows, basis)
         if self.model is None:
-            added = split_by_port(effect, self.rows, basis)
             return external_change(added, self.axes, self.of_links)
-        derivatives = effect_sensitivity(effect, self.rows, basis, self.sensitivity(effect.ports))
-        return (derivatives.link_length if self.of_links else derivatives.tip)[:, list(self.axes)]
+        by_port = self.sensitivity(effect.ports)
+        changes = [
+            (by_port[port].link_length if self.of_links else by_port[port].tip)[:, list(self.axes)] @ values
+            for port, values in added.items()
+        ]
+        return np.asarray(sum(changes[1:], start=changes[0]))
 
     @cached_property
     def registration_columns(self) -> FloatArray:

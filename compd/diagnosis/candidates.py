@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.period_search import promising_constants
 from compd.diagnosis.criteria import Criteria
 from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_needs import unmet_needs
@@ -92,6 +93,22 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
         else:
             candidates += variants
     return CandidatePool(tuple(candidates), untestable)
+
+
+def periodic_candidates(
+    aligned: AlignedRecording, effects: Iterable[Effect], residual_um: FloatArray, rows: BoolArray
+) -> list[Candidate]:
+    """Effects with a period, at the periods that a residual suggests.
+
+    residual_um : (N, m).  rows : (N,) those that count.
+    """
+    candidates = []
+    for effect in effects:
+        promising = promising_constants(effect, aligned, residual_um, rows)
+        candidates += [
+            variant(effect, constants, aligned, promising.searched_parameters) for constants in promising.constants
+        ]
+    return candidates
 
 
 def searched_parameters(effect: Effect, grid: Sequence[ConstantValues]) -> int:

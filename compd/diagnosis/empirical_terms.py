@@ -31,8 +31,8 @@ _LINK = re.compile(r"^(?P<what>[a-z][a-z0-9_]*)_link_(?P<link>\d+)_(?P<unit>[A-Z
 # In which forms a residual may follow a covariate beside linear: only what warms or wets a body arrives late, only
 # along a way or an angle something repeats, stops and comes taut.
 FORMS_BY_KIND: Mapping[Kind, tuple[str, ...]] = {
-    "place": ("square", "knee", "periodic"),
-    "angle": ("square", "knee", "periodic"),
+    "place": ("square", "periodic"),
+    "angle": ("square", "periodic"),
     "load": ("square", "knee"),
     "flow": ("square", "lagged"),
     "other": ("square",),

@@ -102,20 +102,18 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
         competitors.screen_beside(library, basis)
     progress("effects against descriptions")
     losses = problem.losses(competitors.candidates)
-    forward_search(losses)
-    best = forward_search(losses, best.members)
+    best = _search_all(losses, best.members)
     fits = competitors.screen_beside(losses, best.members)
     if len(competitors.candidates) > len(losses.candidates):
         losses = problem.losses(competitors.candidates)
-        best = forward_search(losses, best.members)
+        best = _search_all(losses, best.members)
     return Explanation(losses, _ordered(losses, best.members), fits, competitors.fit_by_place)
 
 
 def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Progress) -> Explanation:
     """The same search on rows that are weighed anew, among the candidates that were promising before."""
     losses = problem.losses(before.losses.candidates)
-    forward_search(losses)
-    best = forward_search(losses, before.members)
+    best = _search_all(losses, before.members)
     if not losses.describes and not (problem.floor_known and best.cv_loss <= problem.criteria.most_at_floor):
         return explain(problem, progress)
 
@@ -125,6 +123,17 @@ def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Prog
     fit_by_place = {k: replace(fit, values=losses.values[k]) for k, fit in before.fit_by_place.items()}
     fits = tuple(weighed(fit) for fit in before.fits)
     return Explanation(losses, _ordered(losses, best.members), fits, fit_by_place)
+
+
+def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
+    """The best set of effects and descriptions: from the best set of effects, from nothing, and from another set."""
+    effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
+    best = forward_search(losses, among=effects)
+    if not losses.describes:
+        return forward_search(losses, start)
+    for begin in dict.fromkeys([best.members, (), start]):
+        best = forward_search(losses, begin)
+    return best
 
 
 def _search_library(problem: DiagnosisProblem) -> tuple[SubsetLosses, Subset]:

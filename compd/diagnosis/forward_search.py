@@ -14,7 +14,7 @@ FURTHER = 2
 MOST_RANKED = 400
 
 
-def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
+def forward_search(losses: SubsetLosses, start: Collection[int] = (), among: Collection[int] | None = None) -> Subset:
     """The set with the best score of which every member is needed and every number plausible.
 
     From `start` the candidate is added with which the set scores best; then each member is exchanged for any other
@@ -24,14 +24,16 @@ def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
     3.3.2 and 7.10.)
 
     start : places of candidates to begin with; the empty set is always among those that are compared.
+    among : places of the candidates that may be added; None for all.
     """
+    allowed = range(len(losses.candidates)) if among is None else among
     current = _best(losses, [tuple(start)]) or Subset((), losses.baseline)
     best_score, stale = losses.score(current), 0
     while len(current.members) < MOST_MEMBERS and stale < FURTHER:
-        grown = _best(losses, ((*current.members, k) for k in _others(losses, current.members)))
+        grown = _best(losses, ((*current.members, k) for k in _others(losses, current.members, allowed)))
         if grown is None:
             break
-        current = _exchanged(losses, grown)
+        current = _exchanged(losses, grown, allowed)
         score = losses.score(current)
         stale = 0 if score < best_score else stale + 1
         best_score = min(best_score, score)
@@ -41,27 +43,29 @@ def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
 def best_acceptable(losses: SubsetLosses) -> Subset:
     """Of all sets that were evaluated the best plausible one, without the members that it does not need.
 
-    A description is no cause where effects do about as well: a set of effects alone counts if it scores within an
-    effect's price of the best one. In a set with descriptions, in turn, an effect is no cause where a description does
-    better in its place, at the same price and by more than may be chance.
+    A description is no cause where effects do about as well: of the sets that score within an effect's price of the
+    best one, that with the fewest descriptions counts. In a set with descriptions, in turn, an effect is no cause where
+    a description does better in its place, at the same price and by more than may be chance.
     """
     best: Subset | None = None
+    least_score = float("inf")
     ranked: dict[frozenset[str], Subset] = {}
     for subset in losses.scored:
         ranked.setdefault(frozenset(losses.name(k) for k in subset.members), subset)
         if len(ranked) >= MOST_RANKED:
             break
     for subset in ranked.values():
-        if best is not None and losses.score(subset) > losses.score(best) + losses.criteria.effect_price:
+        if losses.score(subset) > least_score + losses.criteria.effect_price:
             break
-        if best is not None and losses.described(subset.members):
+        if best is not None and len(losses.described(subset.members)) >= len(losses.described(best.members)):
             continue
         needed = _pruned(losses, subset) if losses.is_plausible(subset.members) else None
         if needed is None or not losses.is_plausible(needed.members):
             continue
-        if not losses.described(needed.members):
-            return needed
-        best = best or needed
+        best = needed
+        least_score = min(least_score, losses.score(needed))
+        if not losses.described(best.members):
+            return best
     return _proven(losses, best) if best else Subset((), losses.baseline)
 
 
@@ -93,14 +97,14 @@ def _proven(losses: SubsetLosses, subset: Subset) -> Subset:
     return subset
 
 
-def _exchanged(losses: SubsetLosses, subset: Subset) -> Subset:
+def _exchanged(losses: SubsetLosses, subset: Subset, allowed: Collection[int]) -> Subset:
     """The set after exchanging members one by one while that lowers the score."""
     gained = True
     while gained:
         gained = False
         for member in subset.members:
             rest = tuple(k for k in subset.members if k != member)
-            other = _best(losses, ((*rest, k) for k in _others(losses, rest) if k != member))
+            other = _best(losses, ((*rest, k) for k in _others(losses, rest, allowed) if k != member))
             if other is not None and losses.score(other) < losses.score(subset) - 1e-9:
                 subset, gained = other, True
                 break
@@ -129,10 +133,10 @@ def _rest(losses: SubsetLosses, subset: Subset, member: int) -> tuple[tuple[int,
     return rest, losses.loss(rest)
 
 
-def _others(losses: SubsetLosses, members: Collection[int]) -> list[int]:
+def _others(losses: SubsetLosses, members: Collection[int], allowed: Collection[int]) -> list[int]:
     """Candidates that can be added: no two choices of one effect's constants."""
     names = {losses.name(k) for k in members}
-    return [k for k in range(len(losses.candidates)) if losses.name(k) not in names]
+    return [k for k in allowed if losses.name(k) not in names]
 
 
 def _best(losses: SubsetLosses, sets: Iterable[tuple[int, ...]]) -> Subset | None:

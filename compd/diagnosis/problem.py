@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import orth
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -20,6 +21,26 @@ from compd.diagnosis.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.regression import RegressionData, Regressors
 from compd.diagnosis.subset_losses import SubsetLosses
 from compd.units import UM_PER_MM
+
+
+class Projection:
+    """Takes out of columns what others explain, and scales the rest up for the degrees of freedom that this costs."""
+
+    def __init__(self, columns: FloatArray) -> None:
+        """columns : (R, m, Q) what is taken out."""
+        flat = columns.reshape(-1, columns.shape[2])
+        self._q = orth(flat) if flat.size else flat
+        self._scale = float(np.sqrt(len(flat) / max(len(flat) - self.count, 1)))
+
+    @property
+    def count(self) -> int:
+        """How many independent columns are taken out."""
+        return int(self._q.shape[1])
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """The projection of (R, m, P) or (R, m)."""
+        flat = values.reshape(len(self._q), -1)
+        return np.asarray(self._scale * (flat - self._q @ (self._q.T @ flat)).reshape(values.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +58,7 @@ class DiagnosisProblem:
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
     residual : (N, m) whitened, 0 where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
+    start : what is projected out of these and of all candidates; None for nothing.
     """
 
     comparison: Comparison
@@ -52,6 +74,7 @@ class DiagnosisProblem:
     residual: FloatArray
     nuisance: FloatArray
     data: RegressionData
+    start: Projection | None = None
 
     @property
     def aligned(self) -> AlignedRecording:
@@ -70,7 +93,35 @@ class DiagnosisProblem:
 
     def whiten(self, columns_um: FloatArray) -> FloatArray:
         """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
-        return np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
+        values = np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
+        return values if self.start is None else self.start(values)
+
+    @property
+    def states(self) -> int:
+        """How many unknown numbers were projected out."""
+        return 0 if self.start is None else self.start.count
+
+    def without(self, columns_um: FloatArray) -> DiagnosisProblem:
+        """The problem with what some columns (N, m, Q) in um can explain projected out of everything."""
+        columns = columns_um / self.sigma_um[:, None]
+        start = Projection(self.whiten(columns_um))
+        nuisance = self.data.nuisance
+        return replace(
+            self,
+            nuisance=np.concatenate([self.nuisance, columns], axis=2),
+            data=replace(
+                self.data, y=start(self.data.y), nuisance=Regressors(start(nuisance.values), nuisance.largest)
+            ),
+            start=start,
+        )
+
+    def residual_beside_um(self, losses: SubsetLosses, members: Sequence[int]) -> FloatArray:
+        """(N, m) what some members, fitted on the rows that count, leave; nan where a row does not count."""
+        columns = [losses.candidates[k].columns_um / self.sigma_um[:, None] for k in members]
+        G = np.concatenate([self.nuisance, *columns], axis=2)
+        theta, _, _ = losses.equations.estimate(losses.index(members))
+        left = (self.residual - G[:, :, : len(theta)] @ theta) * self.sigma_um
+        return np.where(self.rows[:, None], left, np.nan)
 
     def losses(self, candidates: Sequence[Candidate]) -> SubsetLosses:
         """Of all sets of these candidates."""

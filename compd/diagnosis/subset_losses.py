@@ -96,7 +96,7 @@ class SubsetLosses:
         new = [key for key in keys if key not in self._losses]
         if new:
             testable = np.array([self._testable[list(members)].all(axis=0) for members in new])
-            losses = self.equations.cv_losses([self._index(members) for members in new], testable)
+            losses = self.equations.cv_losses([self.index(members) for members in new], testable)
             self._losses.update(zip(new, losses.tolist(), strict=True))
         return [Subset(key, self._losses[key]) for key in keys if np.isfinite(self._losses[key])]
 
@@ -137,7 +137,7 @@ class SubsetLosses:
 
         The covariance is scaled by the mean square left where that is above the noise floor.
         """
-        theta, covariance, left = self.equations.estimate(self._index(members))
+        theta, covariance, left = self.equations.estimate(self.index(members))
         covariance = covariance * max(left, self._least_loss)
         estimates, begin = [], len(self._nuisance_index)
         for k in members:
@@ -184,7 +184,7 @@ class SubsetLosses:
         largest = [nuisance.largest, *(self.candidates[k].largest for k in members)]
         return Regressors(np.concatenate(values, axis=2), np.concatenate(largest))
 
-    def _index(self, members: Iterable[int]) -> IntArray:
+    def index(self, members: Iterable[int]) -> IntArray:
         """Columns of a set among the normal equations, the nuisance columns first."""
         return np.concatenate([self._nuisance_index, *(self._indices[k] for k in members)]).astype(np.int64)
 
@@ -193,7 +193,7 @@ class SubsetLosses:
         key = tuple(sorted(members))
         if key in self._by_row:
             return self._by_row[key]
-        index = self._index(key)
+        index = self.index(key)
         columns = np.concatenate([self.data.nuisance.values, *(self.values[k] for k in key)], axis=2)
         losses = np.zeros(len(self.data.y))
         testable = np.asarray(self._testable[list(key)].all(axis=0))

@@ -47,11 +47,13 @@ def measures(results: Sequence[Result]) -> list[Measure]:
     can_be = [result for result in named if reaches(result, "true_floor_ratio")]
     covered = [inside for result in named for _, inside in scoring.intervals(result)]
     took_s = [result["took_s"] for result in results]
+    rivals = [len(step["rivals"]) for result in library for step in scoring.steps(result)]
     bound = _percent([reaches(result, "true_floor_ratio") for result in named])
     return [
         _share("right effect named first, error 1 to 6 times the floor", library, named_first, ">= 97 %"),
         _share("the same, constants not taken as one family", library, named_first_exactly, ""),
         _share("right effect named or among the rivals", library, named_or_rival, "100 %"),
+        Measure("rivals of a named effect: median, 95 %", len(rivals), _median("", rivals), ""),
         _share("an effect named that is not there", library, named_wrongly, ""),
         _share("two hidden effects, both named or among the rivals", of["pair"], named_or_rival, ">= 90 %"),
         _share("nothing hidden: says adequate", of["nothing"], is_adequate, ">= 98 %"),
@@ -65,7 +67,7 @@ def measures(results: Sequence[Result]) -> list[Measure]:
             "all",
         ),
         Measure("95 % interval holds the true parameter", len(covered), _percent(covered), "93-97 %"),
-        Measure("processor time of a diagnosis: median, 95 %", len(took_s), _times(took_s), "<= 5 s"),
+        Measure("processor time of a diagnosis: median, 95 %", len(took_s), _median(" s", took_s), "<= 5 s"),
     ]
 
 
@@ -117,5 +119,6 @@ def _percent(values: Sequence[bool]) -> str:
     return f"{100 * float(np.mean(values)):.0f} %" if len(values) else "-"
 
 
-def _times(took_s: Sequence[float]) -> str:
-    return f"{np.median(took_s):.1f} s, {np.quantile(took_s, 0.95):.1f} s" if len(took_s) else "-"
+def _median(unit: str, values: Sequence[float]) -> str:
+    """Median and 95 % quantile."""
+    return ", ".join(f"{np.quantile(values, share):.2g}{unit}" for share in (0.5, 0.95)) if values else "-"

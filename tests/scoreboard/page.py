@@ -111,7 +111,7 @@ def said_lines(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"a constant of {_numbers(list(constant['um'].values()))} um: {' or '.join(constant['effects'])}")
     for entry in verdict["depends_on"][:SHOWN]:
         what = entry.get("effect") or entry.get("covariate")
-        when = f" at {entry['time_s']:.0f} s" if "time_s" in entry else ""
+        when = "" if entry.get("time_s") is None else f" at {entry['time_s']:.0f} s"
         lines.append(f"the rest follows {what}: {entry['form']}{when}")
     return lines
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import yaml
 
+from compd.configuration.shipped import shipped_effects
 from tests.scoreboard.expectation import Expectation
 from tests.support.paths import SHARED
 
 PLACE = SHARED / "real"
 FAMILY = "real"
-HERE = Path(__file__).parent
 # "... with ia ie an aw in the model": effects that the model has already.
 _WITH, _IN_THE_MODEL = " with ", " in the model"
 # Where nobody planted anything, any word but these may be right if the answers do not say.
@@ -37,8 +37,7 @@ def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> 
     for suffix in (".csv", ".yaml"):
         _link(place / f"{recording}{suffix}", directory / f"train{suffix}")
     if library := entry.pop("library"):
-        own = HERE / f"{library}-effects.yaml"
-        _link(own if own.exists() else place / library, directory / "effects.yaml")
+        _link(shipped_effects().get(library, place / library), directory / "effects.yaml")
     known = model.removesuffix(_IN_THE_MODEL).split()
     if known:
         (directory / "known.json").write_text(json.dumps(known), encoding="utf-8")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tests.scoreboard.cases import CONSTANT_CAUSES
 from tests.scoreboard.expectation import Expectation
 
 # Two-sided 95 % of a normal distribution.
@@ -132,12 +134,22 @@ def _change_missing(result: Result, expected: Expectation) -> list[str]:
     change = expected.change
     if change is None:
         return []
-    entries = [entry for entry in result["verdict"]["depends_on"] if entry.get("form") == "change"]
-    right = [entry for entry in entries if entry.get("effect") in change.effects]
-    if not right:
+    reported = [_reported_change(entry) for entry in result["verdict"]["depends_on"]]
+    times_s = [time_s for effects, time_s in reported if time_s is not None and effects & set(change.effects)]
+    if not times_s:
         return [f"does not say that {' or '.join(change.effects)} changes"]
-    off = min(_share_between(result["times_s"], change.time_s, entry["time_s"]) for entry in right)
+    off = min(_share_between(result["times_s"], change.time_s, time_s) for time_s in times_s)
     return [f"the time of the change is off by {100 * off:.0f} % of the rows"] if off > CHANGE_WITHIN else []
+
+
+def _reported_change(entry: Mapping[str, Any]) -> tuple[set[str], float | None]:
+    """(effects that may have changed, when) by an entry of `depends_on`; a step in time is a constant that begins."""
+    if entry.get("form") == "change":
+        return {entry["effect"]}, entry["time_s"]
+    step = re.search(r"time_s - ([\d.]+)", (entry.get("formula_effect") or {}).get("formula", ""))
+    if entry.get("form") == "step" and step:
+        return set(CONSTANT_CAUSES), float(step[1])
+    return set(), None
 
 
 def _share_between(times_s: list[float], first_s: float, second_s: float) -> float:

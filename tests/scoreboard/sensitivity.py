@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import Field, fields, is_dataclass, replace
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ UNCHANGED = "as it is"
 
 
 class Variant(NamedTuple):
-    """A threshold, "comparison.outlier_sigmas" for one of the comparison's, and what is done to it."""
+    """A threshold, and what is done to it."""
 
     name: str
     change: str
@@ -64,13 +64,8 @@ def main() -> None:
 
 
 def thresholds() -> dict[str, Field[Any]]:
-    """Every number of `Criteria` by its name, those of the comparison too."""
-    numbers: dict[str, Field[Any]] = {}
-    for field in fields(Criteria):
-        value = getattr(Criteria(), field.name)
-        inner = fields(value) if is_dataclass(value) else ()
-        numbers |= {f"{field.name}.{part.name}": part for part in inner} if inner else {field.name: field}
-    return numbers
+    """Every number of `Criteria` by its name."""
+    return {field.name: field for field in fields(Criteria)}
 
 
 def variants() -> list[Variant]:
@@ -79,20 +74,11 @@ def variants() -> list[Variant]:
 
 
 def changed(variant: Variant) -> Criteria:
-    """The criteria with this variant. Of a confidence above one half its distance from 1 is halved or doubled."""
-    criteria: Any = Criteria()
+    """The criteria with this variant."""
     if not variant.name:
         return Criteria()
-    *outer, name = variant.name.split(".")
-    owner: Any = getattr(criteria, outer[0]) if outer else criteria
-    value, factor = getattr(owner, name), FACTORS[variant.change]
-    if thresholds()[variant.name].metadata["unit"] == "probability" and value > 0.5:
-        new: float = 1 - (1 - value) * factor
-    else:
-        new = max(1, round(value * factor)) if isinstance(value, int) else value * factor
-    owner = replace(owner, **{name: new})
-    changed_criteria: Criteria = replace(criteria, **{outer[0]: owner}) if outer else owner
-    return changed_criteria
+    value: float = getattr(Criteria(), variant.name)
+    return replace(Criteria(), **{variant.name: value * FACTORS[variant.change]})
 
 
 def run_variant(trial: Trial) -> dict[str, Any]:

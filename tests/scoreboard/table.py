@@ -14,7 +14,7 @@ def report(results: Sequence[Result]) -> str:
     """All tables of these results."""
     families = list(family_scores(results))
     tables = (_families(families), _measures(results), _by_effect(results), _misses(families))
-    return "\n\n".join("\n".join(table) for table in tables)
+    return "\n\n".join(text for table in tables if (text := "\n".join(table)))
 
 
 def _families(families: Sequence[FamilyScore]) -> Iterator[str]:
@@ -38,6 +38,8 @@ def _measures(results: Sequence[Result]) -> Iterator[str]:
 def _by_effect(results: Sequence[Result]) -> Iterator[str]:
     """By effect and strength: how many of the cases of one effect named it first."""
     library = [result for result in results if result["family"] == "library"]
+    if not library:
+        return
     sizes = sorted({_asked(result) for result in library})
     cells: dict[tuple[str, float], list[bool]] = defaultdict(list)
     largest: dict[str, float] = defaultdict(float)

@@ -18,7 +18,7 @@ from compd.diagnosis.diagnose import diagnose
 from compd.errors import CompdError
 from compd.model.effect import Effect, FittedEffect
 from compd.model.library import load_library
-from tests.scoreboard.two_axes import effects_of_file
+from compd.model.library.effects_file import load_effects
 
 ANSWER = "answer.json"
 # The family for which it is computed what the true effects, fitted, leave on the other recording: a bound, set by the
@@ -83,7 +83,7 @@ def _floor_ratio(other: AlignedRecording | None, fitted: Sequence[FittedEffect])
 def _effects(directory: Path) -> Sequence[Effect]:
     """The library, and the effects of effects.yaml beside the recording."""
     own = directory / "effects.yaml"
-    return [*load_library().values(), *(effects_of_file(own) if own.exists() else ())]
+    return [*load_library().values(), *(load_effects(own).values() if own.exists() else ())]
 
 
 def _known(

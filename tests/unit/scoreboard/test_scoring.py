@@ -104,6 +104,13 @@ def test_a_change_is_said_with_its_effect_and_its_time(entries, kind):
     assert kinds(result(CHANGE, "unexplained", depends_on=entries)) == kind
 
 
+def test_a_step_in_time_is_an_offset_that_begins():
+    expected = Expectation(("unexplained",), may_name=CONSTANT_CAUSES, change=Change(CONSTANT_CAUSES, 500.0))
+    step_in_time = {**TIME, "form": "step", "formula_effect": {"formula": "k * (1 + sign(time_s - 503.4)) / 2 + c"}}
+    assert kinds(result(expected, "unexplained", depends_on=[step_in_time])) == "right"
+    assert kinds(result(expected, "unexplained", depends_on=[TIME])) == "missed"
+
+
 def test_a_change_that_is_named_without_its_time_is_near():
     assert kinds(result(CHANGE, "partial", step("backlash"))) == "near"
 
