@@ -30,7 +30,7 @@ def noise(seed: int, size: float = 1.0) -> FloatArray:
 
 
 def candidate(name: str, values: FloatArray, limit: float = 100.0, **others: Any) -> Candidate:
-    """A candidate with columns (ROWS, COORDINATES, P) and plausible ranges from -limit to limit; others : its fields."""
+    """A candidate with columns (ROWS, COORDINATES, P), each number plausible up to the limit; others : its fields."""
     fields: dict[str, Any] = {"searched_parameters": 0, "effect": EFFECT, **others}
     limits = np.tile([-limit, limit], (values.shape[2], 1))
     return Candidate(name=name, columns_um=values, limits=limits, **fields)

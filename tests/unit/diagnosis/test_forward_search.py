@@ -46,7 +46,7 @@ def test_two_effects_that_gain_only_together_are_found() -> None:
 def test_what_was_best_alone_is_exchanged_for_what_is_right_together() -> None:
     mixed = A + B + 0.7 * columns(6)
     losses = subset_losses(noise(4) + a + b, {"mixed": mixed, "a": A, "b": B, "c": C})
-    assert list(losses.best_variants)[0] == "mixed"
+    assert next(iter(losses.best_variants)) == "mixed"
     assert names(losses, forward_search(losses).members) == {"a", "b"}
 
 
