@@ -1,4 +1,4 @@
-"""What competes: effects whose inputs were recorded and that move the prediction, at every choice of their constants."""
+"""What competes: effects whose inputs were recorded and that move the prediction, at each choice of their constants."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.open import open_recording
 from compd.diagnosis.candidates import CHOICE, LEAST_MOTION_UM, SEARCHED_CONSTANT, library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.units import UM_PER_MM
@@ -90,7 +91,5 @@ def test_an_instruments_frame_is_no_candidate_where_it_is_fitted_along(tmp_path:
     assert library_pool(aligned, [registration], ()).candidates
     text = (tmp_path / "run.yaml").read_text().replace("frame: machine", "frame: instrument")
     (tmp_path / "run.yaml").write_text(text)
-    from compd.comparison.open import open_recording
-
     pool = library_pool(open_recording(tmp_path / "run.csv"), [registration], ())
     assert "fitted along" in pool.untestable["reference_registration"]

@@ -120,6 +120,22 @@ def test_effects_that_do_nearly_as_well_are_preferred_to_a_description() -> None
     assert forward_search(subset_losses(y, [description("d", A)])).members == (0,), "where there is no cause"
 
 
+def test_of_sets_that_do_about_as_well_that_with_the_fewest_descriptions_counts() -> None:
+    """Two descriptions, or one and an effect that is a little worse in the place of the other."""
+    D, like_d = columns(21), columns(21) + 0.05 * columns(23)
+    y = noise(4) + 2.0 * a + 2.0 * D[:, :, 0]
+    equal = replace(Criteria(), description_price=Criteria().effect_price, least_sigmas=5.0)
+    losses = subset_losses(y, [description("a", A), description("d", D), candidate("effect", like_d)], equal)
+    both, fewer = losses.evaluate([(0, 1), (0, 2)])
+    assert 0 < losses.score(fewer) - losses.score(both) < equal.effect_price
+    assert best_acceptable(losses).members == (0, 2)
+
+
+def test_only_what_is_allowed_is_added() -> None:
+    losses = subset_losses(noise(4) + 2.0 * a - 1.5 * b, {"a": A, "b": B, "c": C})
+    assert forward_search(losses, among=[0, 2]).members == (0,)
+
+
 def test_an_effect_is_no_cause_beside_descriptions_where_a_description_does_better_in_its_place() -> None:
     """The residual is d and e; the effect looks like d and is cheaper, but d predicts rows left out better."""
     D, E = columns(21), columns(22)
