@@ -45,7 +45,8 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
 
     A description is no cause where effects do about as well: of the sets that score within an effect's price of the
     best one, that with the fewest descriptions counts. In a set with descriptions, in turn, an effect is no cause where
-    a description does better in its place, at the same price and by more than may be chance.
+    a description does better in its place, at the same price and by more than may be chance; and in any set an effect
+    with many numbers is none where the constant does about as well.
     """
     best: Subset | None = None
     least_score = float("inf")
@@ -65,8 +66,28 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
         best = needed
         least_score = min(least_score, losses.score(needed))
         if not losses.described(best.members):
-            return best
-    return _proven(losses, best) if best else Subset((), losses.baseline)
+            return _with_constant(losses, best)
+    return _with_constant(losses, _proven(losses, best)) if best else Subset((), losses.baseline)
+
+
+def _with_constant(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set with the constant in place of an effect that has more numbers and is not an effect's price better.
+
+    Such an effect contains a constant, beside which its other numbers describe what is too small to be named.
+    """
+    constant = losses.constant
+    if constant is None or constant in subset.members:
+        return subset
+    numbers = losses.candidates[constant].parameter_count
+    large = [
+        k
+        for k in subset.members
+        if losses.candidates[k].kind == "effect" and losses.candidates[k].parameter_count > numbers
+    ]
+    other = _best(losses, ((*(other for other in subset.members if other != k), constant) for k in large))
+    if other is None or losses.score(other) > losses.score(subset) + losses.criteria.effect_price:
+        return subset
+    return _pruned(losses, other)
 
 
 def _proven(losses: SubsetLosses, subset: Subset) -> Subset:

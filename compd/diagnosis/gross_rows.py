@@ -29,7 +29,7 @@ class RowWeights(NamedTuple):
     """What each of N rows counts.
 
     gross : (N,) rows that do not.  weight : (N,) of the others, so scaled that the mean square of normal noise is not
-    changed; 0 for rows that are gross or not known.
+    changed; 0 for rows that are gross, or that the fit does not rest on.
     """
 
     gross: BoolArray
@@ -46,7 +46,8 @@ def weigh_rows(
 ) -> RowWeights:
     """Weigh rows by what a robust fit of some columns and a constant leaves of them.
 
-    columns : each (N, m, P), whitened.  residual : (N, m), whitened.  known : (N,) rows in which all are known.
+    columns : each (N, m, P), whitened.  residual : (N, m), whitened; nan where it is not known.
+    known : (N,) rows that the fit rests on. Others are judged by it where the residual and the columns are known.
     visit : (N,) number of the visit, negative for none.
     noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
         of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there.
@@ -56,16 +57,18 @@ def weigh_rows(
     """
     m = residual.shape[1]
     constant = np.broadcast_to(np.eye(m), (*residual.shape, m))
-    G = np.concatenate([constant, *columns], axis=2)[known]
-    if G.shape[2] > MOST_COLUMNS * G.shape[0] * m:
+    G = np.concatenate([constant, *columns], axis=2)
+    if G.shape[2] > MOST_COLUMNS * known.sum() * m:
         G = G[:, :, :m]
-    theta = robust_regression(G, residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
-    left = np.full(residual.shape, np.nan)
-    left[known] = residual[known] - G @ theta
+    theta = robust_regression(
+        G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+    )
+    left = residual - G @ theta
+    judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
     scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)
-    distance = np.where(known[:, None], np.abs(left) / scale, 0.0)
+    distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)
-    gross = far & ~_confirmed(left, known, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
+    gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
     size = np.sqrt(np.mean(distance**2, axis=1))
     full = criteria.full_weight_sigmas
     weight = np.minimum(1.0, full / np.maximum(size, full)) / consistency(m, full)

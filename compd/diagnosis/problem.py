@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import orth
+from scipy.stats import f as f_distribution
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -21,6 +22,7 @@ from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.regression import RegressionData, Regressors
 from compd.diagnosis.subset_losses import SubsetLosses
+from compd.recording.gaps import filled
 from compd.units import UM_PER_MM
 
 
@@ -57,7 +59,7 @@ class DiagnosisProblem:
     known : (N,) rows in which the residual and all candidates are known.
     gross : (N,) rows that nothing explains; rows : (N,) those that count: known and not gross.
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
-    residual : (N, m) whitened, 0 where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
+    residual : (N, m) whitened, nan where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
     start : what is projected out of these and of all candidates; None for nothing.
     """
@@ -89,7 +91,17 @@ class DiagnosisProblem:
 
     def is_at_floor(self, loss: float) -> bool:
         """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
-        return self.floor_known and loss <= self.criteria.most_at_floor
+        return self.floor_known and loss <= self.most_at_floor
+
+    @property
+    def most_at_floor(self) -> float:
+        """Largest loss at which nothing is left: the criterion's, or what chance makes of a floor from few repeats.
+
+        The latter is a quantile of the F distribution, by which a comparison too is at the floor.
+        """
+        dof = min(self.comparison.floor.dof, 1e9)
+        by_chance = f_distribution.ppf(self.comparison.criteria.at_floor_confidence, self.data.value_count, dof)
+        return max(self.criteria.most_at_floor, float(by_chance))
 
     @property
     def unit_um(self) -> float:
@@ -160,7 +172,7 @@ def build_problem(
     constant = constant_candidate(aligned)
     if constant is not None:
         candidates = (*candidates, constant)
-    residual = np.where(known[:, None], comparison.residual_um, 0.0) / sigma_um
+    residual = comparison.residual_um / sigma_um
     nuisance = nuisance_um / sigma_um[:, None]
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
@@ -209,9 +221,10 @@ def _everything(
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
     for values in (time_s, time_s**2, *aligned.recording.quantities.values()):
-        column = values[known]
+        without_gaps = filled(values, time_s)
+        column = without_gaps[known]
         if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
-            scaled = np.nan_to_num(values - column.mean()) / np.ptp(column)
+            scaled = np.nan_to_num(without_gaps - column.mean()) / np.ptp(column)
             columns.append(scaled[:, None, None] * np.eye(len(aligned.labels)))
     return columns
 

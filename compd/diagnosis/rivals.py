@@ -14,28 +14,27 @@ from compd.diagnosis.subset_losses import SubsetLosses
 def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> tuple[Rival, ...]:
     """Effects that would explain as much in the place of one member of a set, the best first.
 
-    With the log loss l of the set as it is, of the set without the member, and with another effect in its place, alone
-    or with the constant, the other is a rival where its parameters are plausible, it takes most of what the member
-    takes, and the difference is below an effect's price or may be chance::
+    With the log loss l of the set as it is, of the set without the member, and with another effect in its place, the
+    other is a rival where its parameters are plausible, it takes most of what the member takes, and the difference is
+    below an effect's price or may be chance::
 
         L_other - L <= rival_share (L_without - L)
         l_other - l <= effect_price   or   L_other - L <= least_sigmas std(L_other - L)
+
+    All three sets have the constant wherever the member is worth its price beside it, so that rivals are the same
+    whether or not one was added to the measured values: a constant tells no effects apart.
 
     An effect with more parameters that contains the member as a special case is bound to do about as well; for it the
     price is no excuse. Effects that on these rows do the same are always rivals, however far above the floor.
     """
     criteria = losses.criteria
+    members = (*members, *_constant_beside(losses, members, member))
     rest = tuple(k for k in members if k != member)
     loss, without = losses.loss(members), losses.loss(rest)
-    constant = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "constant"]
-    substitutes = _substitutes(losses, rest, member)
-    sets = {(*rest, k): k for k in substitutes}
-    if constant and constant[0] not in members:
-        sets |= {(*rest, k, constant[0]): k for k in substitutes}
-    by_key = {tuple(sorted(key)): (key, k) for key, k in sets.items()}
+    sets = {tuple(sorted((*rest, k))): k for k in _substitutes(losses, rest, member)}
     rivals: list[Rival] = []
     for subset in sorted(losses.evaluate(sets), key=losses.score):
-        key, k = by_key[subset.members]
+        key, k = subset.members, sets[subset.members]
         name = losses.candidates[k].effect.id
         if name in [rival.name for rival in rivals]:
             continue
@@ -47,6 +46,16 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         if (near or excess <= criteria.least_sigmas * std) and losses.is_plausible(key):
             rivals.append(Rival(k, name, collinearity(losses, rest, member, k), excess, std))
     return tuple(rivals)
+
+
+def _constant_beside(losses: SubsetLosses, members: tuple[int, ...], member: int) -> tuple[int, ...]:
+    """The constant, where it is a candidate, not in the set, and the member is worth its price beside it."""
+    constant = losses.constant
+    if constant is None or constant in members:
+        return ()
+    rest = (constant, *(k for k in members if k != member))
+    worth = losses.log_loss(losses.loss(rest)) - losses.log_loss(losses.loss((*rest, member)))
+    return (constant,) if worth >= losses.price(member) else ()
 
 
 def collinearity(losses: SubsetLosses, rest: tuple[int, ...], member: int, other: int) -> float:

@@ -78,6 +78,11 @@ class SubsetLosses:
         """Whether descriptions are among the candidates."""
         return any(candidate.kind in ("description", "change") for candidate in self.candidates)
 
+    @cached_property
+    def constant(self) -> int | None:
+        """Place of the constant among the candidates; None where it is fitted along in any case."""
+        return next((k for k, candidate in enumerate(self.candidates) if candidate.kind == "constant"), None)
+
     def described(self, members: Iterable[int]) -> tuple[int, ...]:
         """Those of some members that name no cause, but for the constant."""
         return tuple(k for k in members if self.candidates[k].kind not in ("effect", "constant"))

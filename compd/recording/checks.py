@@ -2,7 +2,8 @@
 
 A recording that breaks a rule is refused:
 
-- `time_s` rises from row to row; a row without it is left out.
+- `time_s` is different in every row; a row without it is left out. Rows in another order than that of time are taken in
+  that order, with a warning, unless sessions would get mixed: then the clock began again.
 - `session`, `visit`, `point` and `ball` are whole numbers from 0; `point` may be text.
 - `approach_<i>` is 1 or -1, or empty where it is not known.
 - At least two rows have all that is needed: the gauges, and a value of the reference.
@@ -141,17 +142,30 @@ def check_rows(table: CsvTable, excluded: BoolArray, needed: Iterable[str], prob
 
 
 def _check_time(table: CsvTable, problems: ProblemList) -> None:
-    """time_s rises: a row that is not later than the one above is reported, backwards and repeated apart."""
+    """No two rows have one time, and rows in the order of time keep together the sessions that the file keeps together.
+
+    Rows that are out of order make a warning: what was measured does not depend on how a file is sorted.
+    """
     with_time = np.flatnonzero(~np.isnan(table.columns["time_s"]))
     time_s = table.columns["time_s"][with_time]
-    step = np.diff(time_s)
-    for wrong, what, mend in (
-        (step < 0, "time runs backwards", "sort the rows, or let the clock run on where sessions were put together"),
-        (step == 0, "the same time as the row above", "write more decimals, or delete the repeated row"),
-    ):
+    order = np.argsort(time_s, kind="stable")
+
+    def report(wrong: IntArray, what: str, allowed: str, next_step: str, warn: bool = False) -> None:
         rows = np.zeros(len(table.row), dtype=bool)
-        rows[with_time[1:][wrong]] = True
-        _report(table, "time_s", rows, problems, what, "later than the row above", mend)
+        rows[with_time[wrong]] = True
+        _report(table, "time_s", rows, problems, what, allowed, next_step, warn)
+
+    repeated = order[1:][np.diff(time_s[order]) == 0]
+    what, next_step = "the same time as another row", "write more decimals, or delete the repeated row"
+    report(repeated, what, "a time of its own", next_step)
+    backwards = np.flatnonzero(np.diff(time_s) < 0) + 1
+    session = table.columns.get("session", np.zeros(len(table.row)))[with_time]
+    if np.count_nonzero(np.diff(session[order])) > np.count_nonzero(np.diff(session)):
+        next_step = "let the clock run on where sessions were put together"
+        report(backwards, "time runs backwards, and sessions overlap", "one clock for all sessions", next_step)
+    else:
+        next_step = "nothing; where a clock began again, let it run on"
+        report(backwards, "time runs backwards", "rows are taken in the order of time", next_step, warn=True)
 
 
 def _check_limits(table: CsvTable, problems: ProblemList) -> None:

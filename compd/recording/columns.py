@@ -54,8 +54,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "time_s",
             r"time",
             "s",
-            "seconds from the start; every row is later than the one above. With `machine: external` optional: the "
-            "rows then count as taken in order",
+            "seconds from the start, different in every row; rows count in this order, however the file is sorted. "
+            "With `machine: external` optional: the rows then count as taken in order",
         ),
         (
             "session",

@@ -145,10 +145,11 @@ def _build(
     plate: BallPlate | None,
     warnings: tuple[Problem, ...],
 ) -> Recording:
-    """The Recording of files without problems; rows without a time are left out and counted."""
-    kept = ~np.isnan(table.columns["time_s"])
+    """The Recording of files without problems, in the order of time; rows without a time are left out and counted."""
+    timed = ~np.isnan(table.columns["time_s"])
+    kept = np.argsort(table.columns["time_s"], kind="stable")[: int(timed.sum())]
     columns = {name: values[kept] for name, values in table.columns.items()}
-    left_out = {"time_s is empty": int((~kept).sum()), "empty row": table.blank_rows}
+    left_out = {"time_s is empty": int((~timed).sum()), "empty row": table.blank_rows}
 
     def stack(names: Iterable[str]) -> FloatArray | None:
         present = [columns[name] for name in names if name in columns]

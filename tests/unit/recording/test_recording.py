@@ -242,6 +242,19 @@ def test_gauges_alone_are_for_join_only(tmp_path: Path) -> None:
     assert read_recording(path, needs_reference=False).reference is None
 
 
+def test_rows_count_in_the_order_of_time(tmp_path: Path) -> None:
+    header, *lines = csv_text().splitlines()
+    newest_first = "\n".join([header, *lines[::-1]])
+    recording = read_recording(write_recording_files(tmp_path, newest_first))
+    sorted_file = read_recording(write_recording_files(tmp_path, csv_text()))
+    assert np.array_equal(recording.row, np.arange(21, 1, -1))
+    assert recording.columns.keys() == sorted_file.columns.keys()
+    assert all(np.array_equal(values, sorted_file.columns[name]) for name, values in recording.columns.items())
+    assert recording.scale_mm is not None
+    assert np.array_equal(recording.scale_mm[:, 0], sorted_file.columns["scale_1_mm"])
+    assert "column time_s (A), rows 3, 4, 5 and 16 more rows: time runs backwards" in str(recording.warnings[0])
+
+
 def test_implausible_values_are_warned_of_not_refused(tmp_path: Path) -> None:
     text = set_column("temperature_room_degC", "68")(set_cell(3, "joint_1_um", "5000")(csv_text()))
     warnings = "\n".join(str(warning) for warning in read_recording(write_recording_files(tmp_path, text)).warnings)

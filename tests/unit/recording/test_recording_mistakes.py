@@ -40,12 +40,6 @@ def lines_of(text: str) -> list[str]:
     return text.split("\n")
 
 
-def swap_rows(text: str) -> str:
-    lines = lines_of(text)
-    lines[4], lines[5] = lines[5], lines[4]
-    return "\n".join(lines)
-
-
 MISTAKES: dict[str, tuple[Edit, list[str]]] = {
     "text": (set_cell(7, "joint_4_um", "abc"), ["column joint_4_um (J), row 7: text", "'abc'", "empty the cell"]),
     "a spreadsheet's error": (set_cell(3, "scale_1_mm", "#REF!"), ["scale_1_mm (D), row 3", "a spreadsheet's error"]),
@@ -64,8 +58,11 @@ MISTAKES: dict[str, tuple[Edit, list[str]]] = {
     "thousands by spaces": (set_cell(3, "pressure_hPa", "1 013.25"), ["thousands separator"]),
     "typographic minus": (set_cell(3, "scale_1_mm", "\u221212.5"), ["typographic minus"]),
     "underscore": (set_cell(3, "scale_1_mm", "1_0"), ["text where a number belongs"]),
-    "time backwards": (swap_rows, ["column time_s (A), row 6: time runs backwards", "'30'", "sort the rows"]),
-    "time repeated": (set_cell(5, "time_s", "20"), ["row 5: the same time as the row above"]),
+    "clock begun again": (
+        set_cell(15, "time_s", "25"),
+        ["column time_s (A), row 15: time runs backwards, and sessions overlap", "'25'", "let the clock run on"],
+    ),
+    "time repeated": (set_cell(5, "time_s", "20"), ["row 5: the same time as another row"]),
     "session 1.5": (set_cell(5, "session", "1.5"), ["session (B), row 5: not a whole number", "'1.5'"]),
     "visit -3": (set_cell(5, "visit", "-3"), ["visit (C), row 5", "'-3'"]),
     "scale in um": (rename_column("scale_1_mm", "scale_1_um"), ["is in um by its name", "divide the values by 1000"]),

@@ -1,0 +1,168 @@
+"""Recordings as a person may change them without changing what they say: other order, unit, frame, useless columns.
+
+Each change takes a `RecordingFile` and returns another. They are written by hand here, not by `write_recording`, which
+would refuse some of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from scipy.spatial.transform import Rotation
+
+from compd.arrays import FloatArray
+from compd.units import UM_PER_MM
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingFile:
+    """What stands in NAME.csv and NAME.yaml, and in a file of formula effects.
+
+    columns : (N,) by name, nan for an empty cell.  formulas : declarations; empty for the library that comes along.
+    """
+
+    columns: Mapping[str, FloatArray]
+    sidecar: Mapping[str, Any]
+    formulas: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """N."""
+        return len(self.columns["time_s"])
+
+    @property
+    def reference_columns(self) -> list[str]:
+        """The measured coordinates."""
+        return [name for name in self.columns if name.startswith("reference_")]
+
+    def with_columns(self, columns: Mapping[str, FloatArray]) -> RecordingFile:
+        """Some columns replaced or, at the end, added."""
+        return replace(self, columns={**self.columns, **columns})
+
+    def write(self, path: Path) -> Path:
+        """Write the CSV file `path` and its sidecar."""
+        lines = [",".join(self.columns)]
+        lines += [",".join(map(_cell, row)) for row in zip(*self.columns.values(), strict=True)]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        path.with_suffix(".yaml").write_text(yaml.safe_dump(dict(self.sidecar), sort_keys=False), encoding="utf-8")
+        return path
+
+
+def read_file(path: Path, formulas: tuple[Mapping[str, Any], ...] = ()) -> RecordingFile:
+    """A recording as it stands on disk."""
+    header, *lines = path.read_text(encoding="utf-8").splitlines()
+    cells = [line.split(",") for line in lines]
+    columns = {
+        name: np.array([float(row[k]) if row[k] else np.nan for row in cells])
+        for k, name in enumerate(header.split(","))
+    }
+    return RecordingFile(columns, yaml.safe_load(path.with_suffix(".yaml").read_text(encoding="utf-8")), formulas)
+
+
+def _cell(value: float) -> str:
+    return "" if np.isnan(value) else repr(float(value)).removesuffix(".0")
+
+
+Change = Callable[[RecordingFile], RecordingFile]
+
+
+def add_constant(*offset_um: float) -> Change:
+    """The same error more in every row, along each measured coordinate."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        names = file.reference_columns
+        return file.with_columns(
+            {name: file.columns[name] + offset / UM_PER_MM for name, offset in zip(names, offset_um, strict=False)}
+        )
+
+    return change
+
+
+def shuffle_rows(seed: int) -> Change:
+    """Rows in another order, each with its time, within their session."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        session = file.columns.get("session", np.zeros(file.rows))
+        order = np.lexsort((np.random.default_rng(seed).permutation(file.rows), session))
+        return replace(file, columns={name: values[order] for name, values in file.columns.items()})
+
+    return change
+
+
+def shuffle_columns(seed: int) -> Change:
+    """Columns in another order."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        names = list(file.columns)
+        order = np.random.default_rng(seed).permutation(len(names))
+        return replace(file, columns={names[k]: file.columns[names[k]] for k in order})
+
+    return change
+
+
+def rename(old: str, new: str, factor: float = 1.0, offset: float = 0.0) -> Change:
+    """A quantity in another unit: its column under a new name, times a factor, and then shifted."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        columns = {
+            new if name == old else name: factor * values + offset if name == old else values
+            for name, values in file.columns.items()
+        }
+        return replace(file, columns=columns)
+
+    return change
+
+
+def turn_frame(*degrees: float, shift_mm: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Change:
+    """The reference in an instrument's frame that is turned about x, y, z (about z alone of one angle), and shifted."""
+    angles = degrees if len(degrees) == 3 else (0.0, 0.0, *degrees)
+    R = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+
+    def change(file: RecordingFile) -> RecordingFile:
+        names = file.reference_columns
+        n = len(names)
+        measured = np.column_stack([file.columns[name] for name in names])
+        turned = measured @ R[:n, :n].T + np.array(shift_mm[:n])
+        return file.with_columns(dict(zip(names, turned.T, strict=True)))
+
+    return change
+
+
+def empty_cell(column: str, row: int) -> Change:
+    """One cell without a value; row from 0."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        values = file.columns[column].copy()
+        values[row] = np.nan
+        return file.with_columns({column: values})
+
+    return change
+
+
+def add_column(name: str, make: Callable[[RecordingFile], FloatArray]) -> Change:
+    """A column more."""
+    return lambda file: file.with_columns({name: make(file)})
+
+
+def move_rows(seed: int, share: float, most_um: float, as_run: bool = False) -> Change:
+    """A share of the rows moved by up to `most_um` along each coordinate, here and there or in one run."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        rng = np.random.default_rng(seed)
+        count = max(round(share * file.rows), 1)
+        begin = int(rng.integers(0, file.rows - count))
+        rows = np.arange(begin, begin + count) if as_run else rng.choice(file.rows, count, replace=False)
+        columns = {}
+        for name in file.reference_columns:
+            columns[name] = file.columns[name].copy()
+            columns[name][rows] += rng.uniform(-most_um, most_um, count) / UM_PER_MM
+        return file.with_columns(columns)
+
+    return change
