@@ -17,7 +17,7 @@ from compd.cli.main import app
 from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import compare
 from compd.comparison.open import open_recording
-from compd.comparison.robust import robust_regression
+from compd.comparison.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
 from compd.diagnosis.candidates import Candidate, library_pool
 from compd.diagnosis.cross_validation import row_splits
@@ -93,7 +93,9 @@ def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
     known, m = problem.known, problem.residual.shape[1]
     constant = np.broadcast_to(np.eye(m), (*problem.residual.shape, m))
     columns = np.concatenate([constant, candidate.columns_um / problem.sigma_um[:, None]], axis=2)[known]
-    return robust_regression(columns, problem.residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
+    return robust_regression(
+        columns, problem.residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+    )
 
 
 def _quiet(status: str) -> None:

@@ -127,7 +127,7 @@ def blocks(example: Example, sheets: Sheets) -> str:
         low = min(0.0, float(min(by_block)) * 1.2)
         plot = Plot(70 + 350 * number, 45, 270, 200, (0, count), (low, top))
         step = 10.0 ** np.floor(np.log10(top))
-        ticks = [0.0, *np.arange(step, top, step * (2 if top / step > 5 else 1)).tolist()]
+        ticks = np.arange(0.0, top, step * (2 if top / step > 5 else 1)).tolist()
         plot.axes([5, 10, 15, 20], ticks, "block of neighbouring rows", f"{words}, squares of the noise")
         for k, value in enumerate(by_block):
             plot.bar((k + 0.15, k + 0.85), (min(value, 0.0), max(value, 0.0)), AFTER if value > 0 else BEFORE)

@@ -190,15 +190,15 @@ class Sheets:
             of_row = self._cell("Rows", "known", k)
             for name in names[1:13]:
                 sigma = self.results[f"sigma_{name[-1]}"]
-                cells.append(f"={of_row}*{self._cell('Rows', name, k)}/{sigma}")
+                cells.append(f"={self._cell('Rows', name, k)}/{sigma}")
             for axis in AXES:
                 constant = fit[f"c_{axis}"]
-                cells.append(f"={here[f'r_{axis}']}-{of_row}*{constant}-{here[f'a_{axis}']}*{fit['a']}")
+                cells.append(f"={here[f'r_{axis}']}-{constant}-{here[f'a_{axis}']}*{fit['a']}")
             distances = [f"{here[f'e_{axis}']}/{scale[axis]}" for axis in AXES]
             cells.append(f"=SQRT(({'+'.join(f'({distance})^2' for distance in distances)})/3)")
             cells.append(f"=IF(MAX({','.join(f'ABS({distance})' for distance in distances)})>{gross},1,0)")
             near = [f"(ABS({ends[f'e_{axis}']}-{here[f'e_{axis}']})<={gross}*SQRT(2))" for axis in AXES]
-            same = f"SUMPRODUCT({known}*({visit}={self._cell('Rows', 'visit', k)})*{'*'.join(near)})"
+            same = f"SUMPRODUCT(({visit}={self._cell('Rows', 'visit', k)})*{'*'.join(near)})"
             cells.append(f"=IF({here['far']}=1,IF({same}>1,1,0),0)")
             cells.append(f"={here['far']}*(1-{here['confirmed']})")
             cells.append(f"={of_row}*(1-{here['gross']})*{full}/MAX({here['d']},{full})/{consistency}")
