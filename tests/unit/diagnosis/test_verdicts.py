@@ -1,4 +1,4 @@
-"""Which verdict a recording gets: of a stage whose error is known, with noise known or not, with gross rows or without."""
+"""Which verdict a recording gets: of a stage whose error is known, noise known or not, with gross rows or without."""
 
 from __future__ import annotations
 
