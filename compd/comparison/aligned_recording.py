@@ -259,7 +259,7 @@ def align_recording(
         observations = _observations(recording, model, starts)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
-        links = tuple(range(len(labels)) if model is None else (i - 1 for i in recording.reference_links))
+        links = tuple(i - 1 for i in recording.reference_links)
         return AlignedRecording(
             recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
         )

@@ -19,8 +19,10 @@ from compd.model.deltas import Deltas
 from compd.model.motion import Movement
 from compd.model.observations import Observations
 from compd.model.observe import observe_external
+from compd.recording.columns import is_sensitivity
 from compd.recording.recording import Recording
 from compd.travel_direction import row_directions
+from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 
 def external_prediction(recording: Recording) -> FloatArray:
@@ -62,7 +64,7 @@ def external_observations(recording: Recording, starts: BoolArray) -> Observatio
     starts : (N,) rows without a history.
     """
     links = max(recording.reference_links, default=0)
-    quantities = {**recording.quantities, **_directions_from_scales(recording)}
+    quantities = {**recording.quantities, **_sensitivities_in_mm(recording), **_directions_from_scales(recording)}
     scale_mm, direction, velocity = (
         _of_links(quantities, name, recording.rows, links)
         for name in ("scale_{}_mm", "approach_{}", "velocity_{}_mm_per_s")
@@ -72,7 +74,10 @@ def external_observations(recording: Recording, starts: BoolArray) -> Observatio
         velocity = velocities(recording.time_s, starts, at_point, scale_mm, np.zeros((recording.rows, 0)))
         velocity = np.where(np.isfinite(scale_mm), velocity, np.nan)
     readings = {"scale": scale_mm, "direction": direction, "motion": velocity}
-    recorded = {name for name, values in readings.items() if links and np.isfinite(values).any(axis=0).all()}
+    measured = [link - 1 for link in recording.reference_links]
+    recorded = {
+        name for name, values in readings.items() if links and np.isfinite(values[:, measured]).any(axis=0).all()
+    }
     return observe_external(
         _external_tip(recording),
         scale_mm=scale_mm,
@@ -89,6 +94,18 @@ def _of_links(quantities: Mapping[str, FloatArray], name: str, rows: int, links:
     unknown = np.full(rows, np.nan)
     columns = [quantities.get(name.format(i + 1), unknown) for i in range(links)]
     return np.stack(columns, axis=1) if columns else np.zeros((rows, 0))
+
+
+def _sensitivities_in_mm(recording: Recording) -> dict[str, FloatArray]:
+    """Columns `d_<name>_x_mm` (N,) of those in another unit of the reference, which counts as a micrometre."""
+    ending = REFERENCE_UNITS[recording.unit]
+    if ending == "mm":
+        return {}
+    return {
+        f"{name.removesuffix(ending)}mm": values / UM_PER_MM
+        for name, values in recording.quantities.items()
+        if is_sensitivity(name) and name.endswith(f"_{ending}")
+    }
 
 
 def _directions_from_scales(recording: Recording) -> dict[str, FloatArray]:

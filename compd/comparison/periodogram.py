@@ -48,6 +48,8 @@ OUTLIER_SIGMAS = 4.0
 REFINED = 33
 # A spectral window (rms over the series) from which on frequencies are images of one another: 0.81 of the square.
 IMAGE = 0.9
+# So many multiples of an image's frequency are images too, where values lie on an even grid.
+MULTIPLES = 5
 # A sine and a cosine of which so little is left beside each other and a constant (1 on even rows) explain nothing.
 LEAST_DETERMINANT = 1e-3
 
@@ -139,11 +141,16 @@ def _peaks(explained: FloatArray, apart: int, count: int) -> IntArray:
 def _frequencies_below_images(window: FloatArray, first: float, step: float, span: float) -> int:
     """How many frequencies are below half of the first at which the spectral window shows images.
 
-    Below 1 / span, where the window falls from 1, there is none.
+    Below 1 / span, where the window falls from 1, there is none. The images of an even grid come again at every
+    multiple; those of a few sessions, far apart, fade.
     """
     frequency = first + step * np.arange(len(window))
-    images = frequency[(window > IMAGE) & (frequency > 1.0 / span)]
-    return len(window) if not len(images) else max(int((images[0] / 2 - first) / step) + 1, 0)
+    for image in frequency[(window > IMAGE) & (frequency > 1.0 / span)].tolist():
+        multiples = np.arange(1, MULTIPLES + 1) * image
+        places = np.rint((multiples[multiples <= frequency[-1]] - first) / step).astype(np.int64)
+        if (window[places] > IMAGE).all():
+            return max(int((image / 2 - first) / step) + 1, 0)
+    return len(window)
 
 
 def _refined(quantity: FloatArray, y: FloatArray, frequency: float, step: float) -> tuple[float, float]:

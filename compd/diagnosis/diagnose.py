@@ -13,7 +13,7 @@ from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
-from compd.diagnosis.candidates import library_pool
+from compd.diagnosis.candidates import library_pool, periodic_candidates
 from compd.diagnosis.constant import describe_constant, name_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
@@ -70,19 +70,27 @@ def diagnose(
     before = compare(aligned, fitted, covariance)
     progress("what each effect would do")
     present = [effect.effect.id for effect in fitted]
-    pool = replace(library_pool(aligned, effects, present), proxies=proxy_candidates(aligned, effects, present))
+    pool = library_pool(aligned, effects, present)
+    tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
+    pool = replace(
+        pool,
+        candidates=(*pool.candidates, *periodic_candidates(aligned, tried, before.residual_um, before.used)),
+        proxies=proxy_candidates(aligned, effects, present),
+    )
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
-    weights = problem.weigh_beside([explanation.losses.candidates[k] for k in explanation.members])
+    members = [explanation.losses.candidates[k] for k in explanation.members]
+    weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
     explanation = name_constant(explain_again(problem, explanation, progress))
     progress("fitting on the real forward model")
-    return _diagnosis(problem, explanation, covariance)
+    return _diagnosis(explanation, covariance)
 
 
-def _diagnosis(problem: DiagnosisProblem, explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
+def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
     """Fit the effects that are named, and state the verdict with its evidence."""
+    problem = explanation.problem
     losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
     before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
     before = replace(before, floor=problem.comparison.floor)
@@ -128,7 +136,7 @@ def _verdict(
     Where the noise is not known, whether something is missing can be told only by finding it.
     """
     found = bool(explanation.described)
-    if problem.floor_known and not found and explanation.loss <= problem.most_at_floor:
+    if not found and problem.is_at_floor(explanation.loss):
         if not steps:
             return "adequate"
         return "ambiguous" if any(step.rivals for step in steps) else "identified"

@@ -176,7 +176,7 @@ def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Itera
     ports = list(_ports(aligned))
     timed = aligned.recording.has_time
     for covariate in search_covariates(aligned, rows):
-        yield from _terms_of(covariate, ports, residual_um[rows], timed=timed)
+        yield from _terms_of(covariate, ports, residual_um[rows], timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
     grids = {"step": step_times_s(time.values)}
     if timed:
@@ -194,9 +194,13 @@ def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Itera
 
 
 def _terms_of(
-    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray, *, timed: bool
+    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray, *, timed: bool, known: bool
 ) -> Iterator[EmpiricalTerm]:
-    """Every form of one covariate at every port; timed : whether the rows have times, which a lag needs."""
+    """Every form of one covariate at every port.
+
+    timed : whether the rows have times, which a lag needs.  known : whether links have known lengths, which a strain
+    needs.
+    """
     grids: dict[str, tuple[float, ...]] = {"linear": ()}
     for form in FORMS_BY_KIND[covariate.kind]:
         if covariate.distinct >= FEWEST_VALUES.get(form, 2):
@@ -205,7 +209,7 @@ def _terms_of(
         for port in ports:
             if _repeats_along(port, form) and (grid or form not in CONSTANTS) and (timed or form != "lagged"):
                 yield _term(port, covariate, form, grid)
-            if form == "lagged" and port.port == "link":  # expansion is proportional to length
+            if form == "lagged" and port.port == "link" and known:  # expansion is proportional to length
                 yield _term(port, covariate, "strain", ())
 
 
@@ -227,16 +231,21 @@ def _repeats_along(port: EmpiricalTerm, form: str) -> bool:
 
 
 def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
-    """Where terms may act, without covariate and form: at the reference, and of a known machine at links and tool."""
+    """Where terms may act, without covariate and form: of a known machine at links, tool and reference; of an external
+    model at what was predicted, its links or the reference."""
+    # a constant along each coordinate is part of every fit of an external model
+    with_constant = aligned.registration_columns.shape[2] == 0
     if aligned.model is not None:
         yield EmpiricalTerm("", "", "link", 0.0, 0.0)
         yield EmpiricalTerm("", "", "link", 0.0, 0.0, per_link=True)
         if not aligned.of_links:
             yield EmpiricalTerm("", "", "tool", 0.0, 0.0, axes=("x", "y", "z"))
-    if aligned.model is None or not aligned.of_links:
-        axes = tuple("xyz"[axis] for axis in aligned.axes[:3])
-        fitted_along = aligned.registration_columns.shape[2] > 0
-        yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=not fitted_along)
+    elif aligned.of_links:
+        # of a single link both are the same
+        yield EmpiricalTerm("", "", "link", 0.0, 0.0, per_link=len(aligned.axes) > 1, with_constant=with_constant)
+    if not aligned.of_links:
+        axes = tuple("xyz"[axis] for axis in aligned.axes)
+        yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=with_constant)
 
 
 def _link_covariates(aligned: AlignedRecording, rows: BoolArray) -> Iterator[tuple[str, float, str]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from compd.diagnosis.candidates import Candidate
+from compd.diagnosis.candidates import Candidate, periodic_candidates
 from compd.diagnosis.changes import change_candidates, moments_s
 from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
 from compd.diagnosis.forward_search import forward_search
@@ -15,6 +15,7 @@ from compd.diagnosis.problem import DiagnosisProblem
 from compd.diagnosis.refined_constants import refined_variants
 from compd.diagnosis.significance import OrthogonalComplement
 from compd.diagnosis.subset_losses import Subset, SubsetLosses
+from compd.diagnosis.warm_start import find_warm_start, with_states_of
 
 # Changes in time that compete, of those that explain most where they were fitted.
 PROMISING_CHANGES = 6
@@ -28,12 +29,14 @@ Progress = Callable[[str], None]
 class Explanation:
     """The best set of candidates.
 
+    problem : in which it was found.
     losses : over the library and what competed with it.
     members : the set: effects, the one that explains most first, then the constant, then descriptions and changes.
     fits : the promising descriptions; empty where none was needed.
     fit_by_place : of the candidates that are descriptions, the term by the candidate's place.
     """
 
+    problem: DiagnosisProblem
     losses: SubsetLosses
     members: tuple[int, ...]
     fits: tuple[EmpiricalFit, ...] = ()
@@ -93,9 +96,9 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     A set of effects and descriptions wins by the same score; a description has the higher price.
     """
     progress("every effect, then the next beside it, on rows left out")
-    library, best = _search_library(problem)
-    if problem.floor_known and best.cv_loss <= problem.criteria.most_at_floor:
-        return Explanation(library, _ordered(library, best.members))
+    problem, library, best = _search_library(problem)
+    if problem.is_at_floor(best.cv_loss):
+        return Explanation(problem, library, _ordered(library, best.members))
     progress("every covariate, lag, direction and time")
     competitors = _Competitors(problem, library)
     for basis in dict.fromkeys([(), best.members]):
@@ -107,14 +110,17 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     if len(competitors.candidates) > len(losses.candidates):
         losses = problem.losses(competitors.candidates)
         best = _search_all(losses, best.members)
-    return Explanation(losses, _ordered(losses, best.members), fits, competitors.fit_by_place)
+    return Explanation(problem, losses, _ordered(losses, best.members), fits, competitors.fit_by_place)
 
 
 def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Progress) -> Explanation:
     """The same search on rows that are weighed anew, among the candidates that were promising before."""
-    losses = problem.losses(before.losses.candidates)
+    candidates = before.losses.candidates
+    if before.problem.states:
+        problem = with_states_of(problem, [candidates[k] for k in before.members])
+    losses = problem.losses(candidates)
     best = _search_all(losses, before.members)
-    if not losses.describes and not (problem.floor_known and best.cv_loss <= problem.criteria.most_at_floor):
+    if not losses.describes and not problem.is_at_floor(best.cv_loss):
         return explain(problem, progress)
 
     def weighed(fit: EmpiricalFit) -> EmpiricalFit:
@@ -122,7 +128,7 @@ def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Prog
 
     fit_by_place = {k: replace(fit, values=losses.values[k]) for k, fit in before.fit_by_place.items()}
     fits = tuple(weighed(fit) for fit in before.fits)
-    return Explanation(losses, _ordered(losses, best.members), fits, fit_by_place)
+    return Explanation(problem, losses, _ordered(losses, best.members), fits, fit_by_place)
 
 
 def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
@@ -136,10 +142,35 @@ def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
     return best
 
 
-def _search_library(problem: DiagnosisProblem) -> tuple[SubsetLosses, Subset]:
-    """The library's best set, constants refined between the values of their grids."""
-    losses = problem.losses(problem.candidates)
-    best = forward_search(losses)
+def _search_library(problem: DiagnosisProblem) -> tuple[DiagnosisProblem, SubsetLosses, Subset]:
+    """The library's best set, and the problem in which it was found: where a lag began warm, without that start."""
+    losses, best = _refined(problem, problem.candidates, ())
+    if problem.is_at_floor(best.cv_loss):
+        return problem, losses, best
+    if best.members:
+        # a period that was hidden behind something larger shows in what that leaves
+        effects = {candidate.name: candidate.effect for candidate in problem.candidates if candidate.kind == "effect"}
+        residual_um = problem.residual_beside_um(losses, best.members)
+        periodic = periodic_candidates(problem.aligned, effects.values(), residual_um, problem.rows)
+        if periodic:
+            losses, best = _refined(problem, [*losses.candidates, *periodic], best.members)
+    warm = find_warm_start(problem, losses, best)
+    if warm is not None:
+        candidates = [*losses.candidates, *(lag for lag in (warm.lag,) if lag not in losses.candidates)]
+        start = tuple(candidates.index(member) for member in warm.members)
+        warm_losses, warm_best = _refined(warm.problem, candidates, start)
+        if warm.lag.name in [warm_losses.name(k) for k in warm_best.members]:
+            return warm.problem, warm_losses, warm_best
+    return problem, losses, best
+
+
+def _refined(
+    problem: DiagnosisProblem, candidates: Sequence[Candidate], start: tuple[int, ...]
+) -> tuple[SubsetLosses, Subset]:
+    """The best set of some candidates, constants refined between the values of their grids."""
+    losses = problem.losses(candidates)
+    forward_search(losses)
+    best = forward_search(losses, start)
     for _ in range(REFINEMENTS):
         refined = refined_variants(losses.candidates, best.members, problem.aligned)
         if not refined:

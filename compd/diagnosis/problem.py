@@ -13,6 +13,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import Comparison
+from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.robust import LEAST_SIGMA, trimmed_scale
 from compd.diagnosis.candidates import Candidate, CandidatePool
 from compd.diagnosis.constant import constant_candidate, split_constants
@@ -87,6 +88,10 @@ class DiagnosisProblem:
     def floor_known(self) -> bool:
         """Whether the noise was measured or declared."""
         return self.comparison.floor.known
+
+    def is_at_floor(self, loss: float) -> bool:
+        """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
+        return self.floor_known and loss <= self.criteria.most_at_floor
 
     @property
     def most_at_floor(self) -> float:
@@ -225,10 +230,10 @@ def _everything(
 
 
 def _nuisance_um(comparison: Comparison) -> FloatArray:
-    """(N, m, Q) columns of the model's own parameters and of what is fitted along: frame or constant."""
+    """(N, m, Q) columns of the model's own parameters and of what is fitted along: frame, constant, starts of lags."""
     aligned = comparison.aligned
     columns = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in comparison.fitted]
-    return np.concatenate([*columns, aligned.registration_columns * UM_PER_MM], axis=2)
+    return np.concatenate([*columns, nuisance_columns(aligned, comparison.fitted)], axis=2)
 
 
 def _renumbered(labels: IntArray) -> IntArray:

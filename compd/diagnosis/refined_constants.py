@@ -26,8 +26,8 @@ def refined_variants(
         if chosen.kind != "effect":
             continue
         for constant in chosen.effect.constants:
-            if constant.choice:
-                continue
+            if constant.choice or constant.period_of:
+                continue  # the spectrum of a period is as fine as the rows can tell
             value = chosen.constants[constant.name]
             others = {name: v for name, v in chosen.constants.items() if name != constant.name}
             grid = sorted(

@@ -1,61 +1,59 @@
-"""The verdict in words."""
+"""The verdict in a sentence or two, for titles, notebooks and programs.
+
+The words tell a cause from a share and from a description. "What is missing" is said only of effects that bring the
+error down to the noise; above it an effect is a share of the error; what a residual follows is no cause.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from compd.diagnosis.error_fall import error_fall
+from compd.diagnosis.phrases import change_text, followed_text, is_change, rivals_text, was_any_tried
+from compd.number_text import join_words, number_text
 
 if TYPE_CHECKING:
     from compd.diagnosis.verdict import Diagnosis
 
+CANNOT_KNOW = "how much of it is noise cannot be known"
+
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences."""
-    floor = in_um(diagnosis.before.floor.um)
-    noise = f"where noise alone is {floor}"
-    before, after = in_um(diagnosis.before.rms_um), in_um(diagnosis.after.rms_um)
-    error = f"the error of {before}"
-    names = _joined([step.effect.id for step in diagnosis.steps])
+    """The verdict in one or two sentences, which claim no more than it does."""
+    fall = error_fall(diagnosis)
+    before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
+    noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
+    names = join_words([step.effect.id for step in diagnosis.steps])
     match diagnosis.verdict:
-        case "adequate":
-            return f"Nothing is missing: {error} is the measurement's own noise ({floor})."
+        case "adequate" if fall.noise_known:
+            but = " but for a constant" if diagnosis.constant else ""
+            own = number_text(fall.noise, fall.unit)
+            return f"Nothing is missing{but}: the error of {before} is the measurement's own noise ({own})."
         case "identified":
-            with_them = "with it" if len(diagnosis.steps) == 1 else "with them"
-            return f"What is missing is {names}: {with_them} {error} falls to {after}, {noise}."
+            them = "it" if len(diagnosis.steps) == 1 else "them"
+            return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."
         case "ambiguous":
-            pairs = "; ".join(
-                f"{step.effect.id} or {_joined([rival.name for rival in step.rivals], 'or')}"
-                for step in diagnosis.steps
-                if step.rivals
-            )
-            return (
-                f"With {names} {error} falls to {after}, {noise}. But this recording cannot tell apart: "
-                f"{pairs}. The rows under 'next' can."
-            )
-        case "not_testable":
-            return f"{_capitalized(error)} is above the noise of {floor}, but no effect can be tested on it."
+            pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
+            falls = f"With {names} the error of {before} falls to {after}, {noise}."
+            return f"{falls} But these rows cannot tell apart: {pairs}."
+        case "adequate" | "not_testable":
+            tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
+            return f"The error is {before}, {noise}. No effect {tried}."
     if diagnosis.steps:
-        subject = f"{_capitalized(names)} explains a part ({before} -> {after}). The rest"
-    else:
-        subject = _capitalized(error)
+        verb = "explains" if len(diagnosis.steps) == 1 else "explain"
+        rest = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
+        share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {rest}."
+        return " ".join([share, *_rest(diagnosis, "The rest")])
+    unexplained = f"No effect that was tried explains the error of {before}, {noise}."
+    return " ".join([unexplained, *(_rest(diagnosis, "It") or ["It follows nothing that was measured."])])
+
+
+def _rest(diagnosis: Diagnosis, what: str) -> list[str]:
+    """What follows or changes, as a sentence; empty where nothing does.  what : its subject."""
     if not diagnosis.depends_on:
-        return (
-            f"{subject} has no cause in the library and follows nothing that was measured: {after} are left, {noise}."
-        )
-    first = diagnosis.depends_on[0]
-    follows = _joined([first.covariate, *first.beside])
-    left = in_um(first.heldout_rms_um)
-    return f"{subject} has no cause in the library. It follows {follows}: to describe that leaves {left}, {noise}."
-
-
-def in_um(value: float) -> str:
-    """A length with two figures and without powers of ten: "0.12 um"."""
-    return f"{value:.0f} um" if value >= 100 else f"{value:.2g} um"
-
-
-def _joined(names: Sequence[str], word: str = "and") -> str:
-    return f" {word} ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
-
-
-def _capitalized(text: str) -> str:
-    return text[:1].upper() + text[1:]
+        return []
+    fall, finding = error_fall(diagnosis), diagnosis.depends_on[0]
+    left = f"to describe that leaves {number_text(finding.heldout_rms_um, fall.unit)}, and names no cause"
+    if is_change(finding):
+        return [f"Something changed: {change_text(finding, diagnosis)}; {left}."]
+    return [f"{what} follows {followed_text(finding)}: {left}."]

@@ -19,7 +19,8 @@ from compd.paper.frame_experiment import (
     crossing_mm,
     order,
 )
-from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
+from compd.report.page import COLOURS, Panel, style_figure, write_page
+from compd.report.page_table import PageTable
 from compd.units import UM_PER_MM
 
 # Each cell but the first holds the median and the largest, over directions or, for the warm-up, over time.

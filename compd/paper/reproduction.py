@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.report.page import PageTable, Panel, write_page
+from compd.report.page import Panel, write_page
+from compd.report.page_table import PageTable
 
 HEAD = ("", "without", "with", "reduction", "the paper")
 _FOOTER = (

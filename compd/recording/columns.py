@@ -41,8 +41,8 @@ class ColumnKind(NamedTuple):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """The unit, and for the reference's lengths those that `reference.unit` of the sidecar may put in its place."""
-        of_reference = self.unit == "mm" and self.names.startswith("reference_")
+        """The unit, and for lengths of the reference and for derivatives those that `reference.unit` may put there."""
+        of_reference = self.unit == "mm" and self.names.startswith(("reference_", "d_"))
         return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
 
 
@@ -119,7 +119,8 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             _SENSITIVITY_STEM,
             "mm",
             "derivative of the prediction by the parameter `name` of a model of your own, in mm per unit of the "
-            "parameter: for an effect with `sensitivity: name`, and for nothing else",
+            "parameter (in arcsec, where the reference is: d_<name>_x_arcsec): for an effect with `sensitivity: name`, "
+            "and for nothing else",
         ),
     )
 )
@@ -166,7 +167,7 @@ def is_sensitivity(name: str) -> bool:
 
     Such a column belongs to an effect; it is nothing that was measured, and no covariate.
     """
-    return re.fullmatch(rf"{_SENSITIVITY_STEM}_mm", name) is not None
+    return re.fullmatch(rf"{_SENSITIVITY_STEM}_(?:{'|'.join(REFERENCE_UNITS.values())})", name) is not None
 
 
 def decimals(name: str) -> int | None:

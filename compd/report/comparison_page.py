@@ -20,7 +20,8 @@ from compd.report.figures import (
     plot_residual_vectors,
     plot_workspace_map,
 )
-from compd.report.page import PageTable, Panel, write_page
+from compd.report.page import Panel, write_page
+from compd.report.page_table import PageTable
 from compd.report.small_multiples import plot_residual_against
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
@@ -39,6 +40,10 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
         [f"{label}: rms / 95 % / largest", *(_axis(comparison, label) for comparison in comparisons)]
         for label in labels
     ]
+    if any(comparison.aligned.registration_columns.size for comparison in comparisons):
+        rows.append(
+            [f"constant taken off, {' / '.join(labels)}", *(_constant(comparison) for comparison in comparisons)]
+        )
     rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(comparison) for comparison in comparisons)])
     sources = list(dict.fromkeys(name for comparison in comparisons for name in comparison.contributions))
     rows += [[f"rms without {name}", *(_without(comparison, name) for comparison in comparisons)] for name in sources]
@@ -191,6 +196,13 @@ def _axis(comparison: Comparison, label: str) -> str:
         return "-"
     size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
     return f"{rms(size):.3g} / {np.quantile(size, 0.95):.3g} / {_shown(comparison, size.max())}"
+
+
+def _constant(comparison: Comparison) -> str:
+    """The constant of each coordinate that was fitted along; "-" for a machine in its own frame."""
+    if not comparison.aligned.registration_columns.size:
+        return "-"
+    return " / ".join(f"{value:.3g}" for value in comparison.constant_um) + f" {comparison.aligned.unit}"
 
 
 def _distance(comparison: Comparison) -> str:

@@ -20,7 +20,8 @@ from compd.report.effect_signature import (
     Signature,
     compute_signature,
 )
-from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
+from compd.report.page import COLOURS, Panel, style_figure, write_page
+from compd.report.page_table import PageTable
 
 AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain"]}
 

@@ -9,7 +9,8 @@ from plotly.subplots import make_subplots
 from compd.arrays import FloatArray, rms
 from compd.comparison.compare import Comparison
 from compd.comparison.display_unit import format_error, in_place_unit, place_unit
-from compd.report.page import COLOURS, PageTable, style_figure
+from compd.report.page import COLOURS, style_figure
+from compd.report.page_table import PageTable
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
 from compd.units import UM_PER_MM
 
@@ -17,6 +18,8 @@ from compd.units import UM_PER_MM
 ARROWS = 400
 # Cells of the map along each axis.
 CELLS = 9
+# Thickness of a plane in a scene, as a share of its length.
+THIN = 0.01
 # Of a map: its name, and the axes to the right and upwards.
 VIEWS = (("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2))
 # The typical arrow is drawn as long as this share of the workspace.
@@ -96,8 +99,7 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
     figure.update_layout(
         scene={
             **{f"{axis}axis_title": f"{axis}, {place_unit(unit)}" for axis in "xyz"},
-            "aspectmode": "data",
-            "camera": {"eye": {"x": 1.3, "y": -1.6, "z": 0.9}},
+            **_aspect(np.nanmax(path, axis=0) - np.nanmin(path, axis=0), axes),
         },
         margin={"l": 0, "r": 0, "t": 10, "b": 0},
     )
@@ -188,6 +190,22 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
         figure.update_xaxes(title_text=f"{'xyz'[a]}, {shown}", row=1, col=k)
         figure.update_yaxes(title_text=f"{'xyz'[b]}, {shown}", title_standoff=2, row=1, col=k)
     return style_figure(figure, f"x, {shown}", f"y, {shown}", 390).update_layout(margin={"r": 80, "t": 60})
+
+
+def _aspect(extent: FloatArray, axes: list[int]) -> dict[str, object]:
+    """Of a scene: axes to scale, seen obliquely; a plane seen square to it, its second axis upwards."""
+    if len(axes) == 3:
+        return {"aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.6, "z": 0.9}}}
+    # "data" would give a plane no size: its volume is 0
+    ratio = np.where(np.isin(np.arange(3), axes), extent / max(extent.max(), 1e-9), THIN)
+    eye = np.where(np.isin(np.arange(3), axes), 0.0, [1.6, -1.6, 1.6])
+    return {
+        "dragmode": "orbit",  # the default keeps z upwards
+        **{f"{axis}axis_visible": k in axes for k, axis in enumerate("xyz")},
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", np.maximum(ratio, THIN).tolist(), strict=True)),
+        "camera": {"eye": dict(zip("xyz", eye.tolist(), strict=True)), "up": {"xyz"[axes[1]]: 1.0}},
+    }
 
 
 def _places_mm(comparison: Comparison) -> tuple[FloatArray, list[int]]:

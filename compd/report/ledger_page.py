@@ -9,7 +9,8 @@ import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
 from compd.model_document import StoredModel
-from compd.report.page import COLOURS, PageTable, Panel, style_figure, write_page
+from compd.report.page import COLOURS, Panel, style_figure, write_page
+from compd.report.page_table import PageTable
 
 LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
 

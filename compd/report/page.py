@@ -12,13 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
 from compd.errors import CompdError, Problem
+from compd.report.page_table import PageTable
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
@@ -36,27 +39,24 @@ SHARED_SCRIPT = "plotly.min.js"
 
 
 @dataclass(frozen=True)
-class PageTable:
-    """Rows of text under a head; the first column is what the row is about."""
+class PageText:
+    """Lines that stay as they are, to be read or copied: in the page's source too quotes and spaces are themselves."""
 
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    caption: str = ""
+    text: str
 
     @property
-    def numeric(self) -> list[bool]:
-        """For each column, whether it holds only numbers, which are aligned on the right."""
-        columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.head)
-        return [all(map(_is_number, column)) for column in columns]
+    def html(self) -> Markup:
+        """The text with what HTML would take for markup escaped, and nothing else."""
+        return Markup(escape(self.text, quote=False))
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A heading, one sentence that says how to read it, and a figure or a table."""
+    """A heading, one sentence that says how to read it, and a figure, a table or lines of text."""
 
     title: str
     caption: str
-    content: Figure | PageTable
+    content: Figure | PageTable | PageText
 
 
 def check_page_path(path: Path) -> None:
@@ -68,10 +68,11 @@ def check_page_path(path: Path) -> None:
 
 
 def write_page(
-    path: Path, title: str, verdict: str, panels: Sequence[Panel], footer: str, shared_script: bool = False
+    path: Path, title: str, verdict: str | PageText, panels: Sequence[Panel], footer: str, shared_script: bool = False
 ) -> None:
     """Write the page to `path`; all texts are escaped.
 
+    verdict : a sentence or two, or lines.
     shared_script : plotly's script (4.8 MB) is inside the page, which is then a single file. True writes it to
     SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
     """
@@ -79,13 +80,15 @@ def write_page(
         path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
         title=title,
-        verdict=verdict,
+        verdict=verdict.html if isinstance(verdict, PageText) else verdict,
+        verdict_is_lines=isinstance(verdict, PageText),
         panels=[
             {
                 "title": panel.title,
                 "caption": panel.caption,
                 "table": panel.content if isinstance(panel.content, PageTable) else None,
-                "figure": "" if isinstance(panel.content, PageTable) else _figure_html(panel.content, number),
+                "lines": panel.content.html if isinstance(panel.content, PageText) else None,
+                "figure": _figure_html(panel.content, number) if isinstance(panel.content, Figure) else "",
             }
             for number, panel in enumerate(panels)
         ],
@@ -132,8 +135,3 @@ def _figure_html(figure: Figure, number: int) -> str:
             config=_PLOTLY_CONFIG,
         )
     )
-
-
-def _is_number(cell: str) -> bool:
-    """Whether the text begins as a number does, with or without a unit behind it; or nothing is known."""
-    return cell in ("", "-") or cell[0].isdigit() or (cell[0] in "+-." and cell[1:2].isdigit())

@@ -11,10 +11,12 @@ from plotly.subplots import make_subplots
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.compare import Comparison
 from compd.comparison.covariates import Covariate
-from compd.report.page import COLOURS, PageTable, style_figure
+from compd.report.page import COLOURS, style_figure
+from compd.report.page_table import PageTable
 
 # More dots than this hide each other; means are always over all rows.
 DOTS = 500
+FEW_DOTS = 200
 BINS = 12
 COLUMNS = 3
 SERIES_COLOURS = (COLOURS["worst"], COLOURS["best"], COLOURS["plain"], COLOURS["middle"], "#cc79a7", "#56b4e9")
@@ -67,7 +69,7 @@ def small_multiples(
                 legend=k == 0,
                 unit=comparison.aligned.unit,
             )
-        figure.update_xaxes(title_text=_axis_unit(covariate), title_standoff=4, row=row, col=col)
+        figure.update_xaxes(title_text=axis_unit(covariate), title_standoff=4, row=row, col=col)
         if col == 1:
             figure.update_yaxes(title_text=label, row=row, col=1)
     return figure
@@ -77,8 +79,8 @@ def _changes(values: FloatArray) -> bool:
     return bool(np.isfinite(values).any() and np.nanstd(values) > 0)
 
 
-def _axis_unit(covariate: Covariate) -> str:
-    """The unit of the covariate itself, where `Covariate.unit` is that of its changes."""
+def axis_unit(covariate: Covariate) -> str:
+    """The unit of the covariate itself, where `Covariate.unit` is that of its changes; of a link's direction, words."""
     if covariate.name.startswith("temperature"):
         return "K" if " - " in covariate.name else "degC"
     if covariate.name.startswith("direction of link"):
@@ -86,6 +88,14 @@ def _axis_unit(covariate: Covariate) -> str:
     if covariate.name.startswith("direction of axis"):
         return "-1 = backwards, +1 = forwards"
     return "" if covariate.unit == "1" else covariate.unit
+
+
+def axis_title(covariate: Covariate) -> str:
+    """Name and unit of a covariate, for an axis that has no other heading."""
+    if covariate.name.startswith("direction of "):
+        return covariate.name
+    unit = axis_unit(covariate)
+    return f"{covariate.name}, {unit}" if unit else covariate.name
 
 
 def add_dots_and_means(
@@ -114,13 +124,13 @@ def add_dots_and_means(
             mode="markers",
             showlegend=False,
             legendgroup=name,
-            marker={"size": 3, "color": colour, "opacity": 0.35},
+            marker={**dot_style(len(dots)), "color": colour},
             hovertemplate=f"{name}: %{{y:.3g}} {unit} at %{{x:.4g}}<extra></extra>",
         ),
         row=row,
         col=col,
     )
-    middle, mean = class_means(x[known], y_um[known])
+    middle, mean, _ = class_means(x[known], y_um[known])
     figure.add_trace(
         Scatter(
             x=middle,
@@ -138,13 +148,18 @@ def add_dots_and_means(
     )
 
 
-def class_means(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(C,) means of x and of y (R,) in classes of about equally many rows; equal values are never split."""
-    ends = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:]))
+def dot_style(count: int) -> dict[str, float]:
+    """Size and opacity of so many dots: few are to be seen, many are not to hide each other."""
+    return {"size": 3, "opacity": 0.35} if count > FEW_DOTS else {"size": 5, "opacity": 0.6}
+
+
+def class_means(x: FloatArray, y: FloatArray, classes: int = BINS) -> tuple[FloatArray, FloatArray, IntArray]:
+    """(C,) means of x and of y (R,) in classes of about equally many rows, and these; equal values are never split."""
+    ends = np.unique(np.quantile(x, np.linspace(0, 1, classes + 1)[1:]))
     group = np.searchsorted(ends, x)
     count = np.bincount(group)
     filled = count > 0
-    return np.bincount(group, x)[filled] / count[filled], np.bincount(group, y)[filled] / count[filled]
+    return np.bincount(group, x)[filled] / count[filled], np.bincount(group, y)[filled] / count[filled], count[filled]
 
 
 def thin(rows: IntArray, most: int) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,9 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.model.effect import Effect
 from compd.model.formula.declaration import formula_effect
+from compd.model.motion import Movement
+from compd.model.observations import Observations
+from compd.model.observe import observe_external
 from compd.recording.reader import read_recording
 
 SIGMA_UM = 0.5
@@ -53,3 +56,24 @@ def along(axis: str, effect_id: str, formula: str, **keys: Any) -> Effect:
     parameters = {"k": {"unit": "um", "plausible": [-100, 100], "source": "a test"}}
     declaration = {"id": effect_id, "port": "reference", "axis": axis, "formula": formula, "parameters": parameters}
     return formula_effect({**declaration, **keys}, "a test")
+
+
+def external_rows(
+    tip_M_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    *,
+    links: int = 0,
+    recorded: Collection[str] = ("time", "order"),
+    time_s: FloatArray | None = None,
+) -> Observations:
+    """Rows (N,) of such a machine, an hour apart; its links moved forwards at 1 mm/s, as far as that was recorded."""
+    count = len(tip_M_mm)
+    return observe_external(
+        tip_M_mm,
+        scale_mm=np.full((count, links), 5.0),
+        movement=Movement(np.ones((count, links)), np.ones((count, links)), np.zeros((count, 0))),
+        quantities=quantities,
+        time_s=3600.0 * np.arange(count) if time_s is None else time_s,
+        session_start=np.arange(count) == 0,
+        recorded=frozenset(recorded),
+    )

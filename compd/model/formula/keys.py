@@ -57,7 +57,8 @@ class FormulaDeclaration(BaseModel):
         default=None,
         description="in place of a formula, the NAME of a parameter of a model of your own: the recording's columns "
         "`d_NAME_x_mm`, `d_NAME_y_mm`, `d_NAME_z_mm` (port reference) or `d_NAME_link_1_mm` ... (port link) are the "
-        "prediction's derivatives by it, in mm per unit of the effect's one parameter",
+        "prediction's derivatives by it, in mm per unit of the effect's one parameter (`d_NAME_x_arcsec` where the "
+        "reference is in arcsec)",
     )
     gives: Literal["um", "mm"] = Field(default="um", description="unit of the formula's value")
     axis: Literal["x", "y", "z"] | None = Field(

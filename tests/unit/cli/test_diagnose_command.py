@@ -1,52 +1,122 @@
-"""`compd diagnose --effects`: effects of one's own beside the library's."""
+"""`compd diagnose` as a person types it: twelve lines, a line, the evidence, and what can be pasted from it."""
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import pytest
 import typer
+import yaml
+from rich.console import Console
 from typer.testing import CliRunner
 
 from compd.cli.measurements.diagnose import diagnose
-from compd.errors import CompdError
+from compd.diagnosis.findings import CandidateResult, UntestedEffect
+from compd.diagnosis.summary_lines import MOST_LINES, WIDTH, summary_lines
+from compd.diagnosis.verdict import Diagnosis
+from compd.model.library import find_effect
+from compd.report.diagnosis_text import print_diagnosis
+from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step
 from tests.support.measured import gauges, hidden, record
 
 app = typer.Typer()
 app.command()(diagnose)
-SWELLING = """\
-effects:
-- {id: room_growth, port: link, formula: "k * (temperature_room_degC - 20)",
-   parameters: {k: {unit: um/K, plausible: [-9, 9], source: notes}}}
-"""
+FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 
 
-@pytest.fixture
-def recording(tmp_path: Path) -> Path:
-    return record(tmp_path, gauges(200, 21), [hidden("link_expansion", 1.1)])
+def printed(made: Diagnosis, width: int = 80) -> str:
+    """What a terminal of so many columns shows."""
+    out = io.StringIO()
+    print_diagnosis(Console(file=out, width=width, highlight=False), made, [])
+    return out.getvalue()
 
 
-def test_effects_of_files_are_tried_beside_the_library(recording: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text(SWELLING)
-    (tmp_path / "more").mkdir()
-    (tmp_path / "more" / "base.yaml").write_text(SWELLING.replace("room", "base"))
-    arguments = [
-        str(recording),
-        "--effects",
-        str(tmp_path / "mine.yaml"),
-        "--effects",
-        str(tmp_path / "more"),
-        "--json",
+def described() -> Diagnosis:
+    parts = [description(name, "linear", 5.5, 0.998).formula_effects[0] for name in FRAME]
+    finding = description(
+        FRAME[0],
+        "linear",
+        5.5,
+        0.998,
+        beside=FRAME[1:],
+        formula_effects=tuple(parts),
+        parameters=({"k": 0.4}, {"k": -0.2}),
+    )
+    vary = {"measure": "vary temperature_frame_degC alone", "why": "the rest follows it"}
+    recording = external_recording("x", quantities=FRAME)
+    fields = {"depends_on": [finding], "next_measurement": [vary]}
+    return diagnosis("unexplained", 115.0, 115.0, Noise(1.1), recording, **fields)
+
+
+@pytest.fixture(scope="module")
+def output(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    path = record(tmp_path_factory.mktemp("run"), gauges(300, 21), [hidden("link_expansion", 1.1)])
+    result = CliRunner().invoke(app, [str(path)], catch_exceptions=False)
+    assert result.exit_code == 0
+    return path, result.stdout
+
+
+def test_it_begins_with_the_twelve_lines_and_a_line(output: tuple[Path, str]) -> None:
+    lines = output[1].split("\n")
+    end = lines.index("-" * WIDTH)
+    assert 3 <= end <= MOST_LINES
+    assert max(map(len, lines[:end])) <= WIDTH
+    assert lines[0].startswith("identified: What is missing is link_expansion: ")
+    assert lines[1].startswith("Found:    link_expansion: the rods between joints and scale grow with")
+
+
+def test_the_evidence_has_equation_numbers_share_and_rivals(output: tuple[Path, str]) -> None:
+    evidence = output[1].partition("-" * WIDTH)[2]
+    assert "1. link_expansion: The rods between joints and scale grow with temperature." in evidence
+    for begin in (
+        "equation ",
+        "a ",
+        "error, rows left out ",
+        "explains ",
+        "by noise alone ",
+        "rivals ",
+        "told apart by ",
+    ):
+        assert f"\n    {begin}" in evidence
+    assert "Without gain:" in evidence
+
+
+def test_json_has_the_sentence(output: tuple[Path, str]) -> None:
+    result = CliRunner().invoke(app, [str(output[0]), "--json"], catch_exceptions=False)
+    assert json.loads(result.stdout)["said"].startswith("What is missing is link_expansion: with it the error of ")
+
+
+def test_formulas_pasted_from_the_terminal_are_a_file_of_effects() -> None:
+    lines = printed(described()).split("\n")
+    first = next(k for k, line in enumerate(lines) if line.startswith("- id:"))
+    last = max(k for k, line in enumerate(lines) if "# fitted:" in line)
+    entries = yaml.safe_load("\n".join(lines[first : last + 1]))
+    assert [find_effect(entry, "pasted").id for entry in entries] == [
+        f"reference_follows_{name.lower()}_linear_x" for name in FRAME
     ]
-    result = CliRunner().invoke(app, arguments, catch_exceptions=False)
-    names = {candidate["effect"] for candidate in json.loads(result.stdout)["candidates"]}
-    assert {"room_growth", "base_growth", "link_expansion"} <= names
+    assert f"compd effect add described.yaml:{entries[0]['id']} --recording stage.csv --model FILE" in lines
 
 
-def test_what_is_wrong_in_a_file_is_said_before_the_search(recording: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text(SWELLING.replace("port: link", "port: link, axis: x"))
-    result = CliRunner().invoke(app, [str(recording), "--effects", str(tmp_path / "mine.yaml")])
-    assert isinstance(result.exception, CompdError)
-    (problem,) = result.exception.problems
-    assert problem.where == f"{tmp_path / 'mine.yaml'}:2 effects[1], axis"
+def test_what_to_vary_is_said_once() -> None:
+    text = printed(described())
+    assert "    vary temperature_frame_degC alone: the rest follows it" in text
+    assert "measure vary" not in text
+    assert "measure measure" not in text
+
+
+def test_a_machine_with_a_model_of_its_own_is_told_of_nothing_inside_another() -> None:
+    play = formula("stage_backlash", "b * moved_1", "Play of screw and coupling.")
+    candidates = [CandidateResult("my_bow", "no_gain", "takes 0 % of the error away")]
+    untested = [UntestedEffect("link_sag", "acts inside a machine"), UntestedEffect("my_growth", "needs humidity_pct")]
+    fields = {"steps": [step(play, [0.6], 0.02, 0.3, links=0)], "candidates": candidates, "untested": untested}
+    text = printed(diagnosis("identified", 1.4, 0.3, Noise(0.29), external_recording(), **fields))
+    assert "link_sag" not in text
+    assert "my_growth  needs humidity_pct" in text
+    assert "my_bow" in text
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_the_lines_are_the_same_in_every_terminal(width: int) -> None:
+    assert printed(described(), width).split("\n")[: len(summary_lines(described()))] == summary_lines(described())

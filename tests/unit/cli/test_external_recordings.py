@@ -11,9 +11,10 @@ from plotly.graph_objects import Figure
 
 from compd.comparison.compare import compare
 from compd.comparison.open import open_recording
+from compd.model.library import load_library
 from compd.report.figures import plot_residual_vectors, plot_workspace_map
 from compd.report.small_multiples import NOT_RECORDED
-from tests.scoreboard.trial import run_in_process
+from tests.support.command import run_in_process
 from tests.support.external import Floats, measured_places, write_external
 
 NOISE_MM = 1e-3
@@ -79,3 +80,11 @@ def test_the_map_has_a_view_of_every_two_axes_that_are_known(tmp_path: Path, axe
     assert (workspace is NOT_RECORDED) == (vectors is NOT_RECORDED) == (views == 0)
     if isinstance(workspace, Figure):
         assert len(workspace.data) == views
+
+
+def test_a_link_that_is_measured_alone_has_its_own_scale(tmp_path: Path) -> None:
+    columns = lengths([2])
+    columns["scale_2_mm"] = columns["model_link_2_mm"]
+    aligned = open_recording(write_external(tmp_path, columns, LENGTH))
+    gain = aligned.columns(load_library()["scale_gain"], {})
+    assert np.abs(gain).max() > 0

@@ -206,3 +206,24 @@ def test_a_sensitivity_belongs_to_its_effect_and_to_nothing_else(tmp_path: Path)
     assert not any("pitch" in covariate.name for covariate in covariates(aligned))
     diagnosis = compd.diagnose(aligned, effects=formula_effect(pitch, "pitch.yaml"))
     assert [step.effect.id for step in diagnosis.steps] == ["pitch"]
+
+
+def test_a_sensitivity_is_in_the_unit_of_the_reference(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    derivative = rng.uniform(-1, 1, ROWS)  # arcsec per urad
+    columns = {
+        "d_tilt_x_arcsec": derivative,
+        "model_x_arcsec": np.zeros(ROWS),
+        "reference_x_arcsec": 30.0 * derivative + rng.normal(0, 0.2, ROWS),
+    }
+    sidecar = "machine: external\nreference: {quantity: tool_position, unit: arcsec, frame: machine, sigma: 0.2}\n"
+    aligned = opened(tmp_path / "run.csv", sidecar, columns)
+    tilt = {
+        "id": "tilt",
+        "port": "reference",
+        "sensitivity": "tilt",
+        "parameters": {"t": {**PARAMETER, "unit": "urad"}},
+    }
+    (number,) = compd.add_effect(None, tilt, aligned).numbers()
+    assert number.value == pytest.approx(30.0, abs=0.2)
+    assert [covariate.name for covariate in covariates(aligned)] == ["x"]

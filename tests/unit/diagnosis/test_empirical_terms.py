@@ -47,7 +47,7 @@ def test_only_what_warms_or_wets_arrives_late_and_only_along_a_way_something_rep
         "moved_1": np.where(NOISE_UM > 0, 1.0, -1.0),
     }
     aligned = record_external(tmp_path / "run.csv", columns, {"x": NOISE_UM})
-    assert forms_of(aligned, "slide_mm") == {"linear", "square", "knee", "periodic"}
+    assert forms_of(aligned, "slide_mm") == {"linear", "square", "periodic"}
     assert forms_of(aligned, "temperature_bed_degC") == {"linear", "square", "lagged"}
     assert forms_of(aligned, "load_kg") == {"linear", "square", "knee"}
     # the square of a direction is a constant

@@ -16,9 +16,7 @@ from compd.model.deltas import deltas_by_effect, port_size
 from compd.model.effect import PORTS, Effect, FittedEffect
 from compd.model.effect_needs import can_concern, needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find_effect, load_library
-from compd.model.motion import Movement, update_motion
-from compd.model.observations import Observations
-from compd.model.observe import observe_external
+from compd.model.motion import update_motion
 from tests.support.effect_rows import (
     HEXAPOD,
     LIBRARY,
@@ -29,6 +27,7 @@ from tests.support.effect_rows import (
     row_at_zero,
     select_rows,
 )
+from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 
 PORT_FILES = {
@@ -137,32 +136,18 @@ def test_no_effect_sees_the_reference() -> None:
         observe_rows(TRIPOD, arguments)
 
 
-def external_rows(tip_M_mm: Floats, links: int, recorded: set[str], **quantities: Floats) -> Observations:
-    """Two rows of a machine of another model, of which nothing is known but what is given."""
-    scale_mm = np.full((2, links), 5.0)
-    return observe_external(
-        tip_M_mm,
-        scale_mm=scale_mm,
-        movement=Movement(np.ones((2, links)), np.ones((2, links)), np.zeros((2, 0))),
-        quantities=quantities,
-        time_s=np.array([0.0, 3600.0]),
-        session_start=np.array([True, False]),
-        recorded=frozenset(recorded),
-    )
-
-
 def test_of_links_of_an_external_model_the_scales_can_err() -> None:
     nowhere = np.full((2, 3), np.nan)
     everything = {"scale", "direction", "motion", "time", "order"}
     warm = {"temperature_link_1_degC": np.full(2, 21.0), "temperature_link_2_degC": np.full(2, 22.0)}
-    rows = external_rows(nowhere, 2, everything, **warm)
+    rows = external_rows(nowhere, warm, links=2, recorded=everything)
     usable = {effect.id for effect in BUNDLED if not unmet_needs(effect, rows.available, rows.links)}
     assert usable == {effect.id for effect in BUNDLED if "scale" in effect.ports} | {"link_zero"}
     for effect_id in usable:
         basis, _ = LIBRARY[effect_id].basis(rows, constants_of(LIBRARY[effect_id]), None)
         assert np.isfinite(basis).all()
     assert {effect.id for effect in BUNDLED if can_concern(effect, rows.available, rows.links)} == usable
-    bare = external_rows(nowhere, 2, set())
+    bare = external_rows(nowhere, {}, links=2, recorded=())
     said = {effect_id: str(unmet_needs(LIBRARY[effect_id], bare.available, 2)) for effect_id in usable}
     assert "scale_1_mm" in said["scale_gain"]
     assert "approach_1" in said["backlash"]
@@ -173,13 +158,8 @@ def test_of_links_of_an_external_model_the_scales_can_err() -> None:
 
 def test_of_an_external_model_only_the_reference_can_err() -> None:
     tip = np.array([[10.0, 20.0, 30.0], [0.0, 0.0, 0.0]])
-    rows = external_rows(
-        tip,
-        links=0,
-        recorded={"time", "order"},
-        pressure_hPa=np.full(2, 1003.25),
-        temperature_room_degC=np.full(2, 21.0),
-    )
+    air = {"pressure_hPa": np.full(2, 1003.25), "temperature_room_degC": np.full(2, 21.0)}
+    rows = external_rows(tip, air)
     usable = [effect for effect in BUNDLED if not unmet_needs(effect, rows.available, rows.links)]
     assert {effect.ports for effect in usable} == {("reference",)}
     assert LIBRARY["plate_bending"] not in usable, "the temperatures of the plate are not measured"

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import compd
 from compd.model.effect import Effect
-from compd.model.motion import Movement
-from compd.model.observe import observe_external
+from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED
 
@@ -32,16 +31,8 @@ def moved_um(
     time_s = quantities.pop("time_s", None)
     count = max([len(np.atleast_2d(tip_mm)), *map(len, quantities.values())])
     time_s = np.arange(count, dtype=float) if time_s is None else time_s
-    no_links = np.zeros((count, 0))
-    rows = observe_external(
-        np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3)),
-        scale_mm=no_links,
-        movement=Movement.unknown(no_links, no_links),
-        quantities=quantities,
-        time_s=time_s,
-        session_start=np.arange(count) == 0,
-        recorded=frozenset(),
-    )
+    tip_M_mm = np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3))
+    rows = external_rows(tip_M_mm, quantities, time_s=time_s)
     basis, _ = compd.load_effects(library)[id_].basis(rows, constants or {}, None)
     assert not basis[:, 2:].any()
     return np.asarray(basis[:, :2] * 1e3)

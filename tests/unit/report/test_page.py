@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from plotly.graph_objects import Figure
 
-from compd.report.page import SHARED_SCRIPT, PageTable, Panel, write_page
+from compd.report.page import SHARED_SCRIPT, Panel, write_page
+from compd.report.page_table import PageTable
 
 NASTY = '<script>alert("1 & 2")</script>'
 VOID = {"meta", "br", "!doctype"}

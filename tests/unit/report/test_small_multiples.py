@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.covariates import Covariate
-from compd.report.small_multiples import _axis_unit
+from compd.report.small_multiples import axis_unit
 
 
 @pytest.mark.parametrize(
@@ -20,4 +20,4 @@ from compd.report.small_multiples import _axis_unit
     ],
 )
 def test_only_a_direction_of_travel_is_shortening_or_lengthening(name: str, unit: str, shown: str) -> None:
-    assert _axis_unit(Covariate(name, unit, np.zeros(2))) == shown
+    assert axis_unit(Covariate(name, unit, np.zeros(2))) == shown

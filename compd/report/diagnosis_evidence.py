@@ -1,0 +1,155 @@
+"""The evidence of a diagnosis as tables and text, the same on the page and in the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from compd.diagnosis.error_fall import ErrorFall
+from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
+from compd.diagnosis.phrases import change_text, gross_texts, is_change, parameter_texts, short_name, untested_here
+from compd.diagnosis.verdict import Diagnosis
+from compd.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
+from compd.report.page_table import PageTable
+
+# Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
+YAML_WIDTH = 76
+# Single gross rows that are listed.
+GROSS_ROWS = 40
+
+
+def step_rows(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> list[tuple[str, str]]:
+    """An effect's equation, numbers, share and rivals; number : of the step, from 0."""
+    step = diagnosis.steps[number]
+    links = diagnosis.after.aligned.rows.links
+    before = fall.before if number == 0 else fall.steps[number - 1]
+    rows = [("equation", step.effect.equation)]
+    rows += parameter_texts(step, links).items()
+    rows += [
+        ("error, rows left out", fall_text([before, step.heldout_rms_um], fall.unit)),
+        ("explains", f"{percent_text(step.explained_fraction)} of the squared error that was left{_above(fall)}"),
+        ("by noise alone", f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"),
+        ("rivals", _rivals(step)),
+        ("told apart by", step.effect.separated_by),
+    ]
+    return rows
+
+
+def _above(fall: ErrorFall) -> str:
+    return " above noise" if fall.noise_known else ""
+
+
+def _rivals(step: DiagnosisStep) -> str:
+    shown = [f"{rival.name} ({percent_text(rival.cosine)} alike on these rows)" for rival in step.rivals]
+    return ", ".join(shown) or "none"
+
+
+def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
+    """The constant of each coordinate with its standard error; None where there is none."""
+    constant = diagnosis.constant
+    if constant is None:
+        return None
+    rows = [
+        (axis, estimate_text(value, constant.std_um.get(axis, math.nan), fall.unit))
+        for axis, value in constant.by_axis_um.items()
+    ]
+    rows.append(("may come from", ", ".join(constant.effects) or "where zero was set"))
+    if constant.separated_by:
+        rows.append(("told apart by", constant.separated_by))
+    return PageTable(("", "a constant in every row"), rows)
+
+
+def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """How many rows nothing explains, and which."""
+    return "; ".join(gross_texts(diagnosis.gross, diagnosis.after, fall.unit, GROSS_ROWS))
+
+
+def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
+    """What the rest follows, and what changed, the strongest first."""
+    rows = [
+        (
+            change_text(finding, diagnosis) if is_change(finding) else short_name(finding),
+            finding.form,
+            finding.port,
+            percent_text(finding.explained_fraction),
+            number_text(finding.heldout_rms_um),
+            chance_text(finding.p_value) or "-",
+        )
+        for finding in diagnosis.depends_on
+    ]
+    return PageTable(("follows", "form", "port", "explains", f"left, {fall.unit}", "by noise alone"), rows)
+
+
+def candidates_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
+    """The effects that explain something, each tried alone on rows left out."""
+    rows = [
+        (
+            result.effect,
+            result.status,
+            percent_text(result.explained_fraction) if math.isfinite(result.explained_fraction) else "-",
+            number_text(result.heldout_rms_um) if math.isfinite(result.heldout_rms_um) else "-",
+            result.why,
+        )
+        for result in diagnosis.candidates
+        if result.status in ("explains", "partial")
+    ]
+    return PageTable(("effect", "status", "explains", f"left, {fall.unit}", "why"), rows)
+
+
+def without_gain(diagnosis: Diagnosis) -> list[str]:
+    """Ids of the effects that were tried and lower the error by nothing worth a name."""
+    return [result.effect for result in diagnosis.candidates if result.status == "no_gain"]
+
+
+def untested_table(diagnosis: Diagnosis) -> PageTable:
+    """The effects that these rows cannot test, with the reason; first those that may be behind what was found."""
+    behind = "; it may be behind what was found"
+    rows = {effect.effect: effect.why + behind * effect.likely for effect in untested_here(diagnosis)}
+    named = {effect.effect for effect in diagnosis.untested}
+    of_the_constant = set(diagnosis.constant.effects) if diagnosis.constant is not None else set()
+    for result in diagnosis.candidates:
+        if result.status == "not_testable" and result.effect not in named | of_the_constant:
+            rows.setdefault(result.effect, result.why)
+    return PageTable(("effect", "why, and what to measure"), list(rows.items()))
+
+
+def formula_list(diagnosis: Diagnosis) -> str:
+    """What describes the rest best, as a file of effects (a YAML list); "" where nothing does.
+
+    Each formula is an entry of its own; its fitted numbers stand behind it as comments.
+    """
+    finding = described_by(diagnosis)
+    if finding is None:
+        return ""
+    blocks = []
+    for effect, fitted in zip(finding.formula_effects, finding.parameters, strict=True):
+        text = yaml.safe_dump([_plain(effect)], sort_keys=False, default_flow_style=None, width=YAML_WIDTH)
+        numbers = ", ".join(f"{name} = {value:.4g}" for name, value in fitted.items())
+        blocks.append(f"{text}  # fitted: {numbers}\n")
+    return "".join(blocks)
+
+
+def described_by(diagnosis: Diagnosis) -> EmpiricalFinding | None:
+    """The first finding that comes with formulas."""
+    return next((finding for finding in diagnosis.depends_on if finding.formula_effects), None)
+
+
+def _plain(effect: Mapping[str, Any]) -> dict[str, Any]:
+    """A declaration with numbers as people write them: 301.0 is 301."""
+    parameters = {
+        name: {**keys, "plausible": [int(end) if float(end).is_integer() else end for end in keys["plausible"]]}
+        for name, keys in effect["parameters"].items()
+    }
+    return {**effect, "parameters": parameters}
+
+
+def next_table(diagnosis: Diagnosis) -> PageTable | None:
+    """Rows to measure, or what to vary and why; None where nothing is proposed."""
+    if not diagnosis.next_measurement:
+        return None
+    names = list(dict.fromkeys(name for row in diagnosis.next_measurement for name in row))
+    rows = [[str(row.get(name, "")) for name in names] for row in diagnosis.next_measurement]
+    return PageTable(names, rows)

@@ -1,0 +1,85 @@
+"""The part of an error that one effect or description makes, beside the residual that is left with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, rms
+from compd.comparison.compare import Comparison
+from compd.comparison.least_squares import solve_least_squares
+from compd.model.effect import FittedEffect
+from compd.model.sensitivity import link_residuals
+from compd.units import UM_PER_MM
+
+# Effects that add to each link: where link lengths follow from the tip, they are seen best there.
+LINK_PORTS = {"scale", "link"}
+# A series in which the part is smaller than this share of its largest is not drawn.
+LEAST_SHARE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorPart:
+    """What one effect does in N rows, in each of S series: measured coordinates, or links.
+
+    series : their names, such as ``"x"`` or ``"link 1"``.  at_links : whether they are links.
+    part, after : (N, S) what it does, and the residual that is left with it, in the recording's unit.
+    used : (N,) rows that count.
+    """
+
+    series: tuple[str, ...]
+    part: FloatArray
+    after: FloatArray
+    used: BoolArray
+    at_links: bool
+
+    @property
+    def before(self) -> FloatArray:
+        """(N, S) the residual without it, everything else that was found being there."""
+        return np.asarray(self.after + self.part)
+
+    def largest(self, most: int) -> list[int]:
+        """The series in which it does most, at most so many, in their order; none in which it does next to nothing."""
+        sizes = np.array([rms(self.part[self.used, k]) for k in range(len(self.series))])
+        order = [int(k) for k in np.argsort(-sizes)[:most] if sizes[k] > LEAST_SHARE * sizes.max()]
+        return sorted(order) or [0]
+
+
+def error_part(
+    comparison: Comparison, effects: Sequence[FittedEffect], described: Sequence[FittedEffect] = ()
+) -> ErrorPart:
+    """What effects do together.
+
+    comparison : whose model has the effects.  described : effects, among them these, that its model does not have: they
+    are taken off the residual first.
+    """
+    aligned = comparison.aligned
+    part_um = _moved(comparison, effects)
+    after_um = comparison.residual_um - (_moved(comparison, described) if described else 0.0)
+    used = comparison.used & np.isfinite(part_um).all(axis=1) & np.isfinite(after_um).all(axis=1)
+    on_links = all(set(fitted.effect.ports) <= LINK_PORTS for fitted in effects)
+    if on_links and comparison.link_residual_um is not None and aligned.rows.links == len(aligned.axes):
+        link = aligned.sensitivity(["link"])["link"]
+        labels = tuple(f"link {i + 1}" for i in range(aligned.rows.links))
+        parts = (link_residuals(link, part_um), link_residuals(link, np.nan_to_num(after_um)))
+        return ErrorPart(labels, *parts, used, at_links=True)
+    return ErrorPart(tuple(aligned.labels), part_um, after_um, used, at_links=aligned.of_links)
+
+
+def _moved(comparison: Comparison, effects: Sequence[FittedEffect]) -> FloatArray:
+    """(N, m) by how much effects move the prediction, um, without what is fitted along in any case.
+
+    That is a constant or a motion of the instrument's frame, which takes a share of every effect.
+    """
+    aligned = comparison.aligned
+    moved_um = np.zeros(comparison.residual_um.shape)
+    for fitted in effects:
+        moved_um += aligned.columns(fitted.effect, fitted.constants) @ fitted.theta * UM_PER_MM
+    fixed = aligned.registration_columns
+    if not fixed.shape[2]:
+        return moved_um
+    rows = comparison.used & np.isfinite(moved_um).all(axis=1) & np.isfinite(fixed).all(axis=(1, 2))
+    taken = solve_least_squares(fixed[rows].reshape(-1, fixed.shape[2]), moved_um[rows].reshape(-1))
+    return np.asarray(moved_um - fixed @ taken)
