@@ -15,6 +15,8 @@ Source: P. J. Huber, Robust Statistics, Wiley 1981, chapters 5 (scale) and 7 (re
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from compd.arrays import FloatArray
@@ -94,25 +96,34 @@ def _proposal_2(squares: FloatArray, weight: FloatArray) -> float:
     return float(variance[np.argmax(agrees)])
 
 
-def huber_weights(residual: FloatArray, exponent: float = 1.0) -> FloatArray:
+def huber_weights(
+    residual: FloatArray, exponent: float = 1.0, scale: Callable[[FloatArray], FloatArray] = robust_sigma
+) -> FloatArray:
     """(N,) weight of each row of a residual (N, m) by its worst coordinate.
 
-    With u_i = max_j |r_ij| / sigma_j, sigma by `robust_sigma`: w_i = min(1, HUBER / u_i)^exponent. Exponent 1 is
-    Huber's weight, where an outlier keeps a bounded pull; with 2 its pull falls as 1 / u.
+    With u_i = max_j |r_ij| / sigma_j, sigma by `scale`: w_i = min(1, HUBER / u_i)^exponent. Exponent 1 is Huber's
+    weight, where an outlier keeps a bounded pull; with 2 its pull falls as 1 / u.
     """
-    size = (np.abs(residual) / np.maximum(robust_sigma(residual), LEAST_SIGMA)).max(axis=1)
+    size = (np.abs(residual) / np.maximum(scale(residual), LEAST_SIGMA)).max(axis=1)
     return np.asarray(np.minimum(1.0, HUBER / np.maximum(size, HUBER)) ** exponent)
 
 
 def robust_regression(
-    G: FloatArray, y: FloatArray, *, ridge: float | None = None, exponent: float = 1.0, rounds: int = ROUNDS
+    G: FloatArray,
+    y: FloatArray,
+    *,
+    ridge: float | None = None,
+    exponent: float = 1.0,
+    rounds: int = ROUNDS,
+    scale: Callable[[FloatArray], FloatArray] = robust_sigma,
 ) -> FloatArray:
     """(P,) parameters theta of y = G theta, by iteratively reweighted least squares.
 
     G : (N, m, P) columns.  y : (N, m), all coordinates with the same standard deviation.
     ridge : None solves with a rank cut. A number holds every parameter near 0 by this share of its column's squared
     norm: for more columns than the rows may determine.
-    exponent : of `huber_weights`.  rounds : of reweighting.
+    exponent, scale : of `huber_weights`.  rounds : of reweighting. `robust_sigma` stands 5 % of outliers and takes no
+    few rows for outliers on which an effect acts; `trimmed_scale` stands 23 %.
     """
     N, m, P = G.shape
     A, flat = G.reshape(N * m, P), y.ravel()
@@ -127,5 +138,5 @@ def robust_regression(
         else:
             weighted = A * row_weights[:, None]
             theta = solve_ridge(weighted.T @ A, weighted.T @ flat, np.full(P, ridge))
-        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent)
+        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent, scale)
     return np.asarray(theta / norms)

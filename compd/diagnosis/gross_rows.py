@@ -60,7 +60,9 @@ def weigh_rows(
     G = np.concatenate([constant, *columns], axis=2)
     if G.shape[2] > MOST_COLUMNS * known.sum() * m:
         G = G[:, :, :m]
-    theta = robust_regression(G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS)
+    theta = robust_regression(
+        G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+    )
     left = residual - G @ theta
     judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
     scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)

@@ -91,7 +91,7 @@ class DiagnosisProblem:
 
     def is_at_floor(self, loss: float) -> bool:
         """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
-        return self.floor_known and loss <= self.criteria.most_at_floor
+        return self.floor_known and loss <= self.most_at_floor
 
     @property
     def most_at_floor(self) -> float:

@@ -28,13 +28,15 @@ def record_external(
     *,
     model_mm: Mapping[str, FloatArray] | None = None,
     sigma_um: float = SIGMA_UM,
+    declared_um: float | None = SIGMA_UM,
     seed: int = 1,
     frame: str = "machine",
 ) -> AlignedRecording:
     """A recording, written and read: what was measured besides, and the error along each axis to which noise is added.
 
     columns : without `time_s` a row is measured every ten seconds; nan is an empty cell.
-    model_mm : the prediction by axis; 0 if left out.
+    model_mm : the prediction by axis; 0 if left out.  sigma_um : of the noise.  declared_um : of the noise, as the
+    sidecar says; None where it says nothing.
     """
     rng = np.random.default_rng(seed)
     count = len(next(iter(errors_um.values())))
@@ -46,7 +48,9 @@ def record_external(
     lines = [",".join(table)]
     lines += [",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    reference = {"quantity": "tool_position", "frame": frame, "sigma_um": sigma_um}
+    reference: dict[str, object] = {"quantity": "tool_position", "frame": frame}
+    if declared_um is not None:
+        reference["sigma_um"] = declared_um
     path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": "external", "reference": reference}))
     return align_recording(read_recording(path, None), None)
 

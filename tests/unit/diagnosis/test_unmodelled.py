@@ -24,11 +24,11 @@ def test_an_effect_of_the_same_form_adds_its_whole_rms(tmp_path: Path) -> None:
     result = fit(aligned, [initial_effect(effect, {}, aligned.rows.links)], SIGMA_UM)
     columns_um = aligned.columns(effect, {}) * UM_PER_MM
     twin = Candidate("twin", effect, columns_um, np.array([[0.0, 1.0]]), 0)
-    criteria = Criteria(disturbance=0.3, disturbances=2)
+    criteria = Criteria(disturbance=0.3)
     wider = with_disturbances(result, aligned, SIGMA_UM, [twin], criteria)
     rms = float(np.sqrt(np.mean((columns_um[result.used] / SIGMA_UM[:, None]) ** 2)))
     added = wider.covariance[0, 0] - result.covariance[0, 0]
-    assert np.sqrt(added) == pytest.approx(0.3 * np.sqrt(2) / rms, rel=1e-6)
+    assert np.sqrt(added) == pytest.approx(0.3 / rms, rel=1e-6)
     assert wider.fitted[0].covariance[0, 0] == wider.covariance[0, 0]
     assert np.array_equal(wider.fitted[0].theta, result.fitted[0].theta)
 
@@ -37,7 +37,7 @@ def test_more_disturbance_is_more_uncertainty_and_none_is_none(tmp_path: Path) -
     aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 30,)})
     result = fit(aligned, [initial_effect(LIBRARY["link_elasticity"], {}, aligned.rows.links)], SIGMA_UM)
     criteria = Criteria()
-    pool = library_pool(aligned, list(LIBRARY.values()), ["link_elasticity"], criteria)
+    pool = library_pool(aligned, list(LIBRARY.values()), ["link_elasticity"])
 
     def variance(disturbance: float) -> float:
         changed = replace(criteria, disturbance=disturbance)
