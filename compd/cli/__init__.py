@@ -1,6 +1,12 @@
 """The command line: one file per command."""
 
+import os
 import sys
+
+# Matrices are small here: more threads of the linear algebra wait for each other, and beside other programs that costs
+# ten times what the work takes. Read when numpy is first imported; a person's own setting holds.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def main() -> None:

@@ -220,7 +220,7 @@ def _everything(
         first_variants.setdefault(candidate.name, candidate)
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
-    for values in (time_s, time_s**2, *aligned.recording.quantities.values()):
+    for values in (time_s, time_s**2, *aligned.gaps_filled.rows.quantities.values()):
         without_gaps = filled(values, time_s)
         column = without_gaps[known]
         if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:

@@ -41,7 +41,7 @@ def propose_measurement(
                 "why": "without repeats or a declared uncertainty nobody knows how much of the error is noise",
             }
         ]
-    follows = [finding for finding in diagnosis.depends_on if not finding.effect]
+    follows = [finding for finding in diagnosis.depends_on if not finding.effect and finding.covariate != "time_s"]
     if follows:
         return [_to_vary(finding) for finding in follows[:MOST_COVARIATES]]
     constant = diagnosis.constant

@@ -38,7 +38,7 @@ def proxy_candidates(
 
     present : ids of the model's effects, which are left out.
     """
-    rows, usable = aligned.rows, aligned.usable.mask
+    rows, usable = aligned.gaps_filled.rows, aligned.usable.mask
     thermometers = [
         name
         for name, values in rows.quantities.items()
