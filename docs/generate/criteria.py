@@ -65,4 +65,4 @@ def _row(criterion: Field[Any], tried: bool) -> list[str]:
     if not tried:
         return cells
     changed = counts()["thresholds"].get(criterion.name, {})
-    return [*cells, *(changed.get(change, "") for change in ("half", "twice"))]
+    return [*cells, *(changed.get(change, "not counted") for change in ("half", "twice"))]
