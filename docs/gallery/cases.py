@@ -96,7 +96,7 @@ CASES = (
         title="Outside the library: a cable pulls",
         machine="tripod-cmm",
         effects=("cable_drag",),
-        seed=1,
+        seed=3,
         verdict="unexplained",
         look_at="No effect of the library is the right one, and none is named. Instead the verdict says what the error "
         "follows, and proposes a formula which can be used until the cause is known. The page's figure of the rest "

@@ -23,12 +23,6 @@ def counts() -> dict[str, Any]:
     return read
 
 
-def of_all(name: str, change: str = "") -> str:
-    """Right, near and dangerous with one change: "17/18/0"."""
-    found = counts()["thresholds"][name][change] if change else counts()[name]
-    return "/".join(str(count) for count in found[:3])
-
-
 INTRODUCTION = f"""\
 The result of `compd compare` and the verdict of `compd diagnose` rest on the thresholds of this page and on no others.
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says
@@ -39,8 +33,8 @@ Losses are mean squares per measured value divided by the variance of the noise:
 difference of losses is in squares of the noise floor. Where the unit is 1, the number has none.
 
 What a number does shows when it is halved and doubled, alone, and simulated machines are diagnosed again
-(`{counts()["command"]}`, {counts()["counted"]}, {counts()["as it is"][3]} machines). The counts are *right, near and dangerous*, as [How often it is
-right](../explanation/how-often-it-is-right.md) explains them; with all numbers as they are, {of_all("as it is")}.
+(`{counts()["command"]}`, {counts()["counted"]}, {counts()["cases"]} machines). The counts are *right, near and
+dangerous*, as [How often it is right](../explanation/how-often-it-is-right.md) explains them; with all numbers as they are, {counts()["as it is"]}.
 
 In Python, hand other thresholds to `compd.diagnose` as `criteria=`.
 """
@@ -70,5 +64,5 @@ def _row(criterion: Field[Any], tried: bool) -> list[str]:
     cells = [f"{code(criterion.name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
     if not tried:
         return cells
-    known = criterion.name in counts()["thresholds"]
-    return [*cells, *(of_all(criterion.name, change) if known else "" for change in ("half", "twice"))]
+    changed = counts()["thresholds"].get(criterion.name, {})
+    return [*cells, *(changed.get(change, "not counted") for change in ("half", "twice"))]

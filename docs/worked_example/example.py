@@ -20,8 +20,8 @@ from compd.comparison.open import open_recording
 from compd.comparison.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
 from compd.diagnosis.candidates import Candidate, library_pool
-from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.explanation import Explanation, explain, explain_again
 from compd.diagnosis.gross_rows import EXPONENT, RIDGE, ROUNDS

@@ -96,10 +96,10 @@ def prediction(example: Example, sheets: Sheets) -> str:
 
 def scores(sheets: Sheets) -> str:
     """Log loss and prices of the sets, one on the other."""
-    names = {"0": "nothing", "a": "a: link_elasticity", "ab": "a and b: frame_rod_expansion", "c": "c: joint_contact"}
+    names = ["nothing", "a: link_elasticity", "a and b: frame_rod_expansion", "c: joint_contact"]
     plot = Plot(220, 30, 440, 190, (0, 2.2), (0, 4))
     plot.axes([0, 0.5, 1, 1.5, 2], [], "score: the less, the better", "")
-    for k, (name, words) in enumerate(names.items()):
+    for k, words in enumerate(names):
         row, middle = 2 + k, 3.5 - k
         log_loss, prices = (sheets.book.number(Address("Verdict", row, column)) for column in (3, 4))
         plot.bar((0, log_loss), (middle - 0.28, middle + 0.28), PLAIN)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -61,10 +62,10 @@ class Sheets:
             "Blue cells are formulas, black ones are given: by the recording, by the machine's model, or by compd.",
             "Change a black cell, for instance a residual on the sheet Rows, and see what becomes of the verdict.",
             "",
-            f"Three effects: a = {names[0]}, b = {names[1]}, c = {names[2]}. A set is written by its letters, 0 is none.",
+            f"Three effects: a = {names[0]}, b = {names[1]}, c = {names[2]}. Sets are their letters; 0 is none.",
             "",
             "Criteria: the numbers on which the verdict rests.",
-            "Rows: for each row of the recording its folds, the residual, and what one unit of each effect does, in um.",
+            "Rows: for each row of the recording its folds, the residual, and what a unit of each effect does, in um.",
             "Noise: the noise floor from the differences of repeats, and its test against what is declared.",
             "Weights: residual and effects divided by the noise; which rows are gross, and what the others weigh.",
             "Sums: weighted sums of products of each row; what each set leaves of a row that was left out.",
@@ -128,7 +129,7 @@ class Sheets:
         last = FIRST + len(pairs.weight) - 1
         weight = f"$C${FIRST}:$C${last}"
         values = {axis: f"${letter}${FIRST}:${letter}${last}" for axis, letter in zip(AXES, "DEF", strict=True)}
-        scale = self._scale("Noise", 9, values, {axis: weight for axis in AXES})
+        scale = self._scale("Noise", 9, values, dict.fromkeys(AXES, weight))
         declared_um = comparison.aligned.recording.reference_sigma_mm * UM_PER_MM
         gauges_um = np.sqrt(np.mean(comparison.uncertainty.gauges_um[comparison.used] ** 2, axis=0))
         reference_mm = comparison.aligned.recording.reference_mm
@@ -226,8 +227,7 @@ class Sheets:
                     for x in AXES
                 )
                 cells.append(f"={self._cell('Weights', 'weight', k)}*({terms})")
-            for members in SETS.values():
-                cells.append(self._left(members, k, column))
+            cells += [self._left(members, k, column) for members in SETS.values()]
             cells.append(f"={column['left by 0']}{k}-{column['left by a']}{k}")
             cells.append(f"={column['left by a']}{k}-{column['left by ab']}{k}")
             cells.append(f"={column['left by c']}{k}-{column['left by a']}{k}")
@@ -319,10 +319,7 @@ class Sheets:
         ends = np.cumsum([FIRST, *(int(split.max()) + 1 for split in self.example.splits)])
         for k, name in enumerate(SETS):
             letter = column_letters(self.FOLD_NAMES.index(f"left by {name}") + 1)
-            by_split = [
-                f"=SUM({letter}{begin}:{letter}{end - 1})/{count}"
-                for begin, end in zip(ends[:-1], ends[1:], strict=True)
-            ]
+            by_split = [f"=SUM({letter}{begin}:{letter}{end - 1})/{count}" for begin, end in pairwise(ends)]
             row = 21 + k
             self.book.put("Folds", row, 1, [name, *by_split, f"=(B{row}+C{row})/2"])
             self.results[f"loss_{name}"] = Address("Folds", row, 4)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from datetime import UTC, datetime
 from collections.abc import Iterator, Sequence
 from dataclasses import Field, fields, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -101,19 +101,21 @@ def run_variant(trial: Trial) -> dict[str, Any]:
 
 
 def figures(results: Sequence[Result], every: int) -> dict[str, Any]:
-    """The counts as docs/generate/criteria.py reads them: right, near, dangerous and all, by threshold and change.
+    """The counts as docs/generate/criteria.py reads them: right/near/dangerous, by threshold and change.
 
     every : one of so many cases was tried.
     """
     counts = {variant: _counts(results, variant) for variant in variants()}
+    unchanged = Variant("", UNCHANGED)
     return {
         "counted": datetime.now(UTC).date().isoformat(),
         "command": "make sensitivity" + (f' OPTIONS="--every {every}"' if every > 1 else ""),
-        "as it is": counts[Variant("", UNCHANGED)],
+        "cases": counts[unchanged][-1],
+        "as it is": _shares(counts[unchanged]),
         "thresholds": {
-            name: {change: counts[Variant(name, change)] for change in FACTORS}
+            name: {change: _shares(counts[Variant(name, change)]) for change in FACTORS}
             for name in thresholds()
-            if all(counts[Variant(name, change)][-1] for change in FACTORS)
+            if all(counts[Variant(name, change)][-1] == counts[unchanged][-1] for change in FACTORS)
         },
     }
 
@@ -138,9 +140,12 @@ def _counts(results: Sequence[Result], variant: Variant) -> list[int]:
     return [*(sum(result[key] for result in group) for key in ("right", "near", "dangerous")), len(group)]
 
 
+def _shares(counts: Sequence[int]) -> str:
+    return "/".join(str(count) for count in counts[:3])
+
+
 def _text(counts: Sequence[int]) -> str:
-    right, near, dangerous, count = counts
-    return f"{right}/{near}/{dangerous} of {count}" if count else "-"
+    return f"{_shares(counts)} of {counts[-1]}" if counts[-1] else "-"
 
 
 if __name__ == "__main__":

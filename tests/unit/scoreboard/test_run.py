@@ -14,7 +14,7 @@ from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare
 from tests.scoreboard.real import prepare_real
 from tests.scoreboard.scoring import score
-from tests.scoreboard.sensitivity import FACTORS, UNCHANGED, Variant, changed, table, thresholds, variants
+from tests.scoreboard.sensitivity import FACTORS, UNCHANGED, Variant, changed, figures, table, thresholds, variants
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepared, read_answer, run
 
@@ -93,6 +93,17 @@ def test_the_sensitivities_are_a_row_per_threshold():
     assert lines[4].startswith(f"| `{name}` | ")
     assert lines[4].endswith(" | 0/1/0 of 1 | - |")
     assert len(lines) == 4 + len(thresholds())
+
+
+def test_the_documentation_gets_the_thresholds_that_were_counted_whole():
+    name = next(iter(thresholds()))
+    line = {"case": "a", "right": True, "near": True, "dangerous": False}
+    changes = [("", UNCHANGED), (name, "half"), (name, "twice")]
+    counted = figures([line | {"name": number, "change": change} for number, change in changes], every=8)
+    assert counted["command"] == 'make sensitivity OPTIONS="--every 8"'
+    assert counted["cases"] == 1
+    assert counted["as it is"] == "1/1/0"
+    assert counted["thresholds"] == {name: {"half": "1/1/0", "twice": "1/1/0"}}
 
 
 def test_real_recordings_are_cases_too(tmp_path):
