@@ -30,9 +30,7 @@ def noise(sheets: Sheets) -> str:
     cells = sheets.book.sheets["Noise"]
     count = sum(1 for row, column in cells if column == 4 and row >= FIRST)
     values = [
-        sheets.book.number(Address("Noise", row, column))
-        for row in range(FIRST, FIRST + count)
-        for column in (4, 5, 6)
+        sheets.book.number(Address("Noise", row, column)) for row in range(FIRST, FIRST + count) for column in (4, 5, 6)
     ]
     sigma = sheets.book.number(sheets.results["floor"])
     edges = np.arange(-0.65, 0.66, 0.05)
@@ -64,7 +62,9 @@ def rows_left_out(example: Example) -> str:
     ticks = [float(tick) for tick in range(0, int(np.ceil(time_h.max())) + 1, max(1, int(time_h.max() // 6)))]
     by_time.axes(ticks, [-100, -50, 0, 50, 100], "time, h", "x of the tip, mm: four sessions")
     by_place = Plot(460, 40, 260, 260, (-105, 105), (-105, 105))
-    by_place.axes([-100, -50, 0, 50, 100], [-100, -50, 0, 50, 100], "x of the tip, mm", "y of the tip, mm: five sectors")
+    by_place.axes(
+        [-100, -50, 0, 50, 100], [-100, -50, 0, 50, 100], "x of the tip, mm", "y of the tip, mm: five sectors"
+    )
     for k, colour in enumerate(SECTOR_COLOURS):
         rows = [i for i, fold in enumerate(session) if fold == k]
         by_time.dots(time_h[rows].tolist(), tip_mm[rows, 0].tolist(), colour)

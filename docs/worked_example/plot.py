@@ -82,7 +82,7 @@ def picture(title: str, width: int, height: int, plots: Sequence[Plot], more: Se
     """The SVG of some plots."""
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
-        "font-family=\"system-ui, 'DejaVu Sans', sans-serif\" font-size=\"13\">"
+        'font-family="system-ui, \'DejaVu Sans\', sans-serif" font-size="13">'
     )
     body = [part for plot in plots for part in plot.parts]
     background = f'<rect width="{width}" height="{height}" rx="8" fill="#fff"/>'

@@ -336,7 +336,9 @@ class Sheets:
         for name in gains:
             values = self._range("Sums", name)
             columns.append([f"=SUMIF({keys},A{k},{values})" for k in range(FIRST, FIRST + count)])
-        about = "Squares gained on rows left out, summed over each block; divided by the number of values: gain and error"
+        about = (
+            "Squares gained on rows left out, summed over each block; divided by the number of values: gain and error"
+        )
         self._table("Blocks", about, ["block", *gains], columns)
         last = FIRST + count - 1
         values = self.results["values"]
@@ -435,7 +437,11 @@ class Sheets:
             row = FIRST
             kept = "1"
             for number in range(PASSES):
-                start = f"=SQRT(SUMPRODUCT({w}*{kept},{d}^2)/SUMPRODUCT({w}*{kept}))" if number == 0 else f"={letter}{row - 1}"
+                start = (
+                    f"=SQRT(SUMPRODUCT({w}*{kept},{d}^2)/SUMPRODUCT({w}*{kept}))"
+                    if number == 0
+                    else f"={letter}{row - 1}"
+                )
                 self.book.put(sheet, row, place, [start])
                 for step in range(STEPS):
                     s = f"{letter}{row + step}"

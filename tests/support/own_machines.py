@@ -103,7 +103,9 @@ def milling_table(seed: int, hidden: Mapping[str, float], frame: str = "machine"
     humidity = np.round(50 + 8 * np.sin(time_s / 250 + 2), 2)
     size = {"table_scale": 0.0, "table_squareness": 0.0, "screw_expansion": 0.0, "backlash_x": 0.0, "humidity": 0.0}
     size |= hidden
-    x_um = size["table_scale"] * nominal_mm[0] + size["table_squareness"] * nominal_mm[1] + size["backlash_x"] * moved[0]
+    x_um = (
+        size["table_scale"] * nominal_mm[0] + size["table_squareness"] * nominal_mm[1] + size["backlash_x"] * moved[0]
+    )
     x_um += size["screw_expansion"] * (spindle - 20) * nominal_mm[0] / 1000 + size["humidity"] * (humidity - 50)
     error_um = np.stack([x_um, size["table_scale"] * nominal_mm[1]]) + rng.normal(0, NOISE_UM, nominal_mm.shape)
     measured_mm = np.round(nominal_mm + error_um / UM_PER_MM, 6)

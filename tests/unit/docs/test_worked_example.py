@@ -93,7 +93,9 @@ def test_ranges_and_other_sheets_are_read() -> None:
     book = Spreadsheet()
     book.put("Rows", 1, 1, [1.0, 2.0, 3.0])
     book.put("Rows", 2, 1, [4.0, 5.0, 6.0])
-    book.put("Sums", 1, 1, ["=SUMPRODUCT(Rows!$A$1:$C$1,Rows!A2:C2*(Rows!A2:C2>=5))", "=SUMIF(Rows!A1:C1,2,Rows!A2:C2)"])
+    book.put(
+        "Sums", 1, 1, ["=SUMPRODUCT(Rows!$A$1:$C$1,Rows!A2:C2*(Rows!A2:C2>=5))", "=SUMIF(Rows!A1:C1,2,Rows!A2:C2)"]
+    )
     book.put("Sums", 2, 1, ["=INDEX(Rows!A2:C2,MATCH(3,Rows!A1:C1,0))-Sums!B1"])
     assert [book.value(Address("Sums", 1, column)) for column in (1, 2)] == [28.0, 5.0]
     assert book.value(Address("Sums", 2, 1)) == 1.0
