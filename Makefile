@@ -112,8 +112,15 @@ $(GALLERY): $(shell find compd drivers config docs/gallery -name '*.py' -o -name
 	$(BIN)/python -m docs.gallery --screenshots $(or $(SCREENSHOTS),where-possible)
 	@touch $@
 
+# A simulation, a diagnosis and a spreadsheet: 20 seconds.
+EXAMPLE := docs/_build/worked-example/.made
+
+$(EXAMPLE): $(shell find compd config docs/worked_example -name '*.py' -o -name '*.yaml') | $(STAMP)
+	$(BIN)/python -m docs.worked_example
+	@touch $@
+
 # Begun afresh, so that the wheel has no page of yesterday.
-docs: $(STAMP) $(GALLERY)
+docs: $(STAMP) $(GALLERY) $(EXAMPLE)
 	rm -rf docs/_build/html
 	$(BIN)/python -m docs.generate
 	$(BIN)/sphinx-build --builder html --fail-on-warning --keep-going --quiet \

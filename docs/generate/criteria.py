@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import Field, fields
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
+
+# Written by `python -m tests.scoreboard.sensitivity --figures`.
+COUNTS = Path(__file__).parent.parent / "sensitivity.json"
+
+
+@cache
+def counts() -> dict[str, Any]:
+    """What halving and doubling each threshold does."""
+    read: dict[str, Any] = json.loads(COUNTS.read_text(encoding="utf-8"))
+    return read
+
+
+def of_all(name: str, change: str = "") -> str:
+    """Right, near and dangerous with one change: "17/18/0"."""
+    found = counts()["thresholds"][name][change] if change else counts()[name]
+    return "/".join(str(count) for count in found[:3])
+
 
 INTRODUCTION = f"""\
 The result of `compd compare` and the verdict of `compd diagnose` rest on the thresholds of this page and on no others.
@@ -17,6 +37,10 @@ enters.
 
 Losses are mean squares per measured value divided by the variance of the noise: 1.0 is the {term("noise floor")}, and a
 difference of losses is in squares of the noise floor. Where the unit is 1, the number has none.
+
+What a number does shows when it is halved and doubled, alone, and simulated machines are diagnosed again
+(`{counts()["command"]}`, {counts()["counted"]}, {counts()["as it is"][3]} machines). The counts are *right, near and dangerous*, as [How often it is
+right](../explanation/how-often-it-is-right.md) explains them; with all numbers as they are, {of_all("as it is")}.
 
 In Python, hand other thresholds to `compd.diagnose` as `criteria=`.
 """
@@ -34,14 +58,17 @@ def page() -> str:
 
 def _part(title: str, name: str, kind: type[Any]) -> str:
     criteria = [field for field in fields(kind) if isinstance(field.default, int | float)]
-    return join(
-        heading(2, title, target("criteria", name)),
-        table(["criterion and its default", "meaning, and the reason for the default"], map(_row, criteria)),
-    )
+    tried = any(criterion.name in counts()["thresholds"] for criterion in criteria)
+    header = ["criterion and its default", "meaning, and the reason for the default", *(["half", "twice"] * tried)]
+    return join(heading(2, title, target("criteria", name)), table(header, [_row(field, tried) for field in criteria]))
 
 
-def _row(criterion: Field[Any]) -> list[str]:
+def _row(criterion: Field[Any], tried: bool) -> list[str]:
     unit = criterion.metadata["unit"]
     default = f"{criterion.default:g}" + ("" if unit == "1" else f" {escape(unit)}")
     meaning, reason = (escape(sentence(criterion.metadata[key])) for key in ("meaning", "reason"))
-    return [f"{code(criterion.name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
+    cells = [f"{code(criterion.name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
+    if not tried:
+        return cells
+    known = criterion.name in counts()["thresholds"]
+    return [*cells, *(of_all(criterion.name, change) if known else "" for change in ("half", "twice"))]

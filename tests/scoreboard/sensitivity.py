@@ -2,12 +2,15 @@
 
 Every threshold of `Criteria` is halved and doubled, one at a time, and the prepared cases are diagnosed with it. The
 table says for each how many are right, near and dangerous then; a number without an effect on these cases can be any.
+With --figures docs/sensitivity.json the reference of the criteria shows them.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+from datetime import UTC, datetime
 from collections.abc import Iterator, Sequence
 from dataclasses import Field, fields, replace
 from pathlib import Path
@@ -44,6 +47,7 @@ def main() -> None:
     add("--name", nargs="+", default=None, help="these thresholds alone")
     add("--every", type=int, default=1, help="one of so many cases, evenly spread over the families")
     add("--jobs", type=int, default=os.cpu_count(), help="side by side")
+    add("--figures", type=Path, default=None, help="write the counts to this file of the documentation, too")
     options = parser.parse_args()
     directories = prepared(options.campaigns)[:: options.every]
     wanted = [variant for variant in variants() if not options.name or variant.name in ("", *options.name)]
@@ -58,6 +62,8 @@ def main() -> None:
     failed = append_results(options.out, run_variant, todo, options.jobs)
     results = [result for result in read_results(options.out) if result["case"] in cases]
     print("\n".join(table(results)))
+    if options.figures:
+        options.figures.write_text(json.dumps(figures(results, options.every), indent=1) + "\n", encoding="utf-8")
     for name, why in failed:
         print(f"failed: {name}: {why}")
     raise SystemExit(bool(failed))
@@ -94,9 +100,27 @@ def run_variant(trial: Trial) -> dict[str, Any]:
     }
 
 
+def figures(results: Sequence[Result], every: int) -> dict[str, Any]:
+    """The counts as docs/generate/criteria.py reads them: right, near, dangerous and all, by threshold and change.
+
+    every : one of so many cases was tried.
+    """
+    counts = {variant: _counts(results, variant) for variant in variants()}
+    return {
+        "counted": datetime.now(UTC).date().isoformat(),
+        "command": "make sensitivity" + (f' OPTIONS="--every {every}"' if every > 1 else ""),
+        "as it is": counts[Variant("", UNCHANGED)],
+        "thresholds": {
+            name: {change: counts[Variant(name, change)] for change in FACTORS}
+            for name in thresholds()
+            if all(counts[Variant(name, change)][-1] for change in FACTORS)
+        },
+    }
+
+
 def table(results: Sequence[Result]) -> Iterator[str]:
     """A Markdown table: right/near/dangerous with every threshold halved and doubled."""
-    counts = {variant: _counts(results, variant) for variant in variants()}
+    counts = {variant: _text(_counts(results, variant)) for variant in variants()}
     yield f"As it is, right/near/dangerous of all: {counts[Variant('', UNCHANGED)]}."
     yield ""
     yield "| number | default | half | twice |"
@@ -108,12 +132,15 @@ def table(results: Sequence[Result]) -> Iterator[str]:
         yield f"| `{name}` | {default} | {cells} |"
 
 
-def _counts(results: Sequence[Result], variant: Variant) -> str:
+def _counts(results: Sequence[Result], variant: Variant) -> list[int]:
+    """How many are right, near, dangerous, and how many there are."""
     group = [result for result in results if (result["name"], result["change"]) == variant]
-    if not group:
-        return "-"
-    right, near, dangerous = (sum(result[key] for result in group) for key in ("right", "near", "dangerous"))
-    return f"{right}/{near}/{dangerous} of {len(group)}"
+    return [*(sum(result[key] for result in group) for key in ("right", "near", "dangerous")), len(group)]
+
+
+def _text(counts: Sequence[int]) -> str:
+    right, near, dangerous, count = counts
+    return f"{right}/{near}/{dangerous} of {count}" if count else "-"
 
 
 if __name__ == "__main__":

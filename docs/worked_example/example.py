@@ -1,0 +1,113 @@
+"""The example: a simulated recording, its diagnosis, and what the diagnosis computed on the way."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.cli.main import app
+from compd.comparison.cluster_covariance import neighbour_blocks
+from compd.comparison.compare import compare
+from compd.comparison.open import open_recording
+from compd.comparison.robust import robust_regression, trimmed_scale
+from compd.configuration.shipped import shipped_configuration
+from compd.diagnosis.candidates import Candidate, library_pool
+from compd.diagnosis.cross_validation import row_splits
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.explanation import Explanation, explain, explain_again
+from compd.diagnosis.gross_rows import EXPONENT, RIDGE, ROUNDS
+from compd.diagnosis.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.proxies import proxy_candidates
+from compd.diagnosis.verdict import Diagnosis
+from compd.model.library import load_library
+
+SEED, HIDDEN = 5, "link_elasticity"
+# A second member that would lower the loss a little, and an effect that does nearly the same: for the scores.
+SECOND, ALIKE = "frame_rod_expansion", "joint_contact"
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """What the spreadsheet and the pictures show.
+
+    problem, explanation : of the second pass, with the final weights of the rows.
+    members : the candidates `HIDDEN`, `SECOND` and `ALIKE`, by their place.
+    splits : each (N,) the fold of every row.  block : (N,) its block of neighbouring rows.
+    robust_fit : (m + 1,) the constant of each coordinate and the parameter of `HIDDEN`, in the whitened robust fit by
+        which rows are weighed.
+    """
+
+    diagnosis: Diagnosis
+    problem: DiagnosisProblem
+    explanation: Explanation
+    members: tuple[int, int, int]
+    splits: tuple[IntArray, ...]
+    block: IntArray
+    robust_fit: FloatArray
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """The three candidates."""
+        return [self.explanation.losses.candidates[k] for k in self.members]
+
+
+def make_example() -> Example:
+    """Simulate the recording and diagnose it, as `compd campaign` and `compd diagnose` do."""
+    with _temporary_directory():
+        shape = [str(shipped_configuration("tripod-cmm.yaml")), "--seed", str(SEED), "--effect", HIDDEN]
+        with redirect_stdout(StringIO()):
+            app(["campaign", *shape, "--out", "loaded.csv"], standalone_mode=False)
+        aligned = open_recording(Path("loaded.csv"))
+    effects, criteria = list(load_library().values()), Criteria()
+    comparison = compare(aligned)
+    pool = replace(library_pool(aligned, effects, []), proxies=proxy_candidates(aligned, effects, []))
+    problem = build_problem(comparison, pool, criteria)
+    first = explain(problem, _quiet)
+    chosen = [first.losses.candidates[k] for k in first.members]
+    problem = build_problem(comparison, pool, criteria, problem.weigh_beside(chosen))
+    explanation = explain_again(problem, first, _quiet)
+    best = explanation.losses.best_variants
+    members = tuple(best[name].members[0] for name in (HIDDEN, SECOND, ALIKE))
+    return Example(
+        diagnosis=diagnose(aligned, (), None, effects),
+        problem=problem,
+        explanation=explanation,
+        members=(members[0], members[1], members[2]),
+        splits=row_splits(aligned),
+        block=neighbour_blocks(aligned.recording),
+        robust_fit=_robust_fit(problem, chosen[0]),
+    )
+
+
+def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
+    """(m + 1,) the fit of a constant and one candidate beside which `weigh_rows` weighs the rows."""
+    known, m = problem.known, problem.residual.shape[1]
+    constant = np.broadcast_to(np.eye(m), (*problem.residual.shape, m))
+    columns = np.concatenate([constant, candidate.columns_um / problem.sigma_um[:, None]], axis=2)[known]
+    return robust_regression(
+        columns, problem.residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+    )
+
+
+def _quiet(status: str) -> None:
+    """Show no progress."""
+
+
+@contextmanager
+def _temporary_directory() -> Iterator[None]:
+    previous = Path.cwd()
+    with tempfile.TemporaryDirectory(prefix="compd-worked-example-") as directory:
+        os.chdir(directory)
+        try:
+            yield
+        finally:
+            os.chdir(previous)
