@@ -1,13 +1,15 @@
-"""Two simulated machines that compd does not know, with the formulas of their effects: a milling table, a rotary axis."""
+"""Two simulated machines that compd does not know, with the formulas of their effects."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import yaml
 
+from compd.arrays import FloatArray
 from compd.units import UM_PER_MM
 from tests.support.changed_recordings import RecordingFile
 
@@ -89,8 +91,8 @@ AXIS_EFFECTS = yaml.safe_load("""
 """)
 
 
-def milling_table(seed: int, hidden: Mapping[str, float], frame: str = "machine") -> RecordingFile:
-    """VISITS places of a table of 400 mm x 400 mm, each measured REPEATS times with NOISE_UM while the spindle warms up.
+def milling_table(seed: int, hidden: Mapping[str, float]) -> RecordingFile:
+    """VISITS places of a milling table, each measured REPEATS times with NOISE_UM while the spindle warms up.
 
     hidden : size of `table_scale`, `table_squareness`, `screw_expansion`, `backlash_x` as their formulas say; of
         `humidity`, which no formula knows, in um/pct along x.
@@ -101,13 +103,10 @@ def milling_table(seed: int, hidden: Mapping[str, float], frame: str = "machine"
     moved = _repeated(rng.choice((-1.0, 1.0), (2, VISITS)))
     spindle = np.round(20 + 6 * (1 - np.exp(-time_s / 1200)) + 0.8 * np.sin(time_s / 300), 3)
     humidity = np.round(50 + 8 * np.sin(time_s / 250 + 2), 2)
-    size = {"table_scale": 0.0, "table_squareness": 0.0, "screw_expansion": 0.0, "backlash_x": 0.0, "humidity": 0.0}
-    size |= hidden
-    x_um = (
-        size["table_scale"] * nominal_mm[0] + size["table_squareness"] * nominal_mm[1] + size["backlash_x"] * moved[0]
-    )
-    x_um += size["screw_expansion"] * (spindle - 20) * nominal_mm[0] / 1000 + size["humidity"] * (humidity - 50)
-    error_um = np.stack([x_um, size["table_scale"] * nominal_mm[1]]) + rng.normal(0, NOISE_UM, nominal_mm.shape)
+    size = defaultdict(float, hidden)
+    error_um = size["table_scale"] * nominal_mm + rng.normal(0, NOISE_UM, nominal_mm.shape)
+    error_um[0] += size["table_squareness"] * nominal_mm[1] + size["backlash_x"] * moved[0]
+    error_um[0] += size["screw_expansion"] * (spindle - 20) * nominal_mm[0] / 1000 + size["humidity"] * (humidity - 50)
     measured_mm = np.round(nominal_mm + error_um / UM_PER_MM, 6)
     columns = {
         "time_s": time_s,
@@ -125,7 +124,7 @@ def milling_table(seed: int, hidden: Mapping[str, float], frame: str = "machine"
         "reference_x_mm": measured_mm[0],
         "reference_y_mm": measured_mm[1],
     }
-    reference: dict[str, Any] = {"quantity": "tool_position", "frame": frame, "sigma_um": NOISE_UM}
+    reference: dict[str, Any] = {"quantity": "tool_position", "frame": "machine", "sigma_um": NOISE_UM}
     return RecordingFile(columns, {"machine": "external", "reference": reference}, tuple(TABLE_EFFECTS))
 
 
@@ -149,11 +148,11 @@ def rotary_axis(seed: int, play_urad: float, windup_urad: float) -> RecordingFil
     return RecordingFile(columns, {"machine": "external", "reference": reference}, tuple(AXIS_EFFECTS))
 
 
-def _visit_times_s() -> np.ndarray[Any, np.dtype[np.float64]]:
+def _visit_times_s() -> FloatArray:
     """A visit every 40 s, its repeats 3 s apart."""
     return np.asarray(_repeated(np.arange(VISITS) * 40.0) + np.tile(np.arange(REPEATS) * 3.0, VISITS))
 
 
-def _repeated(of_visit: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _repeated(of_visit: FloatArray) -> FloatArray:
     """What is the same for all rows of a visit."""
     return np.repeat(of_visit, REPEATS, axis=-1)
