@@ -24,6 +24,8 @@ def _step(values_um: FloatArray) -> float:
         return 0.0
     for step_um in STEPS_UM:
         counts = values_um / step_um
-        if (np.abs(counts - np.round(counts)) < 1e-3).all():
+        multiples = np.round(counts)
+        # of values that are all far below a step nothing is seen of it
+        if np.ptp(multiples) > 0 and (np.abs(counts - multiples) < 1e-3).all():
             return step_um
     return 0.0

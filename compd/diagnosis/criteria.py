@@ -51,8 +51,8 @@ class Criteria:
     most_at_floor: float = threshold(
         1.25,
         unit="squares of the noise floor",
-        meaning="up to this loss nothing worth a name is left; where repeats are few, and the floor itself is known "
-        "worse, nothing is left either up to what chance makes of it",
+        meaning="up to this loss nothing worth a name is left, and nothing more is looked for; where the floor is from "
+        "few repeats, a larger one that chance can make is no fault either if nothing is found",
         reason="chance, as the floor is known within 5 % and 600 rows give 3 %, and two disturbances of a fifth of the "
         "floor (0.08)",
     )

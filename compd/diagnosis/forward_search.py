@@ -45,8 +45,8 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
 
     A description is no cause where effects do about as well: of the sets that score within an effect's price of the
     best one, that with the fewest descriptions counts. In a set with descriptions, in turn, an effect is no cause where
-    a description does better in its place, at the same price and by more than may be chance; and in any set an effect
-    with many numbers is none where the constant does about as well.
+    a description does better in its place, at the same price and by more than may be chance, or where it is seen only
+    beside a description; and in any set an effect with many numbers is none where the constant does about as well.
     """
     best: Subset | None = None
     least_score = float("inf")
@@ -67,7 +67,23 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
         least_score = min(least_score, losses.score(needed))
         if not losses.described(best.members):
             return _with_constant(losses, best)
-    return _with_constant(losses, _proven(losses, best)) if best else Subset((), losses.baseline)
+    return (
+        _with_constant(losses, _standing_alone(losses, _proven(losses, best))) if best else Subset((), losses.baseline)
+    )
+
+
+def _standing_alone(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set without the effects that are worth their price only beside a description: these are not named."""
+    unseen = True
+    while unseen and losses.described(subset.members):
+        unseen = False
+        named = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
+        for member in named:
+            without = losses.loss(k for k in named if k != member)
+            if losses.log_loss(without) - losses.log_loss(losses.loss(named)) < losses.price(member):
+                subset, unseen = Subset(*_rest(losses, subset, member)), True
+                break
+    return subset
 
 
 def _with_constant(losses: SubsetLosses, subset: Subset) -> Subset:

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaln
 from scipy.stats import chi2
 
 from compd.arrays import BoolArray, FloatArray, IntArray
@@ -88,8 +89,6 @@ def consistency(m: int, full: float) -> float:
 
 def _log_mean_chi(m: int) -> float:
     """Logarithm of the mean of a chi variable with m degrees of freedom."""
-    from scipy.special import gammaln
-
     return float(0.5 * np.log(2.0) + gammaln((m + 1) / 2) - gammaln(m / 2))
 
 

@@ -91,17 +91,16 @@ class DiagnosisProblem:
 
     def is_at_floor(self, loss: float) -> bool:
         """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
-        return self.floor_known and loss <= self.most_at_floor
+        return self.floor_known and loss <= self.criteria.most_at_floor
 
-    @property
-    def most_at_floor(self) -> float:
-        """Largest loss at which nothing is left: the criterion's, or what chance makes of a floor from few repeats.
+    def may_be_noise(self, loss: float) -> bool:
+        """Whether a loss at which nothing more was found is at the floor, or chance as the floor is from few repeats.
 
-        The latter is a quantile of the F distribution, by which a comparison too is at the floor.
+        By the F distribution, as in a comparison.
         """
         dof = min(self.comparison.floor.dof, 1e9)
         by_chance = f_distribution.ppf(self.comparison.criteria.at_floor_confidence, self.data.value_count, dof)
-        return max(self.criteria.most_at_floor, float(by_chance))
+        return self.is_at_floor(loss) or (self.floor_known and loss <= float(by_chance))
 
     @property
     def unit_um(self) -> float:

@@ -1,8 +1,7 @@
 """Effects whose thermometer is missing, tried with every thermometer that there is in its place.
 
 Such an effect cannot be named: its own temperature was not measured. But parts of one machine warm up together, and
-what
-it does would else be taken for another effect that is driven by the neighbour's temperature.
+what it does would else be taken for another effect that is driven by the neighbour's temperature.
 """
 
 from __future__ import annotations

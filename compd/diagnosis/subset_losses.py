@@ -42,7 +42,7 @@ class SubsetLosses:
 
     Example::
 
-        losses = SubsetLosses(problem.data, problem.candidates, problem.values, Criteria(), least_loss=1.0)
+        losses = problem.losses(problem.candidates)
         losses.evaluate([(0,), (0, 3)])  # [Subset((0,), 5.2), Subset((0, 3), 1.03)]
     """
 

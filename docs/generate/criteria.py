@@ -34,8 +34,8 @@ difference of losses is in squares of the noise floor. Where the unit is 1, the 
 
 What a number does shows when it is halved and doubled, alone, and simulated machines are diagnosed again
 (`{counts()["command"]}`, {counts()["counted"]}, {counts()["cases"]} machines). The counts are *right, near and
-dangerous*, as [How often it is right](../explanation/how-often-it-is-right.md) explains them; with all
-numbers as they are, {counts()["as it is"]}.
+dangerous*, as [How often it is right](../explanation/how-often-it-is-right.md) explains them; with all numbers as they
+are, {counts()["as it is"]}.
 
 In Python, hand other thresholds to `compd.diagnose` as `criteria=`.
 """

@@ -107,27 +107,57 @@ def shuffle_columns(seed: int) -> Change:
     return change
 
 
-def rename(old: str, new: str, factor: float = 1.0, offset: float = 0.0) -> Change:
-    """A quantity in another unit: its column under a new name, times a factor, and then shifted."""
+def other_unit(old: str, new: str, factor: float = 1.0, offset: float = 0.0) -> Change:
+    """A quantity in another unit: its column under a new name, times a factor, then shifted; in the formulas too."""
+    in_old_unit = f"(({new} - {offset}) / {factor})"
 
     def change(file: RecordingFile) -> RecordingFile:
         columns = {
             new if name == old else name: factor * values + offset if name == old else values
             for name, values in file.columns.items()
         }
-        return replace(file, columns=columns)
+        formulas = yaml.safe_dump(list(file.formulas)).replace(old, in_old_unit)
+        return replace(file, columns=columns, formulas=tuple(yaml.safe_load(formulas)))
+
+    return change
+
+
+def reference_in(unit: str, factor: float) -> Change:
+    """The reference of an external machine in another unit, all its numbers times a factor, parameters likewise."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        reference = file.sidecar["reference"]
+        old = reference["unit"]
+        columns = {
+            name.removesuffix(old) + unit if name.endswith(f"_{old}") else name: values
+            * (factor if name.endswith(f"_{old}") else 1.0)
+            for name, values in file.columns.items()
+        }
+        reference = {**reference, "unit": unit, "sigma": factor * reference["sigma"]}
+        formulas = tuple({**formula, "parameters": in_unit(formula["parameters"], old)} for formula in file.formulas)
+        return RecordingFile(columns, {**file.sidecar, "reference": reference}, formulas)
+
+    def in_unit(parameters: Mapping[str, Any], old: str) -> dict[str, Any]:
+        return {
+            name: {
+                **parameter,
+                "unit": parameter["unit"].replace(old, unit),
+                "plausible": [factor * end for end in parameter["plausible"]],
+            }
+            for name, parameter in parameters.items()
+        }
 
     return change
 
 
 def turn_frame(*degrees: float, shift_mm: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Change:
-    """The reference in an instrument's frame that is turned about x, y, z (about z alone of one angle), and shifted."""
-    angles = degrees if len(degrees) == 3 else (0.0, 0.0, *degrees)
-    R = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    """The reference in an instrument's frame, turned about x, y and z, or in a plane about z alone, and shifted."""
 
     def change(file: RecordingFile) -> RecordingFile:
         names = file.reference_columns
         n = len(names)
+        angles = degrees if n == 3 else (0.0, 0.0, degrees[-1])
+        R = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
         measured = np.column_stack([file.columns[name] for name in names])
         turned = measured @ R[:n, :n].T + np.array(shift_mm[:n])
         return file.with_columns(dict(zip(names, turned.T, strict=True)))
@@ -135,20 +165,35 @@ def turn_frame(*degrees: float, shift_mm: tuple[float, ...] = (0.0, 0.0, 0.0)) -
     return change
 
 
-def empty_cell(column: str, row: int) -> Change:
-    """One cell without a value; row from 0."""
+def empty_cells(**row_by_column: int) -> Change:
+    """Of some columns one cell without a value; rows from 0."""
 
     def change(file: RecordingFile) -> RecordingFile:
-        values = file.columns[column].copy()
-        values[row] = np.nan
-        return file.with_columns({column: values})
+        columns = {}
+        for name, row in row_by_column.items():
+            columns[name] = file.columns[name].copy()
+            columns[name][row] = np.nan
+        return file.with_columns(columns)
 
     return change
 
 
-def add_column(name: str, make: Callable[[RecordingFile], FloatArray]) -> Change:
-    """A column more."""
-    return lambda file: file.with_columns({name: make(file)})
+def add_useless_columns(seed: int, copied: str) -> Change:
+    """Columns that have nothing to say: noise, a constant, a copy, the number of the row, numbers of batches."""
+
+    def change(file: RecordingFile) -> RecordingFile:
+        rng = np.random.default_rng(seed)
+        return file.with_columns(
+            {
+                "voltage_mains_V": rng.normal(230, 2, file.rows),
+                "pressure_supply_bar": np.full(file.rows, 6.0),
+                "copy_of_quantity_1": file.columns[copied].copy(),
+                "number_of_row_1": np.arange(file.rows) + 1.0,
+                "batch_1": rng.integers(100_000, 100_020, file.rows).astype(float),
+            }
+        )
+
+    return change
 
 
 def move_rows(seed: int, share: float, most_um: float, as_run: bool = False) -> Change:

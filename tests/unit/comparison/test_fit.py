@@ -104,6 +104,24 @@ def test_gross_rows_are_listed_and_move_nothing(blank: AlignedRecording) -> None
     assert abs(result.fitted[0].theta[0] - clean.fitted[0].theta[0]) < 0.3 * std
 
 
+def test_rows_that_are_said_to_be_gross_are_left_out_and_no_others(blank: AlignedRecording) -> None:
+    noise = white(blank, 4)
+    noise[[50, 100], 2] += 30.0
+    recording = measured(blank, [hidden("link_expansion", 1.1)], noise)
+    gross = np.zeros(len(noise), dtype=bool)
+    gross[[7, 50]] = True
+    result = fit(recording, fresh("link_expansion"), outlier=gross)
+    assert np.array_equal(result.outlier, gross)
+    assert np.flatnonzero(~result.used).tolist() == [7, 50]
+    assert np.abs(result.residual_um[100, 2]) > 25.0
+    comparison = compare(recording, result.fitted, result.covariance, outlier=gross)
+    assert np.array_equal(comparison.outlier, gross)
+    assert not comparison.used[[7, 50]].any()
+    assert comparison.used[100]
+    none = np.zeros(len(noise), dtype=bool)
+    assert not compare(recording, result.fitted, outlier=none).outlier.any()
+
+
 def test_an_effect_on_few_rows_is_fitted_and_not_thrown_out(tmp_path: Path) -> None:
     columns = gauges(600, 41)
     loaded = np.repeat(np.arange(200) % 6 == 0, 3)

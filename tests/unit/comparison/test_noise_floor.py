@@ -148,6 +148,13 @@ def test_repeats_that_are_alike_have_the_uncertainty_of_the_last_digit() -> None
     assert found.um == pytest.approx(0.1 / np.sqrt(12))
 
 
+def test_values_far_below_a_step_show_nothing_of_it() -> None:
+    """As of a reference in mrad that errs by some urad: they are no multiples, 0, of 50 mrad."""
+    values = np.round(np.random.default_rng(6).normal(0, 0.005, (60, 1)), 6)
+    assert last_digit_um(values).tolist() == [0.0]
+    assert last_digit_um(np.round(values, 3)) == pytest.approx(0.001 / np.sqrt(12))
+
+
 def test_a_declaration_counts_with_the_gauges_noise_where_nothing_is_repeated() -> None:
     found = floor(noisy(100), None, np.full(3, 0.3), np.full(3, 0.4))
     assert found.source == "declared"

@@ -152,3 +152,16 @@ def test_the_search_goes_on_from_where_another_ended() -> None:
     losses = subset_losses(noise(4) + 2.0 * a - 1.5 * b, {"a": A, "b": B, "c": C})
     assert forward_search(losses, start=(2,)).members == (0, 1)
     assert best_acceptable(losses).members == (0, 1)
+
+
+def test_an_effect_with_many_numbers_is_none_where_the_constant_takes_nearly_as_much() -> None:
+    ones = np.broadcast_to(np.eye(3), (len(A), 3, 3))
+    many = candidate("many", np.concatenate([ones, columns(31, 4)], axis=2))
+    constant = candidate("constant", ones, np.inf, kind="constant")
+    wiggle = columns(31, 4) @ np.array([0.25, 0.2, 0.0, 0.0])
+    losses = subset_losses(noise(4) + 3.0 + wiggle, [many, constant])
+    assert losses.score(Subset((0,), losses.loss((0,)))) < losses.score(Subset((1,), losses.loss((1,))))
+    assert names(losses, forward_search(losses).members) == {"constant"}
+    assert names(losses, forward_search(subset_losses(noise(4) + 3.0 + 4 * wiggle, [many, constant])).members) == {
+        "many"
+    }

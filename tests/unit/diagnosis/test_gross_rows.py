@@ -124,6 +124,16 @@ def test_rows_that_are_not_known_neither_count_nor_are_gross() -> None:
     assert weights.weight[[3, 4]].tolist() == [0.0, 0.0]
 
 
+def test_a_row_in_which_another_candidate_is_not_known_may_be_gross_and_does_not_count() -> None:
+    """The fit of the effects that are found rests on it all the same."""
+    residual = noise()
+    residual[3] += 40.0
+    known = np.arange(ROWS) > 9
+    weights = weigh_rows([], residual, known, None, 1.0, CRITERIA)
+    assert np.flatnonzero(weights.gross).tolist() == [3]
+    assert (weights.weight[:10] == 0.0).all()
+
+
 def test_a_stretch_of_gross_rows_is_a_run() -> None:
     gross = np.zeros(60, dtype=bool)
     gross[[5, 20, 22, 23, 26, 27, 40, 41, 42]] = True

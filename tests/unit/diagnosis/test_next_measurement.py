@@ -233,7 +233,7 @@ def test_the_diagnose_command_prints_verdict_json_and_page(tmp_path: Path) -> No
     assert result.stdout.startswith("identified: What is missing is link_elasticity")
     assert "Sealed until now" in result.stdout
     text = page.read_text()
-    assert "link_elasticity: the same after" in text
+    assert "What is missing is link_elasticity" in text
     assert "http" not in text.split("</script>")[-1]
     data = json.loads(CliRunner().invoke(app(), ["diagnose", *paths, "--json"]).stdout)
     assert data["verdict"] == "identified"

@@ -109,3 +109,16 @@ def test_given_weights_are_used_and_found_again_beside_the_members(tmp_path: Pat
     assert np.array_equal(again.gross, weights.gross)
     np.testing.assert_allclose(again.root_weight**2, weights.weight[again.rows])
     assert again.sigma_um == pytest.approx([SIGMA_UM])
+
+
+def test_of_a_floor_from_few_repeats_chance_makes_a_larger_loss(tmp_path: Path) -> None:
+    moved, none = np.random.default_rng(1).choice([-1.0, 1.0], ROWS), {"x": np.zeros(ROWS)}
+    repeated = {"moved_1": moved, "visit": np.where(np.arange(ROWS) < 40, np.arange(ROWS) // 2, np.nan)}
+    few = problem(record_external(tmp_path / "few.csv", repeated, none, declared_um=None), PLAY)
+    assert few.comparison.floor.dof == pytest.approx(0.885 * 20, rel=0.1)
+    assert few.may_be_noise(1.5)
+    assert not few.is_at_floor(1.5)
+    assert not few.may_be_noise(3.0)
+    assert not problem(record_external(tmp_path / "declared.csv", repeated, none), PLAY).may_be_noise(1.5)
+    unknown = record_external(tmp_path / "unknown.csv", {"moved_1": moved}, none, declared_um=None)
+    assert not problem(unknown, PLAY).may_be_noise(0.5)
