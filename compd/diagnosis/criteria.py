@@ -95,6 +95,7 @@ class Criteria:
     disturbance: float = threshold(
         0.28,
         unit="standard deviations of the noise, rms per coordinate",
-        meaning="size of everything unnamed in the standard errors of parameters",
+        meaning="size of everything unnamed: in the standard errors of parameters, and in what named effects may leave "
+        "above the floor",
         reason="a choice: two causes of a fifth of the noise each, too small to be found",
     )

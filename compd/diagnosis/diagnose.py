@@ -133,10 +133,12 @@ def _verdict(
 ) -> Verdict:
     """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
 
-    Where the noise is not known, whether something is missing can be told only by finding it.
+    Beside effects that are named the unnamed ones may leave what their standard errors allow for. Where the noise is
+    not known, whether something is missing can be told only by finding it.
     """
     found = bool(explanation.described)
-    if not found and problem.may_be_noise(explanation.reduced_chi_squared):
+    unnamed = problem.criteria.disturbance**2 if steps else 0.0
+    if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
         if not steps:
             return "adequate"
         return "ambiguous" if any(step.rivals for step in steps) else "identified"
