@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
@@ -134,7 +134,7 @@ class Comparison:
             return False
         numbers = float(self.used.sum() * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
-        return self.floor_ratio <= float(f_distribution.ppf(self.criteria.at_floor_confidence, numbers, dof))
+        return self.floor_ratio <= float(fdtri(numbers, dof, self.criteria.at_floor_confidence))
 
     @property
     def verdict(self) -> str:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtr
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
@@ -145,7 +145,7 @@ def _from_repeats(
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
     declared = f"declared noise of {format_error(rms(expected_um), unit, 3)}"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
-    below = float(f_distribution.cdf(ratio, dof, criteria.declared_dof * axes))
+    below = float(fdtr(dof, criteria.declared_dof * axes, ratio))
     if min(below, 1 - below) < criteria.contradiction_p_value / 2:
         remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio, sigma_key(unit))
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as t_distribution
+from scipy.special import stdtr
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -230,7 +230,7 @@ def _fit_line(covariate: Covariate, values: FloatArray, used: BoolArray, block: 
 
 def _p_value(t: float, clusters: int, tests: int) -> float:
     """Two-sided p-value of a t statistic on so many blocks, times the number of tests (Bonferroni), at most 1."""
-    return float(min(1.0, 2.0 * t_distribution.sf(abs(t), max(clusters - 1, 1)) * tests))
+    return float(min(1.0, 2.0 * stdtr(max(clusters - 1, 1), -abs(t)) * tests))
 
 
 def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> float:

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
 
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
@@ -127,6 +126,8 @@ def _evident(suggested: _Trial, described: _Trial, loss_without: float, independ
     degrees of freedom as the effect has parameters (likelihood ratio); a search has as many chances as there are
     independent periods (Bonferroni).
     """
+    from scipy.stats import chi2  # takes a third of a second, and is seldom needed
+
     numbers = float(np.isfinite(suggested.result.residual_um).sum())
     parameters = len(suggested.result.fitted[-1].theta)
     by_search, by_description = (

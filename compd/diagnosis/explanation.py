@@ -10,7 +10,7 @@ import numpy as np
 from compd.diagnosis.candidates import Candidate, periodic_candidates
 from compd.diagnosis.changes import ChangeCandidate, change_candidates, moments_between_s, moments_s
 from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
-from compd.diagnosis.forward_search import forward_search
+from compd.diagnosis.forward_search import extend, forward_search
 from compd.diagnosis.problem import DiagnosisProblem
 from compd.diagnosis.refined_constants import refined_variants
 from compd.diagnosis.significance import OrthogonalComplement
@@ -148,12 +148,9 @@ def _beats_descriptions(problem: DiagnosisProblem, losses: SubsetLosses, best: S
 def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
     """The best set of effects and descriptions: from the best set of effects, from nothing, and from another set."""
     effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
-    best = forward_search(losses, among=effects)
-    if not losses.describes:
-        return forward_search(losses, start)
-    for begin in dict.fromkeys([best.members, (), start]):
-        best = forward_search(losses, begin)
-    return best
+    for begin in dict.fromkeys([extend(losses, among=effects).members, ()]):
+        extend(losses, begin)
+    return forward_search(losses, start)
 
 
 def _search_library(problem: DiagnosisProblem) -> tuple[DiagnosisProblem, SubsetLosses, Subset]:
@@ -183,7 +180,7 @@ def _refined(
 ) -> tuple[SubsetLosses, Subset]:
     """The best set of some candidates, constants refined between the values of their grids."""
     losses = problem.losses(candidates)
-    forward_search(losses)
+    extend(losses)
     best = forward_search(losses, start)
     for _ in range(REFINEMENTS):
         refined = refined_variants(losses.candidates, best.members, problem.aligned)

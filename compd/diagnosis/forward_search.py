@@ -14,30 +14,38 @@ FURTHER = 2
 MOST_RANKED = 400
 
 
-def forward_search(losses: SubsetLosses, start: Collection[int] = (), among: Collection[int] | None = None) -> Subset:
+def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
     """The set with the best score of which every member is needed and every number plausible.
 
-    From `start` the candidate is added with which the set scores best; then each member is exchanged for any other
-    candidate as long as that gains; then the next is added. Of all sets that were seen the best one counts that is
-    plausible. (Forward stepwise selection with exchange: Miller, Subset Selection in Regression (2002), chapter 3;
-    the loss by cross-validation: Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009),
-    3.3.2 and 7.10.)
+    Sets are seen by `extend` from `start`; of all that were seen the best one counts that is plausible.
 
     start : places of candidates to begin with; the empty set is always among those that are compared.
+    """
+    extend(losses, start)
+    return best_acceptable(losses)
+
+
+def extend(losses: SubsetLosses, start: Collection[int] = (), among: Collection[int] | None = None) -> Subset:
+    """The set with the best score that is met on the way from a set to larger ones.
+
+    From `start` the candidate is added with which the set scores best; then each member is exchanged for any other
+    candidate as long as that gains; then the next is added. (Forward stepwise selection with exchange: Miller, Subset
+    Selection in Regression (2002), chapter 3; the loss by cross-validation: Hastie, Tibshirani, Friedman, The Elements
+    of Statistical Learning, 2nd ed. (2009), 3.3.2 and 7.10.)
+
     among : places of the candidates that may be added; None for all.
     """
     allowed = range(len(losses.candidates)) if among is None else among
-    current = _best(losses, [tuple(start)]) or Subset((), losses.baseline)
-    best_score, stale = losses.score(current), 0
+    current = best = _best(losses, [tuple(start)]) or Subset((), losses.baseline)
+    stale = 0
     while len(current.members) < MOST_MEMBERS and stale < FURTHER:
         grown = _best(losses, ((*current.members, k) for k in _others(losses, current.members, allowed)))
         if grown is None:
             break
         current = _exchanged(losses, grown, allowed)
-        score = losses.score(current)
-        stale = 0 if score < best_score else stale + 1
-        best_score = min(best_score, score)
-    return best_acceptable(losses)
+        stale = 0 if losses.score(current) < losses.score(best) else stale + 1
+        best = min(best, current, key=losses.score)
+    return best
 
 
 def best_acceptable(losses: SubsetLosses) -> Subset:

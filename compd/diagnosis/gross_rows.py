@@ -7,8 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import chi2
+from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.robust import LEAST_SIGMA, robust_regression, trimmed_scale
@@ -82,8 +81,8 @@ def consistency(m: int, full: float) -> float:
     >>> round(consistency(1, 2.0), 3), round(consistency(3, 2.0), 3)
     (0.954, 0.999)
     """
-    within = chi2.cdf(m * full**2, m + 2)  # E[d^2; d <= full]
-    beyond = np.exp(_log_mean_chi(m)) / np.sqrt(m) * chi2.sf(m * full**2, m + 1)  # E[d; d > full]
+    within = chdtr(m + 2, m * full**2)  # E[d^2; d <= full]
+    beyond = np.exp(_log_mean_chi(m)) / np.sqrt(m) * chdtrc(m + 1, m * full**2)  # E[d; d > full]
     return float(within + full * beyond)
 
 

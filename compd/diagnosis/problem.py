@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import orth
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -99,7 +99,7 @@ class DiagnosisProblem:
         By the F distribution, as in a comparison.
         """
         dof = min(self.comparison.floor.dof, 1e9)
-        by_chance = f_distribution.ppf(self.comparison.criteria.at_floor_confidence, self.data.value_count, dof)
+        by_chance = fdtri(self.data.value_count, dof, self.comparison.criteria.at_floor_confidence)
         return self.is_at_floor(loss) or (self.floor_known and loss <= float(by_chance))
 
     @property

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import qmc
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
@@ -136,6 +135,8 @@ def _grid(settings: Sequence[Setting]) -> _Programmes:
     if math.prod(sizes) <= MOST_COMBINATIONS:
         places = np.indices(tuple(sizes)).reshape(len(sizes), -1)
     else:
+        from scipy.stats import qmc  # takes a third of a second, and is seldom needed
+
         points = qmc.Sobol(len(sizes), scramble=False).random(MOST_COMBINATIONS)
         places = np.unique((points * sizes).astype(np.int64), axis=0).T
     columns: dict[str, FloatArray] = {}

@@ -133,7 +133,7 @@ def test_of_sets_that_do_about_as_well_that_with_the_fewest_descriptions_counts(
 
 def test_only_what_is_allowed_is_added() -> None:
     losses = subset_losses(noise(4) + 2.0 * a - 1.5 * b, {"a": A, "b": B, "c": C})
-    assert forward_search(losses, among=[0, 2]).members == (0,)
+    assert extend(losses, among=[0, 2]).members == (0,)
 
 
 def test_an_effect_is_no_cause_beside_descriptions_where_a_description_does_better_in_its_place() -> None:
