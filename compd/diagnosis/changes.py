@@ -13,13 +13,16 @@ from compd.diagnosis.candidates import SEARCHED_CONSTANT, Candidate
 
 # Moments that are tried beside the sessions' starts, evenly over the rows.
 MOMENTS = 8
+# Moments between neighbours that are tried where a change was found: to about a hundredth of the recording.
+BETWEEN = 9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ChangeCandidate(Candidate):
-    """An effect from a moment on, time_s on the recording's clock."""
+    """An effect from a moment on, time_s on the recording's clock.  whole : the same over all rows."""
 
-    time_s: float = float("nan")
+    time_s: float
+    whole: Candidate
 
 
 def moments_s(aligned: AlignedRecording) -> list[float]:
@@ -28,6 +31,13 @@ def moments_s(aligned: AlignedRecording) -> list[float]:
     starts = time_s[aligned.rows.session_start][1:]
     quantiles = np.quantile(time_s, np.linspace(0, 1, MOMENTS + 2)[1:-1])
     return sorted({*starts.tolist(), *quantiles.tolist()})
+
+
+def moments_between_s(moments: Sequence[float], moment_s: float) -> list[float]:
+    """Moments between one of those that were tried, s, and its neighbours."""
+    place = list(moments).index(moment_s)
+    ends = [moments[other] for other in (place - 1, place + 1) if 0 <= other < len(moments)]
+    return [float(new) for end in ends for new in np.linspace(moment_s, end, BETWEEN + 2)[1:-1]]
 
 
 def change_candidates(
@@ -45,6 +55,7 @@ def change_candidates(
             constants=candidate.constants,
             kind="change",
             time_s=moment_s,
+            whole=candidate,
         )
         for candidate in candidates
         for moment_s in times_s

@@ -136,7 +136,7 @@ def _verdict(
     Where the noise is not known, whether something is missing can be told only by finding it.
     """
     found = bool(explanation.described)
-    if not found and problem.may_be_noise(explanation.loss):
+    if not found and problem.may_be_noise(explanation.reduced_chi_squared):
         if not steps:
             return "adequate"
         return "ambiguous" if any(step.rivals for step in steps) else "identified"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from compd.diagnosis.candidates import Candidate, periodic_candidates
-from compd.diagnosis.changes import change_candidates, moments_s
+from compd.diagnosis.changes import ChangeCandidate, change_candidates, moments_between_s, moments_s
 from compd.diagnosis.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
 from compd.diagnosis.forward_search import forward_search
 from compd.diagnosis.problem import DiagnosisProblem
@@ -85,6 +85,11 @@ class Explanation:
         """Cross-validated loss of the whole set."""
         return self.losses.loss(self.members)
 
+    @property
+    def reduced_chi_squared(self) -> float:
+        """Mean square that the whole set leaves where it was fitted, in squares of the noise floor."""
+        return min(self.loss, self.losses.reduced_chi_squared(self.members))
+
     def fit_of(self, member: int) -> EmpiricalFit:
         """The term that a description is."""
         return self.fit_by_place[member]
@@ -97,7 +102,7 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     """
     progress("every effect, then the next beside it, on rows left out")
     problem, library, best = _search_library(problem)
-    if problem.is_at_floor(best.cv_loss):
+    if _beats_descriptions(problem, library, best):
         return Explanation(problem, library, _ordered(library, best.members))
     progress("every covariate, lag, direction and time")
     competitors = _Competitors(problem, library)
@@ -107,6 +112,7 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     losses = problem.losses(competitors.candidates)
     best = _search_all(losses, best.members)
     fits = competitors.screen_beside(losses, best.members)
+    competitors.refine_changes(best.members)
     if len(competitors.candidates) > len(losses.candidates):
         losses = problem.losses(competitors.candidates)
         best = _search_all(losses, best.members)
@@ -120,7 +126,7 @@ def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Prog
         problem = with_states_of(problem, [candidates[k] for k in before.members])
     losses = problem.losses(candidates)
     best = _search_all(losses, before.members)
-    if not losses.describes and not problem.is_at_floor(best.cv_loss):
+    if not losses.describes and not _beats_descriptions(problem, losses, best):
         return explain(problem, progress)
 
     def weighed(fit: EmpiricalFit) -> EmpiricalFit:
@@ -129,6 +135,14 @@ def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Prog
     fit_by_place = {k: replace(fit, values=losses.values[k]) for k, fit in before.fit_by_place.items()}
     fits = tuple(weighed(fit) for fit in before.fits)
     return Explanation(problem, losses, _ordered(losses, best.members), fits, fit_by_place)
+
+
+def _beats_descriptions(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> bool:
+    """Whether no description could score better than a set of effects: at the floor each costs its price at least.
+
+    Many effects with many numbers reach the floor of a cause that the library does not have, too.
+    """
+    return problem.is_at_floor(best.cv_loss) and losses.score(best) <= problem.criteria.description_price
 
 
 def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
@@ -190,7 +204,8 @@ class _Competitors:
         self._taken: set[object] = set()
         best = [library.candidates[subset.members[0]] for subset in library.best_variants.values()]
         effects = [candidate for candidate in best if candidate.kind == "effect"]
-        self._changes = change_candidates(effects, problem.aligned, moments_s(problem.aligned))
+        self._moments_s = moments_s(problem.aligned)
+        self._changes = change_candidates(effects, problem.aligned, self._moments_s)
         self._change_values = [problem.whiten(change.columns_um) for change in self._changes]
 
     def screen_beside(self, losses: SubsetLosses, basis: tuple[int, ...]) -> tuple[EmpiricalFit, ...]:
@@ -211,6 +226,13 @@ class _Competitors:
             if self._is_new((change.name, change.time_s)):
                 self.candidates.append(change)
         return fits
+
+    def refine_changes(self, members: Sequence[int]) -> None:
+        """Add the changes among some members at moments between those that were tried."""
+        for change in [self.candidates[k] for k in members]:
+            if isinstance(change, ChangeCandidate):
+                times_s = moments_between_s(self._moments_s, change.time_s)
+                self.candidates += change_candidates([change.whole], self._problem.aligned, times_s)
 
     def _is_new(self, key: object) -> bool:
         if key in self._taken:

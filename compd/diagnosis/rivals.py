@@ -24,6 +24,8 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
     All three sets have the constant wherever the member is worth its price beside it, so that rivals are the same
     whether or not one was added to the measured values: a constant tells no effects apart.
 
+    Where the set is at the floor and the noise known, what may be chance has to be at the floor too.
+
     An effect with more parameters that contains the member as a special case is bound to do about as well; for it the
     price is no excuse. Effects that on these rows do the same are always rivals, however far above the floor.
     """
@@ -43,7 +45,8 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         more_general = losses.candidates[k].parameter_count > losses.candidates[member].parameter_count
         excess, std = losses.gain(members, key)
         near = losses.log_loss(subset.cv_loss) - losses.log_loss(loss) <= criteria.effect_price and not more_general
-        if (near or excess <= criteria.least_sigmas * std) and losses.is_plausible(key):
+        below = subset.cv_loss <= criteria.most_at_floor or loss > criteria.most_at_floor or not losses.floor_known
+        if (near or (below and excess <= criteria.least_sigmas * std)) and losses.is_plausible(key):
             rivals.append(Rival(k, name, collinearity(losses, rest, member, k), excess, std))
     return tuple(rivals)
 

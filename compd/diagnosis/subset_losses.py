@@ -64,6 +64,7 @@ class SubsetLosses:
             [self.equations.testable_splits(index, criteria.most_in_one_fold) for index in self._indices]
         ).reshape(len(candidates), len(data.splits))
         self._prices = np.array([candidate.price(criteria) for candidate in candidates])
+        self.floor_known = least_loss > 0
         self._least_loss = max(least_loss, LEAST_LOSS * self.baseline)
         self._losses: dict[tuple[int, ...], float] = {(): self.baseline}
         self._by_row: dict[tuple[int, ...], FloatArray] = {}
@@ -109,6 +110,12 @@ class SubsetLosses:
         """Cross-validated loss of one set; inf where no split can test it."""
         subsets = self.evaluate([members])
         return subsets[0].cv_loss if subsets else float("inf")
+
+    def reduced_chi_squared(self, members: Sequence[int]) -> float:
+        """Mean square that a set leaves where it was fitted, per degree of freedom, in squares of the noise floor."""
+        index = self.index(members)
+        _, _, left = self.equations.estimate(index)
+        return left * self.data.value_count / max(self.data.value_count - len(index), 1)
 
     def log_loss(self, loss: float) -> float:
         """Logarithm of a loss, not below the floor."""
