@@ -31,7 +31,8 @@ def neighbour_blocks(recording: Recording) -> IntArray:
     """(N,) number of each row's block: rows within which residuals may be correlated.
 
     Blocks are the recording's sessions (`Recording.fold`) where there are BLOCKS or more of them; else each session
-    is cut into parts of neighbouring rows, so that there are at least BLOCKS in all.
+    is cut into parts of neighbouring rows, so that there are at least BLOCKS in all. Rows of one visit stay together,
+    unless visits are longer than blocks.
     """
     sessions, session = np.unique(recording.fold, return_inverse=True)
     if len(sessions) >= BLOCKS:
@@ -41,7 +42,8 @@ def neighbour_blocks(recording: Recording) -> IntArray:
     for k in range(len(sessions)):
         rows = np.flatnonzero(session == k)
         block[rows] = k * per_session + np.arange(len(rows)) * per_session // len(rows)
-    return block
+    together = recording.first_of_visit(block)
+    return together if len(np.unique(together)) == len(np.unique(block)) else block
 
 
 def cluster_covariance(G: FloatArray, residual: FloatArray, block: IntArray) -> FloatArray:

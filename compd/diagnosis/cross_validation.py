@@ -79,7 +79,7 @@ def _split_by_time(aligned: AlignedRecording) -> IntArray:
     recording = aligned.recording
     fold = recording.fold
     if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
-        fold = _first_of_visit(aligned, np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
+        fold = recording.first_of_visit(np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
     return _numbered(fold)
 
 
@@ -90,7 +90,7 @@ def _split_by_values(aligned: AlignedRecording, values: FloatArray) -> IntArray:
         edges = np.unique(np.quantile(known, np.arange(1, BLOCKS) / BLOCKS))
         values = np.where(np.isfinite(values), np.searchsorted(edges, values), np.nan)
     # nan sorts behind every number, and all of them are one value
-    return _numbered(_first_of_visit(aligned, np.unique(values, return_inverse=True)[1]))
+    return _numbered(aligned.recording.first_of_visit(np.unique(values, return_inverse=True)[1]))
 
 
 def _split_by_place(aligned: AlignedRecording) -> IntArray | None:
@@ -116,20 +116,11 @@ def _split_by_place(aligned: AlignedRecording) -> IntArray | None:
 
 def _places(aligned: AlignedRecording, cell: FloatArray) -> IntArray:
     """(N,) number of each row's place: its `point`; where there is none, its cell (N, 2), of a visit's first row."""
-    number = _first_of_visit(aligned, np.unique(cell, axis=0, return_inverse=True)[1].ravel())
+    number = aligned.recording.first_of_visit(np.unique(cell, axis=0, return_inverse=True)[1].ravel())
     point = aligned.recording.point
     if point is not None:
         number = np.where(point >= 0, point, number + point.max() + 1)
     return _numbered(number)
-
-
-def _first_of_visit(aligned: AlignedRecording, fold: IntArray) -> IntArray:
-    """(N,) the fold of each row, of a row in a visit that of the visit's first row."""
-    visit = aligned.recording.visit
-    if visit is None:
-        return fold
-    _, first_row, number = np.unique(visit, return_index=True, return_inverse=True)
-    return np.where(visit >= 0, fold[first_row][number], fold)
 
 
 def _numbered(fold: IntArray) -> IntArray:

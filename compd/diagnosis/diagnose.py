@@ -25,7 +25,7 @@ from compd.diagnosis.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.proxies import proxy_candidates
 from compd.diagnosis.rivals import find_rivals
-from compd.diagnosis.significance import OrthogonalComplement, p_values
+from compd.diagnosis.significance import Family, OrthogonalComplement, p_values
 from compd.diagnosis.subset_losses import SubsetLosses
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
@@ -94,7 +94,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
     before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
     before = replace(before, floor=problem.comparison.floor)
-    p_value_by_effect = _p_values(losses, explanation.effects)
+    p_value_by_effect = _p_values(losses, explanation.members)
     after = before
     if explanation.named:
         links = aligned.rows.links
@@ -191,21 +191,21 @@ def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
     return rivals
 
 
-def _p_values(losses: SubsetLosses, effects: tuple[int, ...]) -> dict[str, float]:
+def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float]:
     """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
 
-    The noise is what the named effects leave; where none is named, what the best candidate leaves.
+    Of an effect among the members of the set: beside the other members; of any other: alone, beside the constant.
     """
-    complement = OrthogonalComplement(losses.data.nuisance.values)
     library = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "effect"]
-    columns = {k: complement(losses.values[k]) for k in library}
-    y = complement(losses.data.y)
-    alone = [subset.members[0] for subset in losses.best_variants.values() if subset.members[0] in columns]
-    explaining = list(effects) or alone[:1]
-    noise = OrthogonalComplement(np.concatenate([columns[k] for k in explaining], axis=2))(y) if explaining else y
-    names = list(dict.fromkeys(losses.name(k) for k in library))
-    families = [[columns[k] for k in library if losses.name(k) == name] for name in names]
-    return dict(zip(names, p_values(families, y, noise, losses.data.block).tolist(), strict=True))
+    member_by_name = {losses.name(k): k for k in members if k in library}
+    constant = [k for k in members if losses.candidates[k].kind == "constant"]
+    families = {}
+    for name in dict.fromkeys(losses.name(k) for k in library):
+        beside = [k for k in members if k != member_by_name[name]] if name in member_by_name else constant
+        complement = OrthogonalComplement(losses.nuisance_with(beside).values)
+        variants = [complement(losses.values[k]) for k in library if losses.name(k) == name]
+        families[name] = Family(variants, complement(losses.data.y))
+    return dict(zip(families, p_values(list(families.values()), losses.data.block).tolist(), strict=True))
 
 
 def _untested(

@@ -16,7 +16,7 @@ from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.problem import DiagnosisProblem
 from compd.diagnosis.proxies import ProxyCandidate
 from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
-from compd.diagnosis.significance import OrthogonalComplement, p_values
+from compd.diagnosis.significance import Family, OrthogonalComplement, p_values
 
 # A direction in which a term explains less than this share of its squares is left out of the proposed formulas: it
 # would be a formula for noise.
@@ -72,14 +72,11 @@ class _Remainder:
         ]
 
     def p_values(self, families: Sequence[Sequence[EmpiricalFit]]) -> list[float]:
-        """Of the columns of each family together; the first family is taken to be the explanation."""
-        if not families:
-            return []
+        """Of the columns of each family together."""
         complement = OrthogonalComplement(self._data.nuisance.values)
         columns = [complement(np.concatenate([fit.values for fit in family], axis=2)) for family in families]
         y = complement(self._data.y)
-        noise = OrthogonalComplement(columns[0])(y)
-        values: list[float] = p_values([[family] for family in columns], y, noise, self._data.block).tolist()
+        values: list[float] = p_values([Family([together], y) for together in columns], self._data.block).tolist()
         return values
 
     def member(self, k: int) -> EmpiricalFinding:
@@ -89,11 +86,9 @@ class _Remainder:
         theta, _ = losses.estimates(self._explanation.members)[self._explanation.members.index(k)]
         names = [column.name for column in candidate.effect.columns(self._problem.aligned.rows.links)]
         rest = [member for member in self._explanation.members if member != k]
-        columns = losses.values[k]
         complement = OrthogonalComplement(losses.nuisance_with(rest).values)
-        y = complement(self._problem.data.y)
-        own = complement(columns)
-        p_value = float(p_values([[own]], y, OrthogonalComplement(own)(y), self._problem.data.block)[0])
+        own = Family([complement(losses.values[k])], complement(losses.data.y))
+        p_value = float(p_values([own], losses.data.block)[0])
         loss, without = losses.loss(self._explanation.members), losses.loss(rest)
         return EmpiricalFinding(
             covariate=candidate.quantity if isinstance(candidate, ProxyCandidate) else "time_s",

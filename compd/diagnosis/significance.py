@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from compd.arrays import FloatArray, IntArray
 # Resamples: 1 / (SIGN_FLIPS + 1) is the smallest p-value that can be stated.
 SIGN_FLIPS = 999
 SEED = 20260
+# Scores that differ by less are equal: the same signs of all blocks, turned round.
+ROUNDING = 1e-9
 
 
 class OrthogonalComplement:
@@ -29,55 +32,75 @@ class OrthogonalComplement:
         return np.asarray((flat - self._q @ (self._q.T @ flat)).reshape(values.shape))
 
 
-def p_values(families: Sequence[Sequence[FloatArray]], y: FloatArray, noise: FloatArray, block: IntArray) -> FloatArray:
+class Family(NamedTuple):
+    """Variants of one candidate, of which the best counts, and the residual that they are to explain.
+
+    variants : each (R, m, P).  y : (R, m) whitened. Both are orthogonal to what is fitted beside them.
+    """
+
+    variants: Sequence[FloatArray]
+    y: FloatArray
+
+
+def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     """(K,) probability that noise alone lets the best of all K families score as high as each family does.
 
-    The score of a candidate A (R, m, P) is the sum of squares that it explains, |A A^+ y|^2, that of a family its
-    best variant's. Its distribution under noise is sampled by flipping the signs of whole blocks of the noise, by
-    which rows that are correlated stay together (wild cluster bootstrap: Cameron, Gelbach, Miller, Review of Economics
-    and Statistics 90 (2008) 414). Scores are standardized by that distribution, and each is compared with the maximum
-    over all families in the same resample::
+    With Q orthonormal columns of a variant, z_b = Q_b^T y_b its scores in each block b of rows, s = sum_b z_b, and
+    r_b = z_b - Q_b^T Q_b s the scores of what it leaves, a variant's score is::
 
-        t_k = (score_k - mean_b score_kb) / std_b score_kb
-        p_k = (1 + #{b : max_j t_jb >= t_k}) / (SIGN_FLIPS + 1)
+        t = (|s|^2 / sum_b |r_b|^2)^(1/3)
+
+    what it explains over what it would explain by chance if only blocks were independent; the third root is nearly
+    normal (Wilson and Hilferty, PNAS 17 (1931) 684), so that candidates with few and many numbers compare. Its
+    distribution under noise is sampled by flipping the signs of whole blocks of y, by which rows that are correlated
+    stay together (wild cluster bootstrap of a studentized score, the null hypothesis imposed: Cameron, Gelbach, Miller,
+    Review of Economics and Statistics 90 (2008) 414). A family has the score of its best variant, standardized by that
+    distribution, and each is compared with the maximum over all families in the same resample::
+
+        t_k = (t_k - mean_i t_ki) / std_i t_ki
+        p_k = (1 + #{i : max_j t_ji >= t_k}) / (SIGN_FLIPS + 1)
 
     which controls the probability of even one false finding among all that were tried, nonlinear constants included
     (max-T: Westfall and Young, Resampling-Based Multiple Testing (1993); Romano and Wolf, Econometrica 73 (2005)
-    1237).
+    1237). What acts in n blocks alone cannot have a p-value below 2^(1 - n): in so few, noise does the same.
 
-    families : each a list of variants of one candidate, (R, m, P), orthogonal to the nuisance columns.
-    y : (R, m) whitened residual, orthogonal likewise.
-    noise : (R, m) what the best explanation leaves of y. It is flipped in place of y, so that an effect which acts in
-        few blocks can still be proven.
     block : (R,) block of each row, numbered from 0.
 
     For example, of two candidates of which the first is in the residual::
 
-        p_values([[first], [second]], y, OrthogonalComplement(first)(y), block)  # array([0.001, 0.6])
+        p_values([Family([first], y), Family([second], y)], block)  # array([0.001, 0.6])
     """
     if not families:
         return np.zeros(0)
     rng = np.random.default_rng(SEED)
-    signs = rng.choice((-1.0, 1.0), (SIGN_FLIPS, int(block.max()) + 1))
+    signs = np.ones((SIGN_FLIPS + 1, int(block.max()) + 1))
+    signs[1:] = rng.choice((-1.0, 1.0), (SIGN_FLIPS, signs.shape[1]))
     scores = np.empty((SIGN_FLIPS + 1, len(families)))
-    for k, variants in enumerate(families):
-        scores[:, k] = np.max([_scores(columns, y, noise, block, signs) for columns in variants], axis=0)
+    for k, family in enumerate(families):
+        scores[:, k] = np.max([_scores(columns, family.y, block, signs) for columns in family.variants], axis=0)
     by_noise = scores[1:]
-    spread = np.maximum(by_noise.std(axis=0), 1e-12)
+    spread = np.maximum(by_noise.std(axis=0), ROUNDING)
     standardized = (scores - by_noise.mean(axis=0)) / spread
     largest = standardized[1:].max(axis=1)
-    return np.asarray((1 + (largest[:, None] >= standardized[0]).sum(axis=0)) / (SIGN_FLIPS + 1))
+    return np.asarray((1 + (largest[:, None] >= standardized[0] - ROUNDING).sum(axis=0)) / (SIGN_FLIPS + 1))
 
 
-def _scores(columns: FloatArray, y: FloatArray, noise: FloatArray, block: IntArray, signs: FloatArray) -> FloatArray:
-    """(SIGN_FLIPS + 1,) sum of squares explained of y, then of the noise with the signs of its blocks flipped."""
+def _scores(columns: FloatArray, y: FloatArray, block: IntArray, signs: FloatArray) -> FloatArray:
+    """(F,) score of y with the signs (F, B) of its blocks."""
     flat = columns.reshape(-1, columns.shape[2])
     values, vectors = np.linalg.eigh(flat.T @ flat)
     determined = values > 1e-9 * max(float(values.max()), 1e-300)
     if not determined.any():
-        return np.zeros(len(signs) + 1)
-    orthonormal = columns @ (vectors[:, determined] / np.sqrt(values[determined]))
-    by_row = np.einsum("rmp,rm->rp", orthonormal, noise)
-    by_block = np.stack([np.bincount(block, column, minlength=signs.shape[1]) for column in by_row.T], axis=1)
-    score = np.einsum("rmp,rm->p", orthonormal, y)
-    return np.concatenate([[float(score @ score)], ((signs @ by_block) ** 2).sum(axis=1)])
+        return np.zeros(len(signs))
+    Q = columns @ (vectors[:, determined] / np.sqrt(values[determined]))
+    z = _sums(np.einsum("rmp,rm->rp", Q, y), block, signs.shape[1])
+    G = _sums(np.einsum("rmp,rmq->rpq", Q, Q).reshape(len(Q), -1), block, len(z)).reshape(len(z), *[Q.shape[2]] * 2)
+    s = signs @ z
+    left = (z**2).sum() - 2 * ((signs @ np.einsum("bpq,bp->bq", G, z)) * s).sum(axis=1)
+    left += np.einsum("fp,pq,fq->f", s, np.einsum("bpq,bpr->qr", G, G), s)
+    return np.asarray(((s**2).sum(axis=1) / np.maximum(left, ROUNDING * max((z**2).sum(), 1e-300))) ** (1 / 3))
+
+
+def _sums(by_row: FloatArray, block: IntArray, blocks: int) -> FloatArray:
+    """(blocks, P) sums over the rows of each block, of values (R, P)."""
+    return np.stack([np.bincount(block, column, minlength=blocks) for column in by_row.T], axis=1)

@@ -187,9 +187,11 @@ class Recording:
         """
         if self.session is not None:
             return self.session
-        block = np.arange(self.rows, dtype=np.int64) * BLOCKS // max(self.rows, 1)
+        return self.first_of_visit(np.arange(self.rows, dtype=np.int64) * BLOCKS // max(self.rows, 1))
+
+    def first_of_visit(self, label: IntArray) -> IntArray:
+        """(N,) the label of each row, of a row in a visit that of the visit's first row: repeats stay together."""
         if self.visit is None:
-            return block
-        _, first, inverse = np.unique(self.visit, return_index=True, return_inverse=True)
-        block_of_visit = block[first][inverse]
-        return np.where(self.visit >= 0, block_of_visit, block).astype(np.int64)
+            return label
+        _, first_row, number = np.unique(self.visit, return_index=True, return_inverse=True)
+        return np.where(self.visit >= 0, label[first_row][number], label).astype(np.int64)
