@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.forward_search import MOST_MEMBERS, best_acceptable, forward_search
+from compd.diagnosis.forward_search import MOST_MEMBERS, best_acceptable, extend, forward_search
 from compd.diagnosis.subset_losses import Subset
 from tests.support.candidate_sets import candidate, columns, description, names, noise, subset_losses
 
