@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import betainc
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
@@ -230,7 +230,9 @@ def _fit_line(covariate: Covariate, values: FloatArray, used: BoolArray, block: 
 
 def _p_value(t: float, clusters: int, tests: int) -> float:
     """Two-sided p-value of a t statistic on so many blocks, times the number of tests (Bonferroni), at most 1."""
-    return float(min(1.0, 2.0 * stdtr(max(clusters - 1, 1), -abs(t)) * tests))
+    dof = max(clusters - 1, 1)
+    # two-sided p-value of Student's t by the incomplete beta function (Abramowitz and Stegun, 26.5.27)
+    return float(min(1.0, betainc(dof / 2, 0.5, dof / (dof + t**2)) * tests))
 
 
 def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> float:

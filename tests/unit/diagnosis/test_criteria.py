@@ -74,7 +74,7 @@ def test_the_customary_thresholds_find_play_room_and_one_gross_row(stage: Aligne
         ({"effect_price": 10.0}, {"steps": []}),
         ({"description_price": 10.0}, {"follows": []}),
         ({"least_sigmas": 1e3}, {"steps": [], "verdict": "unexplained"}),
-        ({"most_at_floor": 1e3}, {"verdict": "identified", "follows": []}),
+        ({"most_at_floor": 1e3, "description_price": 10.0}, {"verdict": "identified", "follows": []}),
         ({"p_value": 0.0, "description_price": 10.0}, {"follows": []}),
         ({"gross_sigmas": 50.0}, {"gross": ()}),
         ({"range_sigmas": -1e6}, {"steps": []}),

@@ -7,7 +7,7 @@ import pytest
 
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
-from compd.diagnosis.significance import SIGN_FLIPS, OrthogonalComplement, p_values
+from compd.diagnosis.significance import SIGN_FLIPS, Family, OrthogonalComplement, p_values
 
 
 def random_data(seed: int, rows: int = 120) -> RegressionData:
@@ -77,13 +77,13 @@ def test_orthogonal_complement_leaves_what_least_squares_does_not_explain() -> N
 def test_p_values_of_noise_are_uniform_and_of_an_effect_the_smallest() -> None:
     rng = np.random.default_rng(7)
     block = np.arange(240) * 24 // 240
-    families = [[rng.standard_normal((240, 3, 2))] for _ in range(6)]
+    columns = [rng.standard_normal((240, 3, 2)) for _ in range(6)]
     smallest = []
     for _ in range(40):
         y = rng.standard_normal((240, 3))
-        smallest.append(float(p_values(families, y, y, block).min()))
+        smallest.append(float(p_values([Family([variant], y) for variant in columns], block).min()))
     assert np.mean(np.array(smallest) < 0.05) <= 0.15  # 5 % is expected: 2 of 40
-    y = families[2][0] @ np.array([0.5, -0.5]) + rng.standard_normal((240, 3))
-    with_effect = p_values(families, y, rng.standard_normal((240, 3)), block)
+    y = columns[2] @ np.array([0.5, -0.5]) + rng.standard_normal((240, 3))
+    with_effect = p_values([Family([variant], y) for variant in columns], block)
     assert with_effect[2] == pytest.approx(1 / (SIGN_FLIPS + 1))
     assert int(np.argmin(with_effect)) == 2
