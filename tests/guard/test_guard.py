@@ -2,8 +2,8 @@
 
 replay/: runs of both machines in both modes, recorded by 0.1.0: effects applied and as a shadow, gauges lost and
 frozen, jumps, machine zero taken anew. verdicts/: `compare --json` and `diagnose --json` of the example recordings; of
-comparisons the residuals and what each part contributes are those of 0.1.0; the noise floor and p-values are the present
-ones, the latter from blocks that hold whole visits.
+comparisons the residuals and what each part contributes are those of 0.1.0; noise floor and p-values are the present
+ones.
 """
 
 from __future__ import annotations
