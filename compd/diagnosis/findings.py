@@ -122,7 +122,8 @@ class EmpiricalFinding:
             "formula_effects": list(self.formula_effects),
             "fitted": list(self.parameters),
             "beside": list(self.beside),
-            **({"effect": self.effect, "time_s": self.time_s} if self.effect else {}),
+            **({"effect": self.effect} if self.effect else {}),
+            **({"time_s": self.time_s} if math.isfinite(self.time_s) else {}),
             "note": "a description, not a cause",
         }
 

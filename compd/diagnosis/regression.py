@@ -126,7 +126,7 @@ class NormalEquations:
         """(S,) cross-validated loss of each set of columns: mean square per value on rows that were left out.
 
         testable : (S, splits) which splits count for a set. The loss is that of the nuisance columns, averaged over
-        all splits, less the gain over them, averaged over the splits that count; nan where none counts.
+        all splits, times the share that the set leaves of it in the splits that count; nan where none counts.
         """
         losses = np.full(len(sets), np.nan)
         sizes = np.array([len(index) for index in sets])
@@ -139,12 +139,12 @@ class NormalEquations:
         return losses
 
     def _cv_losses_of_one_size(self, index: IntArray, testable: BoolArray) -> FloatArray:
-        gain_by_fold = self.nuisance_fold_losses - self.fold_losses(index)
-        split = self.data.split_of_fold
-        gain = np.stack([gain_by_fold[:, split == k].sum(axis=1) for k in range(split.max() + 1)], axis=1)
-        counted = np.where(testable, gain, 0.0).sum(axis=1)
-        mean = counted / np.maximum(testable.sum(axis=1), 1) / self.data.value_count
-        return np.asarray(np.where(testable.any(axis=1), self.nuisance_cv_loss - mean, np.nan))
+        by_fold, split = self.fold_losses(index), self.data.split_of_fold
+        left = np.stack([by_fold[:, split == k].sum(axis=1) for k in range(split.max() + 1)], axis=1)
+        before = np.array([self.nuisance_fold_losses[split == k].sum() for k in range(split.max() + 1)])
+        counted = np.where(testable, before, 0.0).sum(axis=1)
+        share = np.where(testable, left, 0.0).sum(axis=1) / np.maximum(counted, 1e-300)
+        return np.asarray(np.where(testable.any(axis=1), self.nuisance_cv_loss * share, np.nan))
 
     def fold_losses(self, index: IntArray) -> FloatArray:
         """(S, F) sum of squares left in each fold by parameters learned from the split's other folds; index (S, p)."""

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.diagnosis.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.plausibility import is_plausible, is_undetermined
@@ -67,7 +67,7 @@ class SubsetLosses:
         self.floor_known = least_loss > 0
         self._least_loss = max(least_loss, LEAST_LOSS * self.baseline)
         self._losses: dict[tuple[int, ...], float] = {(): self.baseline}
-        self._by_row: dict[tuple[int, ...], FloatArray] = {}
+        self._by_row: dict[tuple[tuple[int, ...], bytes], FloatArray] = {}
 
     @property
     def baseline(self) -> float:
@@ -183,7 +183,8 @@ class SubsetLosses:
 
             std = sqrt(B / (B - 1) sum_b (d_b - mean d)^2),  d_b = sum of the differences in block b
         """
-        difference = self._row_losses(without) - self._row_losses(members)
+        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
+        difference = self._row_losses(without, testable) - self._row_losses(members, testable)
         by_block = np.bincount(self.data.block, difference)
         count = len(by_block)
         spread = float(np.sqrt(count / max(count - 1, 1) * ((by_block - by_block.mean()) ** 2).sum()))
@@ -200,15 +201,15 @@ class SubsetLosses:
         """Columns of a set among the normal equations, the nuisance columns first."""
         return np.concatenate([self._nuisance_index, *(self._indices[k] for k in members)]).astype(np.int64)
 
-    def _row_losses(self, members: Sequence[int]) -> FloatArray:
-        """(R,) squares left in each row by parameters learned without its fold, averaged over the splits that count."""
-        key = tuple(sorted(members))
+    def _row_losses(self, members: Sequence[int], testable: BoolArray) -> FloatArray:
+        """(R,) squares left in each row by parameters learned without its fold, averaged over some splits (splits,)."""
+        members = tuple(sorted(members))
+        key = members, testable.tobytes()
         if key in self._by_row:
             return self._by_row[key]
-        index = self.index(key)
-        columns = np.concatenate([self.data.nuisance.values, *(self.values[k] for k in key)], axis=2)
+        index = self.index(members)
+        columns = np.concatenate([self.data.nuisance.values, *(self.values[k] for k in members)], axis=2)
         losses = np.zeros(len(self.data.y))
-        testable = np.asarray(self._testable[list(key)].all(axis=0))
         for split, fold in enumerate(self.data.splits):
             if not testable[split]:
                 continue

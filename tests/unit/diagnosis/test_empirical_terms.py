@@ -114,11 +114,11 @@ def test_round_numbers() -> None:
 
 def test_an_angle_repeats_once_twice_and_three_times_per_turn_where_it_turns_far_enough(tmp_path: Path) -> None:
     azimuth_deg = RNG.uniform(0, 360, ROWS)
-    columns = {"azimuth_deg": azimuth_deg, "tilt_rad": RNG.uniform(0, 0.4, ROWS), "swivel_deg": azimuth_deg / 30}
+    columns = {"azimuth_deg": azimuth_deg, "tilt_rad": RNG.uniform(0, 0.35, ROWS), "swivel_deg": azimuth_deg / 30}
     aligned = record_external(tmp_path / "run.csv", columns, {"x": NOISE_UM + 5 * np.cos(np.radians(2 * azimuth_deg))})
     terms = terms_of(aligned)
     assert terms["azimuth_deg", "periodic"].grid[:3] == (360.0, 180.0, 120.0)
-    # over 0.4 rad one turn and half a turn are parabolas, and over 12 degrees a third of one is
+    # over 0.35 rad one turn and half a turn are parabolas, and over 12 degrees a third of one is
     assert terms["tilt_rad", "periodic"].grid[0] == pytest.approx(2 * np.pi / 3)
     assert 120.0 not in terms["swivel_deg", "periodic"].grid
     assert terms["azimuth_deg", "periodic"].refined_grid(180.0, 9) == [180.0]
