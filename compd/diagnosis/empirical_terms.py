@@ -29,8 +29,9 @@ from compd.units import UM_PER_MM, unit_of
 _LINK = re.compile(r"^(?P<what>[a-z][a-z0-9_]*)_link_(?P<link>\d+)_(?P<unit>[A-Za-z]\w*)$")
 
 # In which forms a residual may follow a covariate beside linear: only what warms or wets a body arrives late, only
-# along a way or an angle something repeats, stops and comes taut.
+# along a way or an angle something repeats, and only under a load or in a workspace something stops and comes taut.
 FORMS_BY_KIND: Mapping[Kind, tuple[str, ...]] = {
+    "workspace": ("square", "knee", "periodic"),
     "place": ("square", "periodic"),
     "angle": ("square", "periodic"),
     "load": ("square", "knee"),

@@ -19,7 +19,7 @@ from compd.comparison.covariates import why_no_covariate
 from compd.units import UNIT_KINDS, unit_of
 
 # What a covariate is, by its unit: it decides in which forms a residual may follow it.
-Kind: TypeAlias = Literal["place", "angle", "load", "flow", "other"]
+Kind: TypeAlias = Literal["workspace", "place", "angle", "load", "flow", "other"]
 
 STAYED_THE_SAME = "stayed the same"
 # Smaller changes, as a share of the largest value, are rounding.
@@ -41,7 +41,7 @@ _UNITS: dict[Kind, frozenset[str]] = {
 class SearchCovariate:
     """A column that a residual may follow.
 
-    name : as formulas call it.  kind : by its unit.
+    name : as formulas call it.  kind : by its unit; "workspace" is the place of a known machine's tip.
     values : (R,) on the rows that are looked at, without gaps.
     """
 
@@ -81,10 +81,11 @@ def search_covariates(aligned: AlignedRecording, rows: BoolArray) -> list[Search
         for name, column in aligned.gaps_filled.rows.quantities.items()
         if name not in reasons
     ]
+    tip: Kind = "place" if aligned.model is None else "workspace"
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
         values = column[rows]
         if np.isfinite(values).all() and _changes(values) and not _is_among(values, found):
-            found.append(SearchCovariate(f"tip_{axis}_mm", "place", values))
+            found.append(SearchCovariate(f"tip_{axis}_mm", tip, values))
     return found
 
 
