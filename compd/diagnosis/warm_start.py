@@ -18,7 +18,7 @@ from compd.diagnosis.refined_constants import refined_variants
 from compd.diagnosis.subset_losses import Subset, SubsetLosses
 
 
-class WarmStart(NamedTuple):
+class UnknownStart(NamedTuple):
     """A problem without the starts of sessions, and the lag for which they are unknown.
 
     problem : with the states projected out.  lag : the effect with its time constant.
@@ -31,7 +31,7 @@ class WarmStart(NamedTuple):
     score: float
 
 
-def find_warm_start(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> WarmStart | None:
+def find_warm_start(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> UnknownStart | None:
     """The lag that with unknown states at the start of sessions scores better than the best set; None where none does.
 
     Each is tried with the other members of the best set, at every time constant of its grid, then between these.
@@ -57,11 +57,11 @@ def with_states_of(problem: DiagnosisProblem, members: Iterable[Candidate]) -> D
     return problem.without(np.concatenate(columns, axis=2)) if columns else problem
 
 
-def _try(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> WarmStart:
+def _try(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> UnknownStart:
     others = [losses.candidates[k] for k in best.members if losses.candidates[k].effect.id != lag.effect.id]
     members = (*others, lag)
     projected = with_states_of(problem, members)
     alone = projected.losses(members)
     subset = Subset(tuple(range(len(members))), alone.loss(range(len(members))))
     score = alone.score(subset) + problem.criteria.number_price * projected.states
-    return WarmStart(projected, lag, members, score)
+    return UnknownStart(projected, lag, members, score)
