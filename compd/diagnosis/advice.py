@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.phrases import (
     best_description,
@@ -13,11 +11,9 @@ from compd.diagnosis.phrases import (
     thermal_in_one_session,
     untested_here,
 )
+from compd.diagnosis.verdict import Diagnosis
 from compd.model.formula.keys import FormulaDeclaration
 from compd.number_text import join_words
-
-if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
 
 # What a formula says of telling it from others where the person who wrote it said nothing.
 NO_WORDS = FormulaDeclaration.model_fields["separated_by"].default

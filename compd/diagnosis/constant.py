@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,15 +11,9 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.least_squares import column_norms, solve_least_squares
 from compd.diagnosis.candidates import Candidate
-from compd.diagnosis.findings import ConstantFinding
-from compd.diagnosis.rivals import find_rivals
-from compd.model.effect import ConstantValues, Effect, FittedEffect, Parameter, memoryless_basis
+from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
 from compd.model.observations import Observations
 from compd.units import UM_PER_MM
-
-if TYPE_CHECKING:
-    from compd.diagnosis.explanation import Explanation
-    from compd.diagnosis.problem import DiagnosisProblem
 
 CONSTANT = "constant"
 MM_PER_UM = 1 / UM_PER_MM
@@ -94,40 +86,3 @@ def split_constants(
         else:
             competing.append(candidate)
     return tuple(competing), tuple(same.values())
-
-
-def name_constant(explanation: Explanation) -> Explanation:
-    """Where nothing but a constant was found, the effect that makes it best in its place, with its rivals.
-
-    Beside effects that vary a constant is told on a line of its own; alone, it is what is wrong with the machine.
-    """
-    if len(explanation.members) != 1 or not explanation.constants:
-        return explanation
-    family = find_rivals(explanation.losses, explanation.members, explanation.constants[0])
-    return replace(explanation, members=(family[0].member,)) if family else explanation
-
-
-def describe_constant(
-    problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect]
-) -> ConstantFinding | None:
-    """The constant that was taken off or found, and the effects that it may come from; None where there is none.
-
-    named : the fitted effect of each named member.
-    """
-    aligned, losses = problem.aligned, explanation.losses
-    if explanation.constants:
-        member = explanation.constants[0]
-        values, std = named[member].theta, np.sqrt(np.diag(named[member].covariance))
-        rivals = find_rivals(losses, explanation.members, member)
-        effects = [losses.candidates[rival.member].effect for rival in rivals]
-    elif aligned.registration_columns.shape[2] and not aligned.registered:
-        values, std = problem.comparison.constant_um, np.full(len(aligned.labels), np.nan)
-        effects = [candidate.effect for candidate in problem.same_as_nuisance]
-    else:
-        return None
-    return ConstantFinding(
-        by_axis_um=dict(zip(aligned.labels, values.tolist(), strict=True)),
-        std_um=dict(zip(aligned.labels, std.tolist(), strict=True)),
-        effects=tuple(effect.id for effect in effects),
-        separated_by=effects[0].separated_by if effects else "",
-    )

@@ -14,7 +14,7 @@ from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
 from compd.diagnosis.candidates import library_pool, periodic_candidates
-from compd.diagnosis.constant import describe_constant, name_constant
+from compd.diagnosis.constant_finding import describe_constant, name_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
@@ -27,6 +27,7 @@ from compd.diagnosis.proxies import proxy_candidates
 from compd.diagnosis.rivals import find_rivals
 from compd.diagnosis.significance import Family, OrthogonalComplement, p_values
 from compd.diagnosis.subset_losses import SubsetLosses
+from compd.diagnosis.summary import summary
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.model.effect import Effect, FittedEffect
@@ -122,7 +123,11 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
     )
-    return replace(diagnosis, next_measurement=propose_measurement(problem, explanation, diagnosis))
+    return replace(
+        diagnosis,
+        next_measurement=propose_measurement(problem, explanation, diagnosis),
+        summary=summary(diagnosis),
+    )
 
 
 def _verdict(

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from compd.diagnosis.verdict import Diagnosis
 from compd.number_text import fall_text, number_text, percent_text
-
-if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
 
 # Where a floor is from, in words.
 _SOURCES = {"repeats": "repeats", "declared": "declared"}

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from compd.comparison.compare import Comparison
 from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
+from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect import Effect
 from compd.model.formula.keys import FormulaDeclaration
 from compd.model.library import BUNDLED
 from compd.number_text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
-
-if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
 
 # What a formula says of its physics where the person who wrote it said nothing.
 _NO_PHYSICS = FormulaDeclaration.model_fields["physics"].default

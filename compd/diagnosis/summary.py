@@ -6,14 +6,10 @@ error down to the noise; above it an effect is a share of the error; what a resi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from compd.diagnosis.error_fall import error_fall
 from compd.diagnosis.phrases import change_text, followed_text, is_change, rivals_text, was_any_tried
+from compd.diagnosis.verdict import Diagnosis
 from compd.number_text import join_words, number_text
-
-if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
 
 CANNOT_KNOW = "how much of it is noise cannot be known"
 

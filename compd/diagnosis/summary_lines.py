@@ -3,8 +3,6 @@ what else it could be, and what to do next."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from compd.diagnosis.advice import advice
 from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.phrases import (
@@ -25,11 +23,9 @@ from compd.diagnosis.phrases import (
     was_any_tried,
 )
 from compd.diagnosis.summary import CANNOT_KNOW
+from compd.diagnosis.verdict import Diagnosis
 from compd.labelled_lines import LabelledText, fit_lines
 from compd.number_text import fall_text, join_words, number_text, percent_text
-
-if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
 
 # What a terminal shows without scrolling, and its usual width.
 MOST_LINES = 12

@@ -16,6 +16,7 @@ from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.comparison.compare import Comparison, compare
 from compd.comparison.noise_floor import NoiseFloor
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
+from compd.diagnosis.summary import summary
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.model.effect import Effect, FittedEffect
 from compd.model.formula.declaration import formula_effect
@@ -142,7 +143,8 @@ def diagnosis(
     for name in ("steps", "candidates", "depends_on", "untested"):
         fields[name] = tuple(fields.get(name, ()))
     heldout = {"heldout_before_um": before_um, "heldout_after_um": after_um}
-    return Diagnosis(verdict, before, after, **{**heldout, **fields})
+    made = Diagnosis(verdict, before, after, **{**heldout, **fields})
+    return replace(made, summary=summary(made))
 
 
 def _scaled(comparison: Comparison, rms_um: float) -> Comparison:
