@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.diagnosis.explanation import Explanation
 from compd.diagnosis.findings import ConstantFinding
-from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.rivals import find_rivals
+from compd.diagnosis.search.explanation import Explanation
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.search.rivals import find_rivals
 from compd.model.effect import FittedEffect
 
 

@@ -9,10 +9,10 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.summary_lines import WIDTH, summary_lines
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.summary_lines import WIDTH, summary_lines
 from compd.report.diagnosis_evidence import (
     candidates_table,
     constant_table,

@@ -16,8 +16,8 @@ from compd.comparison.aligned_recording import AlignedRecording, align_recording
 from compd.comparison.compare import Comparison, compare
 from compd.comparison.noise_floor import NoiseFloor
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
-from compd.diagnosis.summary import summary
 from compd.diagnosis.verdict import Diagnosis, Verdict
+from compd.diagnosis.words.summary import summary
 from compd.model.effect import Effect, FittedEffect
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import load_library
