@@ -14,10 +14,10 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.cli.main import app
-from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import compare
+from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.open import open_recording
-from compd.comparison.robust import robust_regression, trimmed_scale
+from compd.comparison.statistics.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
 from compd.diagnosis.candidates.candidates import Candidate, library_pool
 from compd.diagnosis.candidates.proxies import proxy_candidates

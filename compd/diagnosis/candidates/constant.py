@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.least_squares import column_norms, solve_least_squares
+from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
 from compd.model.observations import Observations

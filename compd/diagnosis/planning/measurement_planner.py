@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, at_rows
 from compd.diagnosis.planning.t_optimal import Predictions, RivalRefit, choose_programmes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.registration import register
-from compd.comparison.robust import (
+from compd.comparison.statistics.robust import (
     HUBER,
     SCALE_EFFICIENCY,
     huber_weights,

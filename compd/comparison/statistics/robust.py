@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.least_squares import column_norms, solve_least_squares, solve_ridge
+from compd.comparison.statistics.least_squares import column_norms, solve_least_squares, solve_ridge
 
 # Huber's constant, in standard deviations. 1.345 would be 95 % efficient on normal noise; at 2.5 nearly nothing of
 # the noise is held back, only what lies between noise and outliers.

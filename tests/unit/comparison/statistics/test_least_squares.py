@@ -8,9 +8,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from compd.comparison import cluster_covariance, least_squares, robust
-from compd.comparison.cluster_covariance import cluster_covariance as covariance_of
-from compd.comparison.least_squares import (
+from compd.comparison.statistics import cluster_covariance, least_squares, robust
+from compd.comparison.statistics.cluster_covariance import cluster_covariance as covariance_of
+from compd.comparison.statistics.least_squares import (
     determined,
     normal_inverse,
     ridge_inverse,

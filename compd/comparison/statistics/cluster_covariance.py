@@ -20,30 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.least_squares import determined, normal_inverse
-from compd.recording.recording import Recording
-
-# Enough blocks for 15 % on a standard error, and long enough for temperatures to change from one to the next.
-BLOCKS = 24
-
-
-def neighbour_blocks(recording: Recording) -> IntArray:
-    """(N,) number of each row's block: rows within which residuals may be correlated.
-
-    Blocks are the recording's sessions (`Recording.fold`) where there are BLOCKS or more of them; else each session
-    is cut into parts of neighbouring rows, so that there are at least BLOCKS in all. Rows of one visit stay together,
-    unless visits are longer than blocks.
-    """
-    sessions, session = np.unique(recording.fold, return_inverse=True)
-    if len(sessions) >= BLOCKS:
-        return np.asarray(session, dtype=np.int64)
-    per_session = -(-BLOCKS // len(sessions))
-    block = np.zeros(len(session), dtype=np.int64)
-    for k in range(len(sessions)):
-        rows = np.flatnonzero(session == k)
-        block[rows] = k * per_session + np.arange(len(rows)) * per_session // len(rows)
-    together = recording.first_of_visit(block)
-    return together if len(np.unique(together)) == len(np.unique(block)) else block
+from compd.comparison.statistics.least_squares import determined, normal_inverse
 
 
 def cluster_covariance(G: FloatArray, residual: FloatArray, block: IntArray) -> FloatArray:
