@@ -17,9 +17,9 @@ from compd.comparison.shape_search import search_constants
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
-from compd.diagnosis.measurement_plan import MeasurementPlan
-from compd.diagnosis.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.next_measurement import plan_measurement as plan_fitted_rivals
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, recorded_limits
+from compd.diagnosis.planning.next_measurement import plan_measurement as plan_fitted_rivals
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect

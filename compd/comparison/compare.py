@@ -17,12 +17,12 @@ from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.contributions import Contribution, contributions
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error, residual_ending
-from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import NoiseFloor, noise_floor, repeat_scatter
 from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import Trend, find_trends
+from compd.comparison.statistics.last_digit import last_digit_um
 from compd.errors import Problem, RecordingError
 from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect

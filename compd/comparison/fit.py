@@ -29,12 +29,13 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.cluster_covariance import cluster_covariance, neighbour_blocks
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
-from compd.comparison.robust import huber_weights
+from compd.comparison.statistics.cluster_covariance import cluster_covariance
+from compd.comparison.statistics.least_squares import solve_least_squares
+from compd.comparison.statistics.robust import huber_weights
 from compd.errors import CompdError, Problem
 from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM

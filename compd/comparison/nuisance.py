@@ -14,8 +14,8 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
-from compd.comparison.least_squares import column_norms, solve_least_squares
-from compd.comparison.robust import robust_regression
+from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
+from compd.comparison.statistics.robust import robust_regression
 from compd.model.effect import FittedEffect
 from compd.units import UM_PER_MM
 

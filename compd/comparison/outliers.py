@@ -6,8 +6,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.replicates import replicate_pairs
-from compd.comparison.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
+from compd.comparison.statistics.replicates import replicate_pairs
+from compd.comparison.statistics.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
 
 
 def outlier_rows(

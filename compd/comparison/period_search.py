@@ -22,8 +22,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.least_squares import solve_least_squares
-from compd.comparison.periodogram import PeriodLimits, strongest_periods
+from compd.comparison.statistics.least_squares import solve_least_squares
+from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
 from compd.model.deltas import port_size
 from compd.model.effect import Constant, ConstantValues, Effect
 from compd.model.formula.columns import column_values

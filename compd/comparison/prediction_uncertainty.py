@@ -9,8 +9,8 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.last_digit import last_digit_um
 from compd.comparison.noise_floor import repeat_scatter
+from compd.comparison.statistics.last_digit import last_digit_um
 from compd.model.deltas import Deltas, split_by_port, sum_deltas
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import base_joints_by_distances

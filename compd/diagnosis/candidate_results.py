@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from compd.diagnosis.candidates.plausibility import estimate_parameters, is_undetermined
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
-from compd.diagnosis.plausibility import estimate_parameters, is_undetermined
-from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.subset_losses import Subset, SubsetLosses
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 
 
 def candidate_results(

@@ -13,22 +13,23 @@ from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
-from compd.diagnosis.candidates import library_pool, periodic_candidates
-from compd.diagnosis.constant import describe_constant, name_constant
+from compd.diagnosis.candidates.candidates import library_pool, periodic_candidates
+from compd.diagnosis.candidates.plausibility import estimate_parameters
+from compd.diagnosis.candidates.proxies import proxy_candidates
+from compd.diagnosis.constant_finding import describe_constant, name_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
-from compd.diagnosis.gross_rows import gross_rows
-from compd.diagnosis.plausibility import estimate_parameters
-from compd.diagnosis.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.proposed_measurement import propose_measurement
-from compd.diagnosis.proxies import proxy_candidates
-from compd.diagnosis.rivals import find_rivals
-from compd.diagnosis.significance import Family, OrthogonalComplement, p_values
-from compd.diagnosis.subset_losses import SubsetLosses
+from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
+from compd.diagnosis.search.gross_rows import gross_rows
+from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.search.rivals import find_rivals
+from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
+from compd.diagnosis.search.subset_losses import SubsetLosses
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
+from compd.diagnosis.words.summary import summary
 from compd.model.effect import Effect, FittedEffect
 
 # A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
@@ -122,7 +123,11 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
     )
-    return replace(diagnosis, next_measurement=propose_measurement(problem, explanation, diagnosis))
+    return replace(
+        diagnosis,
+        next_measurement=propose_measurement(problem, explanation, diagnosis),
+        summary=summary(diagnosis),
+    )
 
 
 def _verdict(

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.diagnosis.changes import ChangeCandidate
-from compd.diagnosis.empirical_search import EmpiricalFit
-from compd.diagnosis.explanation import Explanation
+from compd.diagnosis.candidates.changes import ChangeCandidate
+from compd.diagnosis.candidates.proxies import ProxyCandidate
 from compd.diagnosis.findings import EmpiricalFinding
-from compd.diagnosis.problem import DiagnosisProblem
-from compd.diagnosis.proxies import ProxyCandidate
-from compd.diagnosis.regression import RegressionData, Regressors, normal_equations
-from compd.diagnosis.significance import Family, OrthogonalComplement, p_values
+from compd.diagnosis.search.empirical_search import EmpiricalFit
+from compd.diagnosis.search.explanation import Explanation
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.search.regression import RegressionData, Regressors, normal_equations
+from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
 
 # A direction in which a term explains less than this share of its squares is left out of the proposed formulas: it
 # would be a formula for noise.

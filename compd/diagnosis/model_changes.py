@@ -11,7 +11,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison, compare
 from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
-from compd.diagnosis.candidates import library_pool
+from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError

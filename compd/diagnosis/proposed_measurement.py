@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from compd.diagnosis.explanation import Explanation
 from compd.diagnosis.findings import EmpiricalFinding
-from compd.diagnosis.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
-from compd.diagnosis.problem import DiagnosisProblem
+from compd.diagnosis.planning.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
+from compd.diagnosis.search.explanation import Explanation
+from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis
 
 # Covariates that the proposal names.

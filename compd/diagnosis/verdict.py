@@ -15,7 +15,6 @@ from compd.diagnosis.findings import (
     GrossRows,
     UntestedEffect,
 )
-from compd.diagnosis.summary import summary
 from compd.json_text import nan_to_null
 from compd.tables import Columns, data_frame, html_table
 
@@ -61,6 +60,8 @@ class Diagnosis:
         Error on rows that were left out with the model as it was, without its constant, um per coordinate.
     heldout_after_um : float
         The same with the effects of `steps`.
+    summary : str
+        The verdict in one or two sentences; `diagnose` fills it in last, from all the others.
     """
 
     verdict: Verdict
@@ -75,11 +76,7 @@ class Diagnosis:
     untested: tuple[UntestedEffect, ...] = ()
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
-
-    @property
-    def summary(self) -> str:
-        """The verdict in one or two sentences."""
-        return summary(self)
+    summary: str = ""
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per effect of the library, as a pandas data frame.

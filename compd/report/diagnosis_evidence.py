@@ -8,10 +8,17 @@ from typing import Any
 
 import yaml
 
-from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
-from compd.diagnosis.phrases import change_text, gross_texts, is_change, parameter_texts, short_name, untested_here
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall
+from compd.diagnosis.words.phrases import (
+    change_text,
+    gross_texts,
+    is_change,
+    parameter_texts,
+    short_name,
+    untested_here,
+)
 from compd.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
 from compd.report.page_table import PageTable
 

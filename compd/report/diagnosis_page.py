@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.phrases import is_change
-from compd.diagnosis.summary_lines import summary_lines
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.phrases import is_change
+from compd.diagnosis.words.summary_lines import summary_lines
 from compd.model.effect import FittedEffect
 from compd.model.library import find_effect
 from compd.report.diagnosis_evidence import (

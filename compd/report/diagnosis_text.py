@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from compd.diagnosis.error_fall import ErrorFall, error_fall
-from compd.diagnosis.summary_lines import WIDTH, summary_lines
+from compd.diagnosis.holdout import Holdout
+from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.summary_lines import WIDTH, summary_lines
 from compd.report.diagnosis_evidence import (
     candidates_table,
     constant_table,
@@ -23,10 +24,6 @@ from compd.report.diagnosis_evidence import (
     without_gain,
 )
 from compd.report.page_table import PageTable
-
-if TYPE_CHECKING:
-    from compd.diagnosis.holdout import Holdout
-    from compd.diagnosis.verdict import Diagnosis
 
 # Findings that are listed; --json has them all.
 SHOWN = 8

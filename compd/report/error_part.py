@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.comparison.compare import Comparison
-from compd.comparison.least_squares import solve_least_squares
+from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import link_residuals
 from compd.units import UM_PER_MM

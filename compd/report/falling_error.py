@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from plotly.graph_objects import Bar, Figure, Scatter
 
-from compd.diagnosis.error_fall import ErrorFall
 from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.phrases import short_name
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall
+from compd.diagnosis.words.phrases import short_name
 from compd.number_text import number_text
 from compd.report.page import COLOURS, style_figure
 

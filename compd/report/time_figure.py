@@ -7,9 +7,9 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.diagnosis.error_fall import ErrorFall
-from compd.diagnosis.phrases import change_text, is_change
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall
+from compd.diagnosis.words.phrases import change_text, is_change
 from compd.recording.recording import Recording
 from compd.report.page import COLOURS, style_figure
 from compd.report.small_multiples import SERIES_COLOURS, dot_style, thin

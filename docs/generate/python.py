@@ -10,7 +10,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import Comparison
 from compd.configuration import Configuration
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
-from compd.diagnosis.measurement_plan import MeasurementPlan
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import (
     ConfigurationError,

@@ -14,19 +14,19 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.cli.main import app
-from compd.comparison.cluster_covariance import neighbour_blocks
 from compd.comparison.compare import compare
+from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.open import open_recording
-from compd.comparison.robust import robust_regression, trimmed_scale
+from compd.comparison.statistics.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.candidates import Candidate, library_pool
+from compd.diagnosis.candidates.candidates import Candidate, library_pool
+from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.cross_validation import row_splits
 from compd.diagnosis.diagnose import diagnose
-from compd.diagnosis.explanation import Explanation, explain, explain_again
-from compd.diagnosis.gross_rows import EXPONENT, RIDGE, ROUNDS
-from compd.diagnosis.problem import DiagnosisProblem, build_problem
-from compd.diagnosis.proxies import proxy_candidates
+from compd.diagnosis.search.cross_validation import row_splits
+from compd.diagnosis.search.explanation import Explanation, explain, explain_again
+from compd.diagnosis.search.gross_rows import EXPONENT, RIDGE, ROUNDS
+from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import load_library
 

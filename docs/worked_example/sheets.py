@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.last_digit import last_digit_um
-from compd.comparison.replicates import replicate_pairs
-from compd.comparison.robust import SCALE_EFFICIENCY, TRIMMED, WINSORIZED, WINSORIZED_MEAN_SQUARE
+from compd.comparison.statistics.last_digit import last_digit_um
+from compd.comparison.statistics.replicates import replicate_pairs
+from compd.comparison.statistics.robust import SCALE_EFFICIENCY, TRIMMED, WINSORIZED, WINSORIZED_MEAN_SQUARE
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.regression import LEAST_RIDGE
+from compd.diagnosis.search.regression import LEAST_RIDGE
 from compd.units import UM_PER_MM
 from docs.worked_example.example import Example
 from docs.worked_example.spreadsheet import Address, Spreadsheet, column_letters

@@ -17,6 +17,7 @@ from compd.comparison.compare import Comparison, compare
 from compd.comparison.noise_floor import NoiseFloor
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
 from compd.diagnosis.verdict import Diagnosis, Verdict
+from compd.diagnosis.words.summary import summary
 from compd.model.effect import Effect, FittedEffect
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import load_library
@@ -142,7 +143,8 @@ def diagnosis(
     for name in ("steps", "candidates", "depends_on", "untested"):
         fields[name] = tuple(fields.get(name, ()))
     heldout = {"heldout_before_um": before_um, "heldout_after_um": after_um}
-    return Diagnosis(verdict, before, after, **{**heldout, **fields})
+    made = Diagnosis(verdict, before, after, **{**heldout, **fields})
+    return replace(made, summary=summary(made))
 
 
 def _scaled(comparison: Comparison, rms_um: float) -> Comparison:

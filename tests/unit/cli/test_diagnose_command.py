@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 from compd.cli.measurements.diagnose import diagnose
 from compd.diagnosis.findings import CandidateResult, UntestedEffect
-from compd.diagnosis.summary_lines import MOST_LINES, WIDTH, summary_lines
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.summary_lines import MOST_LINES, WIDTH, summary_lines
 from compd.model.library import find_effect
 from compd.report.diagnosis_text import print_diagnosis
 from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step

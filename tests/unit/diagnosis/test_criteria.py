@@ -31,7 +31,7 @@ def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Fie
 
 
 def test_every_threshold_is_used() -> None:
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for room in ROOMS for path in room.glob("*.py")]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for room in ROOMS for path in room.rglob("*.py")]
     used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
     assert {threshold.name for threshold in THRESHOLDS} - used == set()
 

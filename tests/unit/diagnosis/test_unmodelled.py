@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.fit import fit, initial_effect
-from compd.diagnosis.candidates import Candidate, library_pool
+from compd.diagnosis.candidates.candidates import Candidate, library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.units import UM_PER_MM

@@ -15,10 +15,10 @@ from plotly.graph_objects import Figure
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.covariates import Covariate
-from compd.diagnosis.error_fall import ErrorFall, error_fall
 from compd.diagnosis.findings import CandidateResult, GrossRows, UntestedEffect
-from compd.diagnosis.summary_lines import summary_lines
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.summary_lines import summary_lines
 from compd.model.effect import FittedEffect
 from compd.model.library import find_effect
 from compd.report.diagnosis_page import write_diagnosis_page

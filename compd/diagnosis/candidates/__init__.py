@@ -1,0 +1,1 @@
+"""What may be missing from a model, with the columns that it would add: effects, the constant, proxies, changes."""

@@ -1,0 +1,66 @@
+"""Changes in time: an effect of the library that begins, ends or grows at a moment, as after a crash or a knock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
+
+# Moments that are tried beside the sessions' starts, evenly over the rows.
+MOMENTS = 8
+# Moments between neighbours that are tried where a change was found: to about a hundredth of the recording.
+BETWEEN = 9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChangeCandidate(Candidate):
+    """An effect from a moment on, time_s on the recording's clock.  whole : the same over all rows."""
+
+    time_s: float
+    whole: Candidate
+
+
+def moments_s(aligned: AlignedRecording) -> list[float]:
+    """Moments at which something may have changed, s: before each session but the first, and quantiles of the rows."""
+    time_s = aligned.rows.time_s
+    starts = time_s[aligned.rows.session_start][1:]
+    quantiles = np.quantile(time_s, np.linspace(0, 1, MOMENTS + 2)[1:-1])
+    return sorted({*starts.tolist(), *quantiles.tolist()})
+
+
+def moments_between_s(moments: Sequence[float], moment_s: float) -> list[float]:
+    """Moments between one of those that were tried, s, and its neighbours."""
+    place = list(moments).index(moment_s)
+    ends = [moments[other] for other in (place - 1, place + 1) if 0 <= other < len(moments)]
+    return [float(new) for end in ends for new in np.linspace(moment_s, end, BETWEEN + 2)[1:-1]]
+
+
+def change_candidates(
+    candidates: Sequence[Candidate], aligned: AlignedRecording, times_s: Sequence[float]
+) -> list[ChangeCandidate]:
+    """Each of some effects from each moment on; what it did before stays as it is."""
+    time_s = aligned.rows.time_s
+    return [
+        ChangeCandidate(
+            name=f"{candidate.name} change",
+            effect=candidate.effect,
+            columns_um=_after(candidate.columns_um, time_s, moment_s),
+            limits=np.ptp(candidate.limits, axis=1)[:, None] * [-1.0, 1.0],
+            searched_parameters=candidate.searched_parameters + SEARCHED_CONSTANT,
+            constants=candidate.constants,
+            kind="change",
+            time_s=moment_s,
+            whole=candidate,
+        )
+        for candidate in candidates
+        for moment_s in times_s
+    ]
+
+
+def _after(columns_um: FloatArray, time_s: FloatArray, moment_s: float) -> FloatArray:
+    return np.where((time_s >= moment_s)[:, None, None], columns_um, 0.0)

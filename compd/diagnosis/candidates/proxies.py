@@ -1,0 +1,73 @@
+"""Effects whose thermometer is missing, tried with every thermometer that there is in its place.
+
+Such an effect cannot be named: its own temperature was not measured. But parts of one machine warm up together, and
+what it does would else be taken for another effect that is driven by the neighbour's temperature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate, searched_parameters, variant
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities, unmet_needs
+
+_PREFIX = "temperature_"
+
+
+@dataclass(frozen=True, eq=False)
+class ProxyCandidate(Candidate):
+    """An effect computed from another part's temperature.
+
+    quantity : the column that stands for the missing ones.  missing : these.
+    """
+
+    quantity: str = ""
+    missing: tuple[str, ...] = ()
+
+
+def proxy_candidates(
+    aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]
+) -> tuple[ProxyCandidate, ...]:
+    """Every effect that lacks nothing but thermometers, with each thermometer of the recording in their place.
+
+    present : ids of the model's effects, which are left out.
+    """
+    rows, usable = aligned.gaps_filled.rows, aligned.usable.mask
+    thermometers = [
+        name
+        for name, values in rows.quantities.items()
+        if name.startswith(_PREFIX) and np.isfinite(values[usable]).all() and np.ptp(values[usable]) > 0
+    ]
+    candidates: list[ProxyCandidate] = []
+    for effect in effects:
+        missing = tuple(name for name in needed_quantities(effect, rows.links) if name not in rows.quantities)
+        lacks = unmet_needs(effect, rows.available | set(missing), rows.links)
+        if effect.id in present or lacks or not missing or not all(name.startswith(_PREFIX) for name in missing):
+            continue
+        for thermometer in thermometers:
+            measured = rows.quantities[thermometer]
+            quantities = {**rows.quantities, **dict.fromkeys(missing, measured)}
+            substituted = replace(aligned, rows=replace(rows, quantities=quantities))
+            grid = effect.constant_grid(rows)
+            searched = searched_parameters(effect, grid) + SEARCHED_CONSTANT
+            for constants in grid:
+                candidate = variant(effect, constants, substituted, searched)
+                candidates.append(
+                    ProxyCandidate(
+                        f"{effect.id} by proxy",
+                        effect,
+                        candidate.columns_um,
+                        candidate.limits,
+                        searched,
+                        constants,
+                        "proxy",
+                        thermometer,
+                        missing,
+                    )
+                )
+    return tuple(candidates)

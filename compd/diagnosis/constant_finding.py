@@ -1,0 +1,51 @@
+"""The constant in a diagnosis: the effect that is named in its place, and what is reported of it beside effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from compd.diagnosis.findings import ConstantFinding
+from compd.diagnosis.search.explanation import Explanation
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.search.rivals import find_rivals
+from compd.model.effect import FittedEffect
+
+
+def name_constant(explanation: Explanation) -> Explanation:
+    """Where nothing but a constant was found, the effect that makes it best in its place, with its rivals.
+
+    Beside effects that vary a constant is told on a line of its own; alone, it is what is wrong with the machine.
+    """
+    if len(explanation.members) != 1 or not explanation.constants:
+        return explanation
+    family = find_rivals(explanation.losses, explanation.members, explanation.constants[0])
+    return replace(explanation, members=(family[0].member,)) if family else explanation
+
+
+def describe_constant(
+    problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect]
+) -> ConstantFinding | None:
+    """The constant that was taken off or found, and the effects that it may come from; None where there is none.
+
+    named : the fitted effect of each named member.
+    """
+    aligned, losses = problem.aligned, explanation.losses
+    if explanation.constants:
+        member = explanation.constants[0]
+        values, std = named[member].theta, np.sqrt(np.diag(named[member].covariance))
+        rivals = find_rivals(losses, explanation.members, member)
+        effects = [losses.candidates[rival.member].effect for rival in rivals]
+    elif aligned.registration_columns.shape[2] and not aligned.registered:
+        values, std = problem.comparison.constant_um, np.full(len(aligned.labels), np.nan)
+        effects = [candidate.effect for candidate in problem.same_as_nuisance]
+    else:
+        return None
+    return ConstantFinding(
+        by_axis_um=dict(zip(aligned.labels, values.tolist(), strict=True)),
+        std_um=dict(zip(aligned.labels, std.tolist(), strict=True)),
+        effects=tuple(effect.id for effect in effects),
+        separated_by=effects[0].separated_by if effects else "",
+    )

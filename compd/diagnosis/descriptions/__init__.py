@@ -1,0 +1,1 @@
+"""Formulas of measured quantities that describe what a residual follows; they name no cause."""

@@ -1,0 +1,118 @@
+"""Gross rows, which neither noise nor any candidate explains, and the weight of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtr, chdtrc, gammaln
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.findings import GrossRows
+
+# Ridge of the robust fit, as a share of each column's squared norm: there may be more columns than rows determine.
+RIDGE = 1e-4
+# A larger exponent of Huber's weight than 1 and more rounds: many columns at once can follow gross rows.
+EXPONENT = 2.0
+ROUNDS = 12
+# With more columns than this share of the measured numbers a fit of them says nothing of single rows.
+MOST_COLUMNS = 0.4
+# A stretch with so many gross rows, at most so far apart, is a run: something happened there.
+FEWEST_IN_RUN, WIDEST_GAP = 4, 3
+
+
+class RowWeights(NamedTuple):
+    """What each of N rows counts.
+
+    gross : (N,) rows that do not.  weight : (N,) of the others, so scaled that the mean square of normal noise is not
+    changed; 0 for rows that are gross, or that the fit does not rest on.
+    """
+
+    gross: BoolArray
+    weight: FloatArray
+
+
+def weigh_rows(
+    columns: Sequence[FloatArray],
+    residual: FloatArray,
+    known: BoolArray,
+    visit: IntArray | None,
+    noise: float,
+    criteria: Criteria,
+) -> RowWeights:
+    """Weigh rows by what a robust fit of some columns and a constant leaves of them.
+
+    columns : each (N, m, P), whitened.  residual : (N, m), whitened; nan where it is not known.
+    known : (N,) rows that the fit rests on. Others are judged by it where the residual and the columns are known.
+    visit : (N,) number of the visit, negative for none.
+    noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
+        of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there.
+
+    With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
+    min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise.
+    """
+    m = residual.shape[1]
+    constant = np.broadcast_to(np.eye(m), (*residual.shape, m))
+    G = np.concatenate([constant, *columns], axis=2)
+    if G.shape[2] > MOST_COLUMNS * known.sum() * m:
+        G = G[:, :, :m]
+    theta = robust_regression(
+        G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+    )
+    left = residual - G @ theta
+    judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
+    scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)
+    distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
+    far = (distance > criteria.gross_sigmas).any(axis=1)
+    gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
+    size = np.sqrt(np.mean(distance**2, axis=1))
+    full = criteria.full_weight_sigmas
+    weight = np.minimum(1.0, full / np.maximum(size, full)) / consistency(m, full)
+    return RowWeights(gross, np.where(known & ~gross, weight, 0.0))
+
+
+def consistency(m: int, full: float) -> float:
+    """Mean of min(d^2, full d) for m coordinates of normal noise, m d^2 being distributed as chi-squared.
+
+    >>> round(consistency(1, 2.0), 3), round(consistency(3, 2.0), 3)
+    (0.954, 0.999)
+    """
+    within = chdtr(m + 2, m * full**2)  # E[d^2; d <= full]
+    beyond = np.exp(_log_mean_chi(m)) / np.sqrt(m) * chdtrc(m + 1, m * full**2)  # E[d; d > full]
+    return float(within + full * beyond)
+
+
+def _log_mean_chi(m: int) -> float:
+    """Logarithm of the mean of a chi variable with m degrees of freedom."""
+    return float(0.5 * np.log(2.0) + gammaln((m + 1) / 2) - gammaln(m / 2))
+
+
+def _confirmed(left: FloatArray, known: BoolArray, visit: IntArray | None, limit: FloatArray) -> BoolArray:
+    """(N,) rows with another row of the same visit within a limit (m,) on every coordinate."""
+    confirmed = np.zeros(len(left), dtype=bool)
+    if visit is None:
+        return confirmed
+    rows = np.flatnonzero(known & (visit >= 0))
+    rows = rows[np.argsort(visit[rows], kind="stable")]
+    bounds = np.flatnonzero(np.diff(visit[rows], prepend=-1, append=-1))
+    for begin, end in pairwise(bounds):
+        of_visit = rows[begin:end]
+        if len(of_visit) < 2:
+            continue
+        near = (np.abs(left[of_visit][:, None] - left[of_visit][None]) <= limit).all(axis=2)
+        confirmed[of_visit] = near.sum(axis=1) > 1
+    return confirmed
+
+
+def gross_rows(gross: BoolArray, row: IntArray) -> GrossRows:
+    """The gross rows as a person finds them; row : (N,) their numbers in a spreadsheet."""
+    places = np.flatnonzero(gross)
+    if not len(places):
+        return GrossRows()
+    stretches = np.split(places, np.flatnonzero(np.diff(places) > WIDEST_GAP) + 1)
+    runs = [(int(row[s[0]]), int(row[s[-1]])) for s in stretches if len(s) >= FEWEST_IN_RUN]
+    return GrossRows(tuple(int(number) for number in row[places]), tuple(runs))

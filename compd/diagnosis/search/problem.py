@@ -1,0 +1,240 @@
+"""What a diagnosis has to explain: the whitened residual on the rows that count, and each candidate's columns there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import orth
+from scipy.special import fdtri
+
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.compare import Comparison
+from compd.comparison.neighbour_blocks import neighbour_blocks
+from compd.comparison.nuisance import nuisance_columns
+from compd.comparison.statistics.robust import LEAST_SIGMA, trimmed_scale
+from compd.diagnosis.candidates.candidates import Candidate, CandidatePool
+from compd.diagnosis.candidates.constant import constant_candidate, split_constants
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.search.cross_validation import row_splits
+from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
+from compd.diagnosis.search.regression import RegressionData, Regressors
+from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.recording.gaps import filled
+from compd.units import UM_PER_MM
+
+
+class Projection:
+    """Takes out of columns what others explain, and scales the rest up for the degrees of freedom that this costs."""
+
+    def __init__(self, columns: FloatArray) -> None:
+        """columns : (R, m, Q) what is taken out."""
+        flat = columns.reshape(-1, columns.shape[2])
+        self._q = orth(flat) if flat.size else flat
+        self._scale = float(np.sqrt(len(flat) / max(len(flat) - self.count, 1)))
+
+    @property
+    def count(self) -> int:
+        """How many independent columns are taken out."""
+        return int(self._q.shape[1])
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """The projection of (R, m, P) or (R, m)."""
+        flat = values.reshape(len(self._q), -1)
+        return np.asarray(self._scale * (flat - self._q @ (self._q.T @ flat)).reshape(values.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisProblem:
+    """The residual of one comparison in standard deviations of the noise, with the candidates for it.
+
+    N rows of the recording, R of which count; m coordinates.
+
+    comparison : of the recording with the model as it is.  pool : effects of the library, and what cannot be tested.
+    candidates : the library's that compete, and the constant.
+    same_as_nuisance : effects that do nothing on these rows but what is fitted along in any case.
+    criteria : numbers of the verdict.  sigma_um : (m,) standard deviation of the noise, or a unit where it is unknown.
+    known : (N,) rows in which the residual and all candidates are known.
+    gross : (N,) rows that nothing explains; rows : (N,) those that count: known and not gross.
+    root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
+    residual : (N, m) whitened, nan where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
+    data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
+    start : what is projected out of these and of all candidates; None for nothing.
+    """
+
+    comparison: Comparison
+    pool: CandidatePool
+    candidates: tuple[Candidate, ...]
+    same_as_nuisance: tuple[Candidate, ...]
+    criteria: Criteria
+    sigma_um: FloatArray
+    known: BoolArray
+    gross: BoolArray
+    rows: BoolArray
+    root_weight: FloatArray
+    residual: FloatArray
+    nuisance: FloatArray
+    data: RegressionData
+    start: Projection | None = None
+
+    @property
+    def aligned(self) -> AlignedRecording:
+        """The recording."""
+        return self.comparison.aligned
+
+    @property
+    def floor_known(self) -> bool:
+        """Whether the noise was measured or declared."""
+        return self.comparison.floor.known
+
+    def is_at_floor(self, loss: float) -> bool:
+        """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
+        return self.floor_known and loss <= self.criteria.most_at_floor
+
+    def may_be_noise(self, loss: float) -> bool:
+        """Whether a loss at which nothing more was found is at the floor, or chance as the floor is from few repeats.
+
+        By the F distribution, as in a comparison.
+        """
+        dof = min(self.comparison.floor.dof, 1e9)
+        by_chance = fdtri(self.data.value_count, dof, self.comparison.criteria.at_floor_confidence)
+        return self.is_at_floor(loss) or (self.floor_known and loss <= float(by_chance))
+
+    @property
+    def unit_um(self) -> float:
+        """Error per coordinate at a loss of 1, um."""
+        return rms(self.sigma_um)
+
+    def whiten(self, columns_um: FloatArray) -> FloatArray:
+        """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
+        values = np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
+        return values if self.start is None else self.start(values)
+
+    @property
+    def states(self) -> int:
+        """How many unknown numbers were projected out."""
+        return 0 if self.start is None else self.start.count
+
+    def without(self, columns_um: FloatArray) -> DiagnosisProblem:
+        """The problem with what some columns (N, m, Q) in um can explain projected out of everything."""
+        columns = columns_um / self.sigma_um[:, None]
+        start = Projection(self.whiten(columns_um))
+        nuisance = self.data.nuisance
+        return replace(
+            self,
+            nuisance=np.concatenate([self.nuisance, columns], axis=2),
+            data=replace(
+                self.data, y=start(self.data.y), nuisance=Regressors(start(nuisance.values), nuisance.largest)
+            ),
+            start=start,
+        )
+
+    def residual_beside_um(self, losses: SubsetLosses, members: Sequence[int]) -> FloatArray:
+        """(N, m) what some members, fitted on the rows that count, leave; nan where a row does not count."""
+        columns = [losses.candidates[k].columns_um / self.sigma_um[:, None] for k in members]
+        G = np.concatenate([self.nuisance, *columns], axis=2)
+        theta, _, _ = losses.equations.estimate(losses.index(members))
+        left = (self.residual - G[:, :, : len(theta)] @ theta) * self.sigma_um
+        return np.where(self.rows[:, None], left, np.nan)
+
+    def losses(self, candidates: Sequence[Candidate]) -> SubsetLosses:
+        """Of all sets of these candidates."""
+        values = [self.whiten(candidate.columns_um) for candidate in candidates]
+        return SubsetLosses(self.data, candidates, values, self.criteria, 1.0 if self.floor_known else 0.0)
+
+    def weigh_beside(self, candidates: Sequence[Candidate]) -> RowWeights:
+        """What each row counts beside some candidates alone."""
+        columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
+        visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
+        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria)
+
+
+def build_problem(
+    comparison: Comparison, pool: CandidatePool, criteria: Criteria, weights: RowWeights | None = None
+) -> DiagnosisProblem:
+    """Whiten the residual and the candidates of a comparison.
+
+    weights : of the rows; None to weigh them beside everything that could explain a row. What a candidate could
+        explain does not make a row gross then, and hides no gross row either: behind an effect of six times the noise
+        an error of twenty times would be hidden.
+    """
+    aligned = comparison.aligned
+    sigma_um = _unit_um(comparison)
+    nuisance_um = _nuisance_um(comparison)
+    known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
+    for columns in (nuisance_um, *(candidate.columns_um for candidate in (*pool.candidates, *pool.proxies))):
+        known &= np.isfinite(columns).all(axis=(1, 2))
+    candidates, same = split_constants(pool.candidates, nuisance_um, known)
+    candidates += pool.proxies
+    constant = constant_candidate(aligned)
+    if constant is not None:
+        candidates = (*candidates, constant)
+    residual = comparison.residual_um / sigma_um
+    nuisance = nuisance_um / sigma_um[:, None]
+    if weights is None:
+        everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
+        noise = 1.0 if comparison.floor.known else 0.0
+        weights = weigh_rows(everything, residual, known, aligned.recording.visit, noise, criteria)
+    rows = known & ~weights.gross
+    root = np.sqrt(weights.weight[rows])
+    data = RegressionData(
+        residual[rows] * root[:, None],
+        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned)),
+        _renumbered(neighbour_blocks(aligned.recording)[rows]),
+        Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
+    )
+    return DiagnosisProblem(
+        comparison=comparison,
+        pool=pool,
+        candidates=candidates,
+        same_as_nuisance=same,
+        criteria=criteria,
+        sigma_um=sigma_um,
+        known=known,
+        gross=weights.gross,
+        rows=rows,
+        root_weight=root,
+        residual=residual,
+        nuisance=nuisance,
+        data=data,
+    )
+
+
+def _unit_um(comparison: Comparison) -> FloatArray:
+    """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all: a unit only."""
+    if comparison.floor.known:
+        return comparison.floor.by_axis_um
+    size_um = rms(trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)]))
+    return np.full(len(comparison.aligned.labels), max(size_um, LEAST_SIGMA))
+
+
+def _everything(
+    aligned: AlignedRecording, candidates: Sequence[Candidate], sigma_um: FloatArray, known: BoolArray
+) -> list[FloatArray]:
+    """Whitened columns of one variant of each effect; time, its square and every quantity, along each coordinate."""
+    first_variants: dict[str, Candidate] = {}
+    for candidate in candidates:
+        first_variants.setdefault(candidate.name, candidate)
+    columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
+    time_s = aligned.rows.time_s
+    for values in (time_s, time_s**2, *aligned.gaps_filled.rows.quantities.values()):
+        without_gaps = filled(values, time_s)
+        column = without_gaps[known]
+        if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
+            scaled = np.nan_to_num(without_gaps - column.mean()) / np.ptp(column)
+            columns.append(scaled[:, None, None] * np.eye(len(aligned.labels)))
+    return columns
+
+
+def _nuisance_um(comparison: Comparison) -> FloatArray:
+    """(N, m, Q) columns of the model's own parameters and of what is fitted along: frame, constant, starts of lags."""
+    aligned = comparison.aligned
+    columns = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in comparison.fitted]
+    return np.concatenate([*columns, nuisance_columns(aligned, comparison.fitted)], axis=2)
+
+
+def _renumbered(labels: IntArray) -> IntArray:
+    """(R,) labels as numbers from 0 without gaps."""
+    return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)

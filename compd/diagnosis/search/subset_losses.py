@@ -1,0 +1,220 @@
+"""What any set of candidates leaves on rows left out, and what it is judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.diagnosis.candidates.candidates import Candidate
+from compd.diagnosis.candidates.plausibility import is_plausible, is_undetermined
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.search.regression import NormalEquations, RegressionData, Regressors, normal_equations
+
+# A loss is at least this share of what it was without any candidate: rounding.
+LEAST_LOSS = 1e-9
+
+
+@dataclass(frozen=True)
+class Subset:
+    """Candidates by their place, rising, and the cross-validated loss that they leave.
+
+    cv_loss : mean square per value on rows that were left out, in squares of the noise floor.
+    """
+
+    members: tuple[int, ...]
+    cv_loss: float
+
+
+class SubsetLosses:
+    """Losses, scores and estimates of sets of candidates for one residual.
+
+    A set S is judged by its score, which is to be small::
+
+        score(S) = log max(L(S), phi) + sum_{k in S} price_k
+
+    with L the mean square on rows left out, and phi = 1 where the noise is known, else 0: below the floor nothing is
+    gained. The logarithm is, up to constants, -2 log likelihood per value of a normal error of unknown variance, which
+    is not below the noise's: it asks for the same share of what is left far above the floor and at it.
+
+    Example::
+
+        losses = problem.losses(problem.candidates)
+        losses.evaluate([(0,), (0, 3)])  # [Subset((0,), 5.2), Subset((0, 3), 1.03)]
+    """
+
+    def __init__(
+        self,
+        data: RegressionData,
+        candidates: Sequence[Candidate],
+        values: Sequence[FloatArray],
+        criteria: Criteria,
+        least_loss: float,
+    ) -> None:
+        """values : columns (R, m, P) of each candidate, whitened, on the rows of the data.  least_loss : phi."""
+        self.data, self.candidates, self.values, self.criteria = data, tuple(candidates), tuple(values), criteria
+        regressors = [Regressors(v, candidate.largest) for v, candidate in zip(values, candidates, strict=True)]
+        self.equations: NormalEquations
+        self.equations, self._indices = normal_equations(data, regressors)
+        self._nuisance_index = np.arange(data.nuisance.values.shape[2])
+        self._testable = np.array(
+            [self.equations.testable_splits(index, criteria.most_in_one_fold) for index in self._indices]
+        ).reshape(len(candidates), len(data.splits))
+        self._prices = np.array([candidate.price(criteria) for candidate in candidates])
+        self.floor_known = least_loss > 0
+        self._least_loss = max(least_loss, LEAST_LOSS * self.baseline)
+        self._losses: dict[tuple[int, ...], float] = {(): self.baseline}
+        self._by_row: dict[tuple[tuple[int, ...], bytes], FloatArray] = {}
+
+    @property
+    def baseline(self) -> float:
+        """Cross-validated loss without any candidate, L(0)."""
+        return self.equations.nuisance_cv_loss
+
+    @cached_property
+    def describes(self) -> bool:
+        """Whether descriptions are among the candidates."""
+        return any(candidate.kind in ("description", "change") for candidate in self.candidates)
+
+    @cached_property
+    def constant(self) -> int | None:
+        """Place of the constant among the candidates; None where it is fitted along in any case."""
+        return next((k for k, candidate in enumerate(self.candidates) if candidate.kind == "constant"), None)
+
+    def described(self, members: Iterable[int]) -> tuple[int, ...]:
+        """Those of some members that name no cause, but for the constant."""
+        return tuple(k for k in members if self.candidates[k].kind not in ("effect", "constant"))
+
+    def number_price(self, member: int) -> float:
+        """The price of a member's numbers beyond its first."""
+        return self.criteria.number_price * (self.candidates[member].parameter_count - 1)
+
+    def name(self, member: int) -> str:
+        """The id of a candidate's effect."""
+        return self.candidates[member].name
+
+    def evaluate(self, sets: Iterable[Iterable[int]]) -> list[Subset]:
+        """Cross-validated losses; sets that no split can test are left out. Each set is computed once."""
+        keys = list(dict.fromkeys(tuple(sorted(members)) for members in sets))
+        new = [key for key in keys if key not in self._losses]
+        if new:
+            testable = np.array([self._testable[list(members)].all(axis=0) for members in new])
+            losses = self.equations.cv_losses([self.index(members) for members in new], testable)
+            self._losses.update(zip(new, losses.tolist(), strict=True))
+        return [Subset(key, self._losses[key]) for key in keys if np.isfinite(self._losses[key])]
+
+    def loss(self, members: Iterable[int]) -> float:
+        """Cross-validated loss of one set; inf where no split can test it."""
+        subsets = self.evaluate([members])
+        return subsets[0].cv_loss if subsets else float("inf")
+
+    def reduced_chi_squared(self, members: Sequence[int]) -> float:
+        """Mean square that a set leaves where it was fitted, per degree of freedom, in squares of the noise floor."""
+        index = self.index(members)
+        _, _, left = self.equations.estimate(index)
+        return left * self.data.value_count / max(self.data.value_count - len(index), 1)
+
+    def log_loss(self, loss: float) -> float:
+        """Logarithm of a loss, not below the floor."""
+        return float(np.log(max(loss, self._least_loss)))
+
+    def score(self, subset: Subset) -> float:
+        """The logarithm of the loss and the prices of the members: what the best set minimizes."""
+        return self.log_loss(subset.cv_loss) + float(self._prices[list(subset.members)].sum())
+
+    def price(self, member: int) -> float:
+        """What the log loss must fall by for this member."""
+        return float(self._prices[member])
+
+    @property
+    def scored(self) -> list[Subset]:
+        """Every set that was evaluated so far, the best first."""
+        subsets = [Subset(key, loss) for key, loss in self._losses.items() if np.isfinite(loss)]
+        return sorted(subsets, key=self.score)
+
+    @cached_property
+    def best_variants(self) -> dict[str, Subset]:
+        """By effect, its best choice of nonlinear constants, alone; the best effect first."""
+        variants: dict[str, Subset] = {}
+        alone = self.evaluate([(k,) for k in range(len(self.candidates))])
+        for subset in sorted(alone, key=lambda subset: subset.cv_loss):
+            variants.setdefault(self.name(subset.members[0]), subset)
+        return variants
+
+    def estimates(self, members: Sequence[int]) -> list[tuple[FloatArray, FloatArray]]:
+        """Parameters (P,) and covariance (P, P) of each member, fitted together on all rows.
+
+        The covariance is scaled by the mean square left where that is above the noise floor.
+        """
+        theta, covariance, left = self.equations.estimate(self.index(members))
+        covariance = covariance * max(left, self._least_loss)
+        estimates, begin = [], len(self._nuisance_index)
+        for k in members:
+            end = begin + len(self._indices[k])
+            estimates.append((theta[begin:end], covariance[begin:end, begin:end]))
+            begin = end
+        return estimates
+
+    def is_plausible(self, members: Sequence[int]) -> bool:
+        """Whether every parameter of every effect is plausible, and at least one of each is determined.
+
+        A cause may be weaker than is usual: plausible ranges reach to nought.
+        """
+        for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
+            candidate = self.candidates[k]
+            if candidate.kind not in ("effect", "proxy", "change"):
+                continue
+            std = np.sqrt(np.diag(covariance))
+            for (low, high), value, error in zip(candidate.limits, theta, std, strict=True):
+                limits = (min(low, 0.0), max(high, 0.0))
+                if not is_plausible(limits, float(value), float(error), self.criteria):
+                    return False
+            if is_undetermined(candidate.limits, std):
+                return False
+        return True
+
+    def gain(self, members: Sequence[int], without: Sequence[int]) -> tuple[float, float]:
+        """How much less a set leaves than another on rows left out, and the standard error of that; per value.
+
+        The standard error is from sums over the B blocks of rows, within which residuals may be correlated::
+
+            std = sqrt(B / (B - 1) sum_b (d_b - mean d)^2),  d_b = sum of the differences in block b
+        """
+        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
+        difference = self._row_losses(without, testable) - self._row_losses(members, testable)
+        by_block = np.bincount(self.data.block, difference)
+        count = len(by_block)
+        spread = float(np.sqrt(count / max(count - 1, 1) * ((by_block - by_block.mean()) ** 2).sum()))
+        return float(by_block.sum()) / self.data.value_count, spread / self.data.value_count
+
+    def nuisance_with(self, members: Iterable[int]) -> Regressors:
+        """The nuisance columns and those of some candidates."""
+        nuisance = self.data.nuisance
+        values = [nuisance.values, *(self.values[k] for k in members)]
+        largest = [nuisance.largest, *(self.candidates[k].largest for k in members)]
+        return Regressors(np.concatenate(values, axis=2), np.concatenate(largest))
+
+    def index(self, members: Iterable[int]) -> IntArray:
+        """Columns of a set among the normal equations, the nuisance columns first."""
+        return np.concatenate([self._nuisance_index, *(self._indices[k] for k in members)]).astype(np.int64)
+
+    def _row_losses(self, members: Sequence[int], testable: BoolArray) -> FloatArray:
+        """(R,) squares left in each row by parameters learned without its fold, averaged over some splits (splits,)."""
+        members = tuple(sorted(members))
+        key = members, testable.tobytes()
+        if key in self._by_row:
+            return self._by_row[key]
+        index = self.index(members)
+        columns = np.concatenate([self.data.nuisance.values, *(self.values[k] for k in members)], axis=2)
+        losses = np.zeros(len(self.data.y))
+        for split, fold in enumerate(self.data.splits):
+            if not testable[split]:
+                continue
+            theta = self.equations.theta_by_fold(index, split)
+            left = self.data.y - np.einsum("rmp,rp->rm", columns, theta[fold])
+            losses += (left**2).sum(axis=1)
+        self._by_row[key] = losses / max(int(testable.sum()), 1)
+        return self._by_row[key]

@@ -1,0 +1,218 @@
+"""Phrases of a diagnosis: each fact as a clause, for the sentence, the twelve lines, the terminal and the page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from compd.comparison.compare import Comparison
+from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
+from compd.diagnosis.verdict import Diagnosis
+from compd.model.effect import Effect
+from compd.model.formula.keys import FormulaDeclaration
+from compd.model.library import BUNDLED
+from compd.number_text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
+
+# What a formula says of its physics where the person who wrote it said nothing.
+_NO_PHYSICS = FormulaDeclaration.model_fields["physics"].default
+_BUNDLED = frozenset(effect.id for effect in BUNDLED)
+# Effects that people know by another name than their id.
+_PLAIN_NAMES = {"reference_registration": "the instrument's frame"}
+# A parameter that has more values than this is said by its smallest and its largest.
+MOST_VALUES = 3
+# Rivals of one effect that are named.
+MOST_RIVALS = 3
+# Single gross rows that are named.
+MOST_ROWS = 4
+
+IMPLAUSIBLE = "IMPLAUSIBLE"
+
+
+def physics_clause(effect: Effect) -> str:
+    """The first clause of what an effect does: "balls flatten where they touch"; of a formula without words, itself."""
+    if effect.physics == _NO_PHYSICS:
+        return effect.equation
+    clause = re.split(r"[;:.](?:\s|$)|,\s(?!but\b)", effect.physics.strip(), maxsplit=1)[0]
+    return clause if clause[1:2].isupper() else clause[:1].lower() + clause[1:]
+
+
+def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
+    """Name -> number with its standard error: "a" -> "1.113 +- 0.021 ppm/K"; one entry for what there is one per link.
+
+    An implausible number says so beside the range that its effect calls plausible; a searched constant, that it was.
+    """
+    texts = {}
+    columns = step.effect.columns(links)
+    for parameter in step.effect.parameters:
+        values = [
+            value for column, value in zip(columns, step.parameters, strict=True) if column.parameter is parameter
+        ]
+        if not values:
+            continue
+        numbers, std = [value.value for value in values], max(value.std for value in values)
+        name = values[0].name if len(values) == 1 else f"{values[0].name} to {values[-1].name}"
+        if len(values) == 1:
+            text = estimate_text(numbers[0], std, values[0].unit)
+        elif len(values) <= MOST_VALUES:
+            text = estimates_text(numbers, std, values[0].unit)
+        else:
+            text = estimates_text([min(numbers), max(numbers)], std, values[0].unit, " to ")
+        if not all(value.plausible for value in values):
+            text += f", {IMPLAUSIBLE}: {parameter.low:g} to {parameter.high:g} is usual"
+        texts[name] = text
+    units = {constant.name: constant.unit for constant in step.effect.constants}
+    for name, value in step.fitted.constants.items():
+        texts[name] = f"{number_text(value, units.get(name, ''), 3)}, searched"
+    return texts
+
+
+def chance_clause(p_values: Sequence[float]) -> str:
+    """How often noise alone would do as well as the least sure of some results; "" where it is not known."""
+    known = [p_value for p_value in p_values if p_value > 0]
+    if not known:
+        return ""
+    each = " each at most" if len(known) > 1 else " this"
+    return f"noise alone does{each} {chance_text(max(known))}"
+
+
+def is_change(finding: EmpiricalFinding) -> bool:
+    """Whether something changed in the middle of the recording."""
+    return finding.form == "change"
+
+
+def short_name(finding: EmpiricalFinding) -> str:
+    """A finding by a name, for tables and bars: its covariates, or the effect that changes or that it stands for."""
+    if is_change(finding):
+        return f"a change of {finding.effect}"
+    names = " with ".join([finding.covariate, *finding.beside])
+    return f"{names}, as {finding.effect}" if finding.effect else names
+
+
+def followed_text(finding: EmpiricalFinding) -> str:
+    """What a residual follows: "temperature_frame_degC (linear) together with humidity_pct".
+
+    Of a thermometer that stands for another's: "temperature_room_degC, as link_expansion would".
+    """
+    if finding.form == "proxy":
+        return f"{finding.covariate}, as {finding.effect} would, whose own temperature was not measured"
+    beside = f" together with {join_words(finding.beside)}" if finding.beside else ""
+    return f"{finding.covariate} ({finding.form}){beside}"
+
+
+def rivals_text(step: DiagnosisStep) -> str:
+    """An effect and those that do as well in its place: "link_elasticity or joint_contact (99 % alike)"."""
+    rivals = [rival.name for rival in step.rivals[:MOST_RIVALS]]
+    others = [f"{len(step.rivals) - MOST_RIVALS} more"] if len(step.rivals) > MOST_RIVALS else []
+    names = join_words([step.effect.id, *rivals, *others], "or")
+    return f"{names} ({percent_text(max(rival.cosine for rival in step.rivals))} alike)"
+
+
+def change_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
+    """A change in the middle of a recording: "from 6000 s on (row 410) backlash is larger"."""
+    return f"from {moment_text(finding, diagnosis)} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+
+
+def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
+    """When something changed: "6000 s on (row 410)"; "row 410 on" in a recording without time."""
+    recording = diagnosis.after.aligned.recording
+    row = recording.row[min(int(np.searchsorted(recording.time_s, finding.time_s)), recording.rows - 1)]
+    return f"{finding.time_s:.0f} s on (row {row})" if recording.has_time else f"row {row} on"
+
+
+def _how_it_changed(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
+    fitted = next((fitted for fitted in diagnosis.after.fitted if fitted.effect.id == finding.effect), None)
+    if fitted is None:
+        return "acts, and before it did not"
+    change = np.array([value for parameters in finding.parameters for value in parameters.values()])
+    if change.shape != fitted.theta.shape or not np.isfinite(change).all():
+        return "is another"
+    return "is larger" if change @ fitted.theta > 0 else "is smaller"
+
+
+def constant_text(constant: ConstantFinding, unit: str) -> str:
+    """The constant with the effects that may make it: one family, of which these rows tell no member."""
+    values = [number_text(value) for value in constant.by_axis_um.values()]
+    size = f"({', '.join(values)}) {unit}" if len(values) > 1 else f"{values[0]} {unit}"
+    if list(constant.by_axis_um) != ["x", "y", "z"]:
+        size += f" in {', '.join(constant.by_axis_um)}"
+    names = [_PLAIN_NAMES.get(name, name) for name in constant.effects]
+    if not names:
+        return f"a constant of {size}: where zero was set; it needs no cause"
+    if len(names) == 1:
+        return f"a constant of {size}, which {names[0]} can make"
+    return f"a constant of {size}: {join_words(names, 'or')}; these rows cannot tell"
+
+
+def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: int = MOST_ROWS) -> list[str]:
+    """How many rows nothing explains, how far off they are, where they lie, and what to look at.
+
+    most_rows : single rows that are named.
+    """
+    if not gross.rows:
+        return []
+    recording = comparison.aligned.recording
+    size = np.abs(comparison.residual_um[np.isin(recording.row, gross.rows)])
+    largest = float(np.nanmax(size)) if np.isfinite(size).any() else float("nan")
+    off = f" (up to {number_text(largest, unit)} off)" if np.isfinite(largest) else ""
+    in_runs = {row for first, last in gross.runs for row in gross.rows if first <= row <= last}
+    single = [str(row) for row in gross.rows if row not in in_runs]
+    if len(single) > most_rows:
+        single = [*single[: most_rows - 1], f"{len(single) - most_rows + 1} more"]
+    rows = join_words(single)
+    count = f"{len(gross.rows)} of {recording.rows} rows do not count{off}"
+    if not gross.runs:
+        return [f"{count}: {rows}"]
+    runs = join_words([f"{first} to {last}" for first, last in gross.runs])
+    texts = [count, f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)"]
+    return [*texts, f"single bad readings: {rows}"] if single else texts
+
+
+def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:
+    """Effects that could not be tried and that concern this machine, first those that may be behind what was found.
+
+    The library's effects are nothing to a machine with a model of its own, but where its links were measured.
+    """
+    aligned = diagnosis.before.aligned
+    external = aligned.model is None and not aligned.of_links
+    concerning = [
+        effect for effect in diagnosis.untested if effect.likely or not (external and effect.effect in _BUNDLED)
+    ]
+    return sorted(concerning, key=lambda effect: not effect.likely)
+
+
+def was_any_tried(diagnosis: Diagnosis) -> bool:
+    """Whether the recording tests any effect of the library."""
+    return any(candidate.status != "not_testable" for candidate in diagnosis.candidates)
+
+
+def best_description(diagnosis: Diagnosis) -> EmpiricalFinding | None:
+    """What the rest follows best; None where nothing or a change describes it better than anything it follows."""
+    if not diagnosis.depends_on or is_best_a_change(diagnosis):
+        return None
+    return diagnosis.depends_on[0]
+
+
+def is_best_a_change(diagnosis: Diagnosis) -> bool:
+    """Whether a change in time describes the rest better than anything that it follows."""
+    return any(is_change(finding) for finding in diagnosis.depends_on[:1])
+
+
+def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:
+    """Thermal effects that were found, or where none was what the error follows, where all rows are of one session.
+
+    All that warms up in a session rises together, and with time: one session alone proves no thermal cause.
+    """
+    session = diagnosis.after.aligned.recording.session
+    if session is not None and len(np.unique(session[diagnosis.after.used & (session >= 0)])) > 1:
+        return []
+    finding = best_description(diagnosis)
+    if diagnosis.steps or finding is None:
+        return [step.effect.id for step in diagnosis.steps if _is_thermal(step.effect)]
+    return [name for name in (finding.covariate, *finding.beside) if name.startswith(("temperature", "time"))]
+
+
+def _is_thermal(effect: Effect) -> bool:
+    """Whether a temperature, or time as its stand-in, drives the effect."""
+    return any(need.startswith("temperature") for need in effect.needs) or effect.needs == ("time",)

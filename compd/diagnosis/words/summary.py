@@ -1,0 +1,55 @@
+"""The verdict in a sentence or two, for titles, notebooks and programs.
+
+The words tell a cause from a share and from a description. "What is missing" is said only of effects that bring the
+error down to the noise; above it an effect is a share of the error; what a residual follows is no cause.
+"""
+
+from __future__ import annotations
+
+from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import error_fall
+from compd.diagnosis.words.phrases import change_text, followed_text, is_change, rivals_text, was_any_tried
+from compd.number_text import join_words, number_text
+
+CANNOT_KNOW = "how much of it is noise cannot be known"
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """The verdict in one or two sentences, which claim no more than it does."""
+    fall = error_fall(diagnosis)
+    before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
+    noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
+    names = join_words([step.effect.id for step in diagnosis.steps])
+    match diagnosis.verdict:
+        case "adequate" if fall.noise_known:
+            but = " but for a constant" if diagnosis.constant else ""
+            own = number_text(fall.noise, fall.unit)
+            return f"Nothing is missing{but}: the error of {before} is the measurement's own noise ({own})."
+        case "identified":
+            them = "it" if len(diagnosis.steps) == 1 else "them"
+            return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."
+        case "ambiguous":
+            pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
+            falls = f"With {names} the error of {before} falls to {after}, {noise}."
+            return f"{falls} But these rows cannot tell apart: {pairs}."
+        case "adequate" | "not_testable":
+            tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
+            return f"The error is {before}, {noise}. No effect {tried}."
+    if diagnosis.steps:
+        verb = "explains" if len(diagnosis.steps) == 1 else "explain"
+        rest = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
+        share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {rest}."
+        return " ".join([share, *_rest(diagnosis, "The rest")])
+    unexplained = f"No effect that was tried explains the error of {before}, {noise}."
+    return " ".join([unexplained, *(_rest(diagnosis, "It") or ["It follows nothing that was measured."])])
+
+
+def _rest(diagnosis: Diagnosis, what: str) -> list[str]:
+    """What follows or changes, as a sentence; empty where nothing does.  what : its subject."""
+    if not diagnosis.depends_on:
+        return []
+    fall, finding = error_fall(diagnosis), diagnosis.depends_on[0]
+    left = f"to describe that leaves {number_text(finding.heldout_rms_um, fall.unit)}, and names no cause"
+    if is_change(finding):
+        return [f"Something changed: {change_text(finding, diagnosis)}; {left}."]
+    return [f"{what} follows {followed_text(finding)}: {left}."]

@@ -1,0 +1,209 @@
+"""The twelve lines that a person reads first: what was found, how much it explains, what is left, how sure that is,
+what else it could be, and what to do next."""
+
+from __future__ import annotations
+
+from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.advice import advice
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.phrases import (
+    IMPLAUSIBLE,
+    best_description,
+    chance_clause,
+    change_text,
+    constant_text,
+    followed_text,
+    gross_texts,
+    is_best_a_change,
+    is_change,
+    parameter_texts,
+    physics_clause,
+    rivals_text,
+    thermal_in_one_session,
+    untested_here,
+    was_any_tried,
+)
+from compd.diagnosis.words.summary import CANNOT_KNOW
+from compd.labelled_lines import LabelledText, fit_lines
+from compd.number_text import fall_text, join_words, number_text, percent_text
+
+# What a terminal shows without scrolling, and its usual width.
+MOST_LINES = 12
+WIDTH = 80
+# Effects, rivals and untested effects that are said here.
+MOST_NAMED = 3
+# A mean square up to so many times that of the noise is called noise.
+NOISE_RATIO = 1.25
+NO_RIVAL = "no other effect that was tried does as well"
+# A probability above this is said before the numbers.
+DOUBTFUL = 0.01
+# With so many other texts the one is left out that says nothing.
+CROWDED = 7
+
+
+def summary_lines(diagnosis: Diagnosis) -> list[str]:
+    """The verdict in at most 12 lines of at most 80 columns.
+
+    A heading, then lines with labels; a label that has nothing to say is left out. What has no room is in the evidence.
+    """
+    fall = error_fall(diagnosis)
+    found = tuple(_found(diagnosis, fall))
+    names = tuple(clause.partition(": ")[0] for clause in found)
+    others = [
+        LabelledText("Changed", tuple(_changed(diagnosis, fall))),
+        LabelledText("Explains", tuple(_explains(diagnosis, fall))),
+        LabelledText("Follows", tuple(_follows(diagnosis, fall))),
+        LabelledText("Left", tuple(_left(diagnosis, fall))),
+        LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
+        LabelledText("Sure", tuple(_sure(diagnosis))),
+        LabelledText("Or else", tuple(_or_else(diagnosis))),
+        LabelledText("Besides", tuple(_constant(diagnosis, fall))),
+        LabelledText("Next", tuple(advice(diagnosis, fall))),
+    ]
+    others = [text for text in others if text.clauses]
+    if len(others) >= CROWDED:
+        others = [text for text in others if text.clauses != (NO_RIVAL,)]
+    room = MOST_LINES - 1 - len(others)
+    label = "Shares" if diagnosis.verdict in ("partial", "unexplained") else "Found"
+    texts = [LabelledText(label, found, names, least=min(len(found), MOST_NAMED, room))] if found else []
+    return [_heading(diagnosis, fall), *fit_lines([*texts, *others], MOST_LINES - 1, WIDTH)]
+
+
+def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """The verdict's word and what it means here, on one line; effects are counted where their names are too long."""
+    ids = [step.effect.id for step in diagnosis.steps]
+    count = f"{len(ids)} effects" if len(ids) > 1 else "one effect"
+    be = "is" if len(ids) == 1 else "are"
+    match diagnosis.verdict:
+        case "adequate" if fall.noise_known and diagnosis.constant is not None:
+            text = "nothing is missing but a constant; what varies is noise"
+        case "adequate" if fall.noise_known:
+            text = f"nothing is missing; the error of {number_text(fall.before, fall.unit)} is noise"
+        case "identified":
+            text = f"What is missing is {{}}: {fall.text(fall.after)}"
+        case "ambiguous":
+            ids = [
+                join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps
+            ]
+            count += " or rivals" if len(ids) > 1 else " or a rival"
+            text = f"{{}} {be} missing; these rows cannot tell"
+        case "adequate" | "not_testable" if was_any_tried(diagnosis):
+            text = "no effect that was tried lowers the error; the noise is not known"
+        case "not_testable":
+            text = "no effect can be tested; nothing that drives one was varied"
+        case _:
+            text = _above_the_noise(diagnosis, fall)
+    headings = [f"{diagnosis.verdict}: {text.format(names)}" for names in (join_words(ids), count)]
+    return headings[len(headings[0]) > WIDTH]
+
+
+def _above_the_noise(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """What `partial` and `unexplained` mean, with {} for the names of the effects."""
+    before = number_text(fall.before, fall.unit)
+    if not diagnosis.steps:
+        if is_best_a_change(diagnosis):
+            return f"the error of {before} goes with a change in time"
+        return f"no effect that was tried explains the error of {before}"
+    verb = "explains" if len(diagnosis.steps) == 1 else "explain"
+    if is_best_a_change(diagnosis):
+        rest = "something changed in time"
+    elif diagnosis.verdict == "unexplained":
+        rest = "the rest has no known cause"
+    else:
+        rest = "something else acts as well" if fall.noise_known else "the noise is not known"
+    return f"{{}} {verb} {percent_text(fall.share_of(fall.after))}; {rest}"
+
+
+def _found(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """Each effect, how far the error falls with it where there are several, and what it does."""
+    errors = [fall.before, *fall.steps]
+    clauses = []
+    for number, step in enumerate(diagnosis.steps):
+        step_fall = f" ({fall_text(errors[number : number + 2], fall.unit)})" if len(diagnosis.steps) > 1 else ""
+        rivals = "".join(f"; or {rival.name}" for rival in step.rivals[:1])
+        clauses.append(f"{step.effect.id}{step_fall}: {physics_clause(step.effect)}{rivals}")
+    return clauses
+
+
+def _changed(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    changes = [finding for finding in diagnosis.depends_on if is_change(finding)]
+    clauses = [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MOST_NAMED]]
+    return [
+        *clauses,
+        *(f"with it {fall_text([fall.after, finding.heldout_rms_um], fall.unit)}" for finding in changes[:1]),
+    ]
+
+
+def _follows(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    finding = best_description(diagnosis)
+    if finding is None:
+        nothing = diagnosis.verdict == "unexplained" and not diagnosis.depends_on
+        return ["the error follows nothing that was measured"] if nothing else []
+    what = "the rest follows " if diagnosis.steps else ""
+    errors = fall_text([fall.after, finding.heldout_rms_um], fall.unit)
+    return [f"{what}{followed_text(finding)}: {errors}", "a description, no cause"]
+
+
+def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    rows = ", rows left out" if fall.left_out else ""
+    return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}{rows}"] if diagnosis.steps else []
+
+
+def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """The error that is left beside the noise, and what the difference means."""
+    described = next(iter(diagnosis.depends_on), None) if not diagnosis.steps else None
+    contradiction = diagnosis.before.floor.contradiction
+    remarks = [contradiction] if contradiction else []
+    left = fall.after if described is None else described.heldout_rms_um
+    text = number_text(left, fall.unit) + (" with it" if described else "")
+    if not fall.noise_known:
+        return [f"{text}; {CANNOT_KNOW}", *remarks]
+    if diagnosis.verdict in ("adequate", "identified", "ambiguous") or left**2 <= NOISE_RATIO * fall.noise**2:
+        meaning = "only noise is left"
+    elif diagnosis.steps and is_best_a_change(diagnosis):
+        meaning = "some of it goes with the change"
+    elif diagnosis.steps or described:
+        meaning = "something else acts as well"
+    else:
+        meaning = "these rows do not show what acts"
+    return [f"{text}; noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
+
+
+def _sure(diagnosis: Diagnosis) -> list[str]:
+    """First what is doubtful: implausible numbers, chance, a single session. Then the other numbers."""
+    links = diagnosis.after.aligned.rows.links
+    steps, finding = diagnosis.steps, best_description(diagnosis)
+    numbers = [
+        f"{step.effect.id} {name} = {text}" if len(steps) > 1 else f"{name} = {text}"
+        for step in steps
+        for name, text in parameter_texts(step, links).items()
+    ]
+    implausible = [text for text in numbers if IMPLAUSIBLE in text]
+    names = thermal_in_one_session(diagnosis)
+    session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
+    p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
+    chance = [clause for clause in (chance_clause(p_values),) if clause]
+    doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []
+    others = [text for text in numbers if text not in implausible]
+    return [*implausible, *doubtful, *session, *others, *(chance if not doubtful else [])]
+
+
+def _or_else(diagnosis: Diagnosis) -> list[str]:
+    """Rivals, then effects that could not be tried and are likely; where there are none, that there are none."""
+    clauses = [f"{rivals_text(step)}: these rows cannot tell" for step in diagnosis.steps if step.rivals]
+    untested = untested_here(diagnosis)
+    likely = [effect for effect in untested if effect.likely]
+    clauses += [f"{effect.effect} may be behind it, and could not be tried" for effect in likely[:MOST_NAMED]]
+    if not clauses and diagnosis.steps:
+        clauses.append(NO_RIVAL)
+    others = [effect.effect for effect in untested if not effect.likely]
+    if diagnosis.verdict == "not_testable":
+        clauses += [f"{effect.effect} {effect.why}" for effect in untested if not effect.likely][:MOST_NAMED]
+    elif others:
+        shown = others[:MOST_NAMED] + ([f"{len(others) - MOST_NAMED} more"] if len(others) > MOST_NAMED else [])
+        clauses.append(f"not testable here: {join_words(shown)}")
+    return clauses
+
+
+def _constant(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    return [] if diagnosis.constant is None else [constant_text(diagnosis.constant, fall.unit)]

@@ -1,0 +1,86 @@
+"""Least squares: units do not matter, what the rows do not determine is said, and ridge bounds it."""
+
+from __future__ import annotations
+
+import doctest
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from compd.comparison.statistics import cluster_covariance, least_squares, robust
+from compd.comparison.statistics.cluster_covariance import cluster_covariance as covariance_of
+from compd.comparison.statistics.least_squares import (
+    determined,
+    normal_inverse,
+    ridge_inverse,
+    solve_least_squares,
+    solve_ridge,
+)
+
+RNG = np.random.default_rng(11)
+A = RNG.normal(size=(40, 3))
+THETA = np.array([1.0, -2.0, 0.5])
+
+
+@pytest.mark.parametrize("module", [least_squares, robust, cluster_covariance], ids=lambda module: module.__name__)
+def test_examples_in_the_docstrings(module: ModuleType) -> None:
+    result = doctest.testmod(module, extraglobs={"np": np})
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_exact_data_give_the_parameters_in_any_unit() -> None:
+    units = np.array([1e-6, 1.0, 1e7])
+    np.testing.assert_allclose(solve_least_squares(A * units, A @ THETA) * units, THETA, rtol=1e-9)
+
+
+def test_a_weight_counts_as_repeated_rows() -> None:
+    y = A @ THETA + RNG.normal(size=40)
+    weights = RNG.integers(1, 4, 40)
+    repeated = np.repeat(np.arange(40), weights)
+    np.testing.assert_allclose(
+        solve_least_squares(A, y, weights.astype(float)), solve_least_squares(A[repeated], y[repeated]), rtol=1e-9
+    )
+
+
+def test_many_right_hand_sides_at_once() -> None:
+    y = RNG.normal(size=(40, 5))
+    each = [solve_least_squares(A, column) for column in y.T]
+    np.testing.assert_allclose(solve_least_squares(A, y), np.stack(each, axis=1), rtol=1e-9)
+
+
+def test_a_copied_and_an_empty_column_are_not_determined() -> None:
+    columns = np.column_stack([A[:, 0], A[:, 1], 3.0 * A[:, 1], np.zeros(40)])
+    assert determined(columns).tolist() == [True, False, False, False]
+    theta = solve_least_squares(columns, A[:, 0] + 2.0 * A[:, 1])
+    np.testing.assert_allclose(columns @ theta, A[:, 0] + 2.0 * A[:, 1], atol=1e-9)
+    assert theta[3] == 0.0
+
+
+def test_the_inverse_gives_the_covariance() -> None:
+    np.testing.assert_allclose(normal_inverse(A), np.linalg.inv(A.T @ A), rtol=1e-9)
+
+
+def test_no_columns_at_all() -> None:
+    assert solve_least_squares(A[:, :0], A[:, 0]).shape == (0,)
+    assert determined(A[:, :0]).shape == (0,)
+    assert covariance_of(A[:, None, :0], A[:, :1], np.arange(40)).shape == (0, 0)
+
+
+def test_ridge_is_a_measurement_of_zero() -> None:
+    ridge = np.array([0.1, 10.0, 1e4])
+    y = RNG.normal(size=40)
+    theta = solve_ridge(A.T @ A, A.T @ y, ridge)
+    with_prior = solve_least_squares(np.concatenate([A, np.diag(np.sqrt(ridge))]), np.concatenate([y, np.zeros(3)]))
+    np.testing.assert_allclose(theta, with_prior, rtol=1e-6)
+    np.testing.assert_allclose(ridge_inverse(A.T @ A, ridge), np.linalg.inv(A.T @ A + np.diag(ridge)), rtol=1e-6)
+
+
+def test_blocks_of_one_row_give_whites_covariance() -> None:
+    residual = RNG.normal(size=40) * (1.0 + 5.0 * np.abs(A[:, 0]))  # heteroscedastic
+    inverse = np.linalg.inv(A.T @ A)
+    white = inverse @ (A.T * residual**2) @ A @ inverse * 40 / 37
+    clustered = covariance_of(A[:, None, :], residual[:, None], np.arange(40))
+    independent = inverse * float(residual @ residual) / 37
+    np.testing.assert_allclose(np.diag(clustered), np.maximum(np.diag(white), np.diag(independent)), rtol=1e-9)
