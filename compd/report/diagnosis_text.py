@@ -130,7 +130,8 @@ def _print_table(console: Console, table: PageTable) -> None:
     shown = Table(*table.head)
     for column, is_numeric in zip(shown.columns, table.numeric, strict=True):
         column.justify = "right" if is_numeric else "left"
-    shown.columns[0].no_wrap = True  # an id is to be copied whole
+    # an id is to be copied whole; a sentence leaves room for the other columns
+    shown.columns[0].no_wrap = not any(" " in row[0] for row in table.rows)
     for row in table.rows:
         shown.add_row(*(Text(cell) for cell in row))
     console.print(shown)

@@ -120,3 +120,10 @@ def test_a_machine_with_a_model_of_its_own_is_told_of_nothing_inside_another() -
 @pytest.mark.parametrize("width", [40, 80, 200])
 def test_the_lines_are_the_same_in_every_terminal(width: int) -> None:
     assert printed(described(), width).split("\n")[: len(summary_lines(described()))] == summary_lines(described())
+
+
+def test_a_long_description_leaves_room_for_the_other_columns() -> None:
+    changed = description(FRAME[0], "linear", 5.5, 0.998, beside=("temperature_room_degC", "temperature_spindle_degC"))
+    text = printed(diagnosis("unexplained", 115.0, 115.0, Noise(1.1), external_recording("x"), depends_on=[changed]))
+    head = next(line for line in text.split("\n") if "follows" in line and "form" in line)
+    assert "explains" in head
