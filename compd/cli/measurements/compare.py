@@ -32,7 +32,7 @@ def compare(
     ] = None,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
-    from compd.api import compare as compare_recording
+    from compd.api.diagnosis import compare as compare_recording
     from compd.comparison.open import open_recording
     from compd.errors import CompdError, Problem
 
