@@ -90,6 +90,7 @@ def undo(stored: StoredModel, where: str) -> StoredModel:
         rms_after_um=last.rms_before_um,
         noise_floor_um=last.noise_floor_um,
         replaced={},
+        unit=last.unit,
     )
     return StoredModel(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
 
@@ -117,6 +118,7 @@ def _changed(
         rms_after_um=after.rms_um,
         noise_floor_um=after.floor.um,
         replaced=old.state(),
+        unit=aligned.unit,
     )
     return replace(
         model,

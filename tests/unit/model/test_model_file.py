@@ -51,6 +51,14 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
 
 
+def test_a_model_whose_effects_were_all_taken_out_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    ModelFile("tripod-cmm", 3).write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.fitted == ()
+    assert found.covariance.shape == (0, 0)
+
+
 def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
     example().write(path)
