@@ -100,6 +100,7 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         tried = [candidate for candidate in self.candidates if candidate.status in ("explains", "partial")]
+        unit = self.before.aligned.unit
         remarks = [
             f"{step.effect.id}: "
             + ", ".join(
@@ -108,7 +109,7 @@ class Diagnosis:
             for step in self.steps
         ]
         remarks += [
-            f"the rest follows {finding.covariate}: {finding.heldout_rms_um:.3g} um are left with it"
+            f"the rest follows {finding.covariate}: {finding.heldout_rms_um:.3g} {unit} are left with it"
             for finding in self.depends_on[:1]
         ]
         others = len(self.candidates) - len(tried)
