@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.compare import Comparison
 from compd.comparison.compare import compare as compare_aligned
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.diagnose import diagnose as diagnose_aligned
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect_needs import can_concern

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.verdict import Diagnosis
 
 

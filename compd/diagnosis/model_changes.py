@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates import library_pool

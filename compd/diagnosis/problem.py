@@ -12,7 +12,7 @@ from scipy.special import fdtri
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.cluster_covariance import neighbour_blocks
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.robust import LEAST_SIGMA, trimmed_scale
 from compd.diagnosis.candidates import Candidate, CandidatePool

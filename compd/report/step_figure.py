@@ -9,7 +9,7 @@ from plotly.graph_objects import Box, Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.error_fall import ErrorFall
 from compd.model.effect import FittedEffect
 from compd.report.driver import Driver, find_driver

@@ -7,7 +7,7 @@ import inspect
 import compd
 from compd.client import Client
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.configuration import Configuration
 from compd.diagnosis.findings import (
     CandidateResult,

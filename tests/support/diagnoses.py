@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.noise_floor import NoiseFloor
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
 from compd.diagnosis.verdict import Diagnosis, Verdict

@@ -11,7 +11,7 @@ import typer
 from compd.cli.options import MachineOption
 
 if TYPE_CHECKING:
-    from compd.comparison.compare import Comparison
+    from compd.comparison.comparison import Comparison
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
