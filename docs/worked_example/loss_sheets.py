@@ -21,7 +21,7 @@ def write_sums(sheets: Sheets) -> None:
     products = ["rr", "ra", "rb", "rc", "aa", "ab", "bb", "cc"]
     names = ["row", *products, *(f"left by {name}" for name in SETS), "gain of a", "gain of b", "c less a"]
     column = {name: column_letters(place) for place, name in enumerate(names, start=1)}
-    columns: list[list[float | str]] = [[] for _ in names]
+    rows: list[list[float | str]] = []
     for k in range(FIRST, sheets.last_row + 1):
         cells: list[float | str] = [f"={sheets.cell('Rows', 'row', k)}"]
         for first, second in products:
@@ -34,13 +34,12 @@ def write_sums(sheets: Sheets) -> None:
         cells.append(f"={column['left by 0']}{k}-{column['left by a']}{k}")
         cells.append(f"={column['left by a']}{k}-{column['left by ab']}{k}")
         cells.append(f"={column['left by c']}{k}-{column['left by a']}{k}")
-        for values, cell in zip(columns, cells, strict=True):
-            values.append(cell)
+        rows.append(cells)
     about = (
         "rr ... cc: weight times the products summed over x, y, z.  left: squares that a fit without the row's "
         "session, and one without its sector, leave, on average"
     )
-    sheets.table("Sums", about, names, columns)
+    sheets.table("Sums", about, names, rows)
 
 
 def write_folds(sheets: Sheets) -> None:

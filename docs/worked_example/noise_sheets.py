@@ -34,7 +34,7 @@ def write_noise(sheets: Sheets) -> None:
             ]
         )
     about = "Pairs of rows of one visit, without outliers; d: difference of their residuals over the root of 2, um"
-    sheets.table("Noise", about, names, columns)
+    sheets.table("Noise", about, names, zip(*columns, strict=True))
     last = FIRST + len(pairs.weight) - 1
     weight = f"$C${FIRST}:$C${last}"
     values = {axis: f"${letter}${FIRST}:${letter}${last}" for axis, letter in zip(AXES, "DEF", strict=True)}
@@ -94,7 +94,7 @@ def write_weights(sheets: Sheets) -> None:
     ends = {name: f"${letter}${FIRST}:${letter}${sheets.last_row}" for name, letter in column.items()}
     known, visit = sheets.column("Rows", "known"), sheets.column("Rows", "visit")
     scale = _robust_scale(sheets, "Weights", side + 3, {x: ends[f"e_{x}"] for x in AXES}, dict.fromkeys(AXES, known))
-    columns: list[list[float | str]] = [[] for _ in names]
+    rows: list[list[float | str]] = []
     for k in range(FIRST, sheets.last_row + 1):
         here = {name: f"{letter}{k}" for name, letter in column.items()}
         cells: list[float | str] = [f"={sheets.cell('Rows', 'row', k)}"]
@@ -113,13 +113,12 @@ def write_weights(sheets: Sheets) -> None:
         cells.append(f"=IF({here['far']}=1,IF({same}>1,1,0),0)")
         cells.append(f"={here['far']}*(1-{here['confirmed']})")
         cells.append(f"={of_row}*(1-{here['gross']})*{full}/MAX({here['d']},{full})/{consistency}")
-        for values, cell in zip(columns, cells, strict=True):
-            values.append(cell)
+        rows.append(cells)
     about = (
         "r, a, b, c: divided by the noise.  e: what the robust fit leaves.  d: distance in robust standard "
         "deviations.  gross: far, and no repeat confirms it"
     )
-    sheets.table("Weights", about, names, columns)
+    sheets.table("Weights", about, names, rows)
     _count(sheets, "gross", f"=SUM({ends['gross']})", 10, side)
     _count(sheets, "values", f"=3*SUMPRODUCT(({ends['weight']}>0)*1)", 11, side)
 

@@ -51,7 +51,7 @@ def write_rows(sheets: Sheets) -> None:
     residual_um = problem.comparison.residual_um
     visit = problem.aligned.recording.visit
     assert visit is not None
-    by_row = [
+    by_column = [
         problem.aligned.recording.row,
         visit,
         sheets.example.splits[0] + 1,
@@ -64,4 +64,4 @@ def write_rows(sheets: Sheets) -> None:
     names = ["row", "visit", "session", "sector", "block", "known", *(f"r_{axis}" for axis in AXES)]
     names += [f"{letter}_{axis}" for letter in "abc" for axis in AXES]
     about = "known: 1 where every effect is known; 34 rows lack a speed.  r: residual, um.  a, b, c: um per unit"
-    sheets.table("Rows", about, names, [np.nan_to_num(column).tolist() for column in by_row])
+    sheets.table("Rows", about, names, zip(*(np.nan_to_num(column).tolist() for column in by_column), strict=True))

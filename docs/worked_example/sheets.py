@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from docs.worked_example.example import Example
@@ -29,12 +30,12 @@ class Sheets:
         """Write the spreadsheet as .xlsx."""
         self.book.save(path, {"Readme": 100.0, "Criteria": 24.0, "Folds": 20.0, "Blocks": 22.0, "Verdict": 44.0})
 
-    def table(self, sheet: str, about: str, names: list[str], columns: list[list[float | str]]) -> None:
-        """A sheet with one line about it, names, and columns from row FIRST on."""
+    def table(self, sheet: str, about: str, names: list[str], rows: Iterable[Sequence[float | str]]) -> None:
+        """A sheet with one line about it, names, and rows from row FIRST on."""
         self.book.put(sheet, 1, 1, [about])
         self.book.put(sheet, 2, 1, names, bold=True)
         self._letters |= {(sheet, name): column_letters(place) for place, name in enumerate(names, start=1)}
-        for row, values in enumerate(zip(*columns, strict=True), start=FIRST):
+        for row, values in enumerate(rows, start=FIRST):
             self.book.put(sheet, row, 1, values)
 
     def column(self, sheet: str, name: str) -> str:

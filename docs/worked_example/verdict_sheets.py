@@ -16,7 +16,7 @@ def write_blocks(sheets: Sheets) -> None:
         values = sheets.column("Sums", name)
         columns.append([f"=SUMIF({keys},A{k},{values})" for k in range(FIRST, FIRST + count)])
     about = "Squares gained on rows left out, summed over each block; divided by the number of values: gain and error"
-    sheets.table("Blocks", about, ["block", *gains], columns)
+    sheets.table("Blocks", about, ["block", *gains], zip(*columns, strict=True))
     last = FIRST + count - 1
     values = sheets.results["values"]
     labels = ["gain per value", "its standard error", "gain / error"]

@@ -9,6 +9,7 @@ from typing import Any
 from compd.diagnosis.findings import ConstantFinding, GrossRows, UntestedEffect
 from compd.diagnosis.verdict import Diagnosis
 from tests.support.diagnoses import (
+    FRAME,
     Noise,
     description,
     diagnosis,
@@ -22,7 +23,6 @@ BACKLASH = formula("stage_backlash", "b * moved_1", "Play of screw and coupling:
 GAIN = formula("stage_gain", "b * position_mm", "Lead of the screw, or a gear ratio.")
 ZEROS = formula("joint_zero", "b * position_mm", "The encoders' zeros are elsewhere.")
 LENGTHS = formula("link_length", "b * moved_1", "The arms are longer than drawn.")
-FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 CONSTANT = ConstantFinding(
     {"x": 4.0, "y": -3.0, "z": 2.0},
     {"x": 0.1, "y": 0.1, "z": 0.1},
