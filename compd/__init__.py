@@ -11,11 +11,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compd.api import add_effect as add_effect
-    from compd.api import compare as compare
-    from compd.api import diagnose as diagnose
-    from compd.api import open_model as open_model
-    from compd.api import plan_measurement as plan_measurement
+    from compd.api.diagnosis import compare as compare
+    from compd.api.diagnosis import diagnose as diagnose
+    from compd.api.measurements import plan_measurement as plan_measurement
+    from compd.api.models import add_effect as add_effect
+    from compd.api.models import open_model as open_model
     from compd.client import connect as connect
     from compd.comparison.open import open_recording as open_recording
     from compd.configuration.shipped import load_machine as load_machine
@@ -33,12 +33,12 @@ _MODULES = {
     "load_machine": "compd.configuration.shipped",
     "simulate_campaign": "compd.simulation.campaign.simulate_campaign",
     "open_recording": "compd.comparison.open",
-    "compare": "compd.api",
-    "diagnose": "compd.api",
+    "compare": "compd.api.diagnosis",
+    "diagnose": "compd.api.diagnosis",
     "load_effects": "compd.model.library.effects_file",
-    "add_effect": "compd.api",
-    "open_model": "compd.api",
-    "plan_measurement": "compd.api",
+    "add_effect": "compd.api.models",
+    "open_model": "compd.api.models",
+    "plan_measurement": "compd.api.measurements",
     "connect": "compd.client",
     "Effect": "compd.model.effect",
     "Parameter": "compd.model.effect",

@@ -48,11 +48,12 @@ class ModelStep:
     date: Annotated[str, Field(description="when, UTC, ISO 8601")]
     recording: Annotated[str, Field(description="the recording that it was fitted on")]
     sha256: Annotated[str, Field(description="hash of that recording with its sidecar")]
-    rms_before_um: Annotated[float, Field(description="residual before, root mean square per coordinate, um")]
-    rms_after_um: Annotated[float, Field(description="residual after, um")]
-    noise_floor_um: Annotated[float, Field(description="noise floor of the recording, um")]
+    rms_before_um: Annotated[float, Field(description="residual before, root mean square per coordinate, in `unit`")]
+    rms_after_um: Annotated[float, Field(description="residual after, in `unit`")]
+    noise_floor_um: Annotated[float, Field(description="noise floor of the recording, in `unit`")]
     replaced: Annotated[State, Field(description="`effects` and `covariance` as they were before, for undo")]
     undone: Annotated[bool, Field(description="whether a later step took it back")] = False
+    unit: Annotated[str, Field(description="unit of the residual, the reference's in the recording's sidecar")] = "um"
 
     # for pydantic, which checks the steps of a file
     __pydantic_config__ = ConfigDict(extra="forbid", coerce_numbers_to_str=True)
@@ -221,7 +222,7 @@ def write_stored(path: Path, stored: StoredModel) -> None:
         **({"geometry": stored.geometry} if stored.geometry else {}),
         "release": __version__,
         **stored.state,
-        "steps": [{**asdict(step), "replaced": dict(step.replaced)} for step in stored.steps],
+        "steps": [_step_data(step) for step in stored.steps],
     }
     text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
     try:
@@ -235,3 +236,11 @@ def write_stored(path: Path, stored: StoredModel) -> None:
                 next_step="choose a place that may be written",
             )
         ) from error
+
+
+def _step_data(step: ModelStep) -> dict[str, Any]:
+    """A step as the file has it; the unit only where it is not um, which release 0.2.0 reads."""
+    data = {**asdict(step), "replaced": dict(step.replaced)}
+    if step.unit == "um":
+        del data["unit"]
+    return data

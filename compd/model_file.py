@@ -148,8 +148,8 @@ class ModelFile:
 
     def _repr_html_(self) -> str:
         remarks = [
-            f"{step.kind} {step.effect} on {step.recording}: {step.rms_before_um:.3g} um to {step.rms_after_um:.3g} um"
-            + (" (undone)" if step.undone else "")
+            f"{step.kind} {step.effect} on {step.recording}: "
+            f"{step.rms_before_um:.3g} to {step.rms_after_um:.3g} {step.unit}" + (" (undone)" if step.undone else "")
             for step in self.steps
         ]
         return html_table(str(self), self._columns(), remarks)
@@ -224,7 +224,8 @@ def read_model_file(path: Path, machine: str, links: int | None, geometry: str =
         links = max((_links_of(effect, entry) for effect, entry, _ in found), default=0)
     fitted = [_fitted_effect(effect, entry, links, where, problems) for effect, entry, where in found]
     parameters = sum(len(effect.theta) for effect in fitted)
-    covariance = np.array(document.covariance, dtype=np.float64).reshape(len(document.covariance), -1)
+    size = len(document.covariance)
+    covariance = np.array(document.covariance, dtype=np.float64).reshape(size, size)
     if not problems and len(covariance) != parameters:
         problems.append(
             Problem(

@@ -10,6 +10,7 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters, is_unde
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
+from compd.number_text import number_text
 
 
 def candidate_results(
@@ -56,6 +57,7 @@ def _result_alone(
     fraction = explained_fraction(losses.baseline, subset.cv_loss, 1.0 if problem.floor_known else 0.0)
     rms_um = problem.unit_um * float(np.sqrt(max(subset.cv_loss, 0.0)))
     gain = losses.log_loss(losses.baseline) - losses.log_loss(subset.cv_loss)
+    unit = problem.aligned.unit
     status: Status
     if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
         status, why = "explains", named
@@ -68,7 +70,7 @@ def _result_alone(
     elif steps:
         status, why = "partial", "nothing more beside what is named"
     else:
-        status, why = "partial", f"leaves {rms_um:.2g} um: others or descriptions do better"
+        status, why = "partial", f"leaves {number_text(rms_um, unit)}: others or descriptions do better"
     return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
 
 

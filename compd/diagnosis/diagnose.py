@@ -10,6 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction
@@ -69,8 +70,24 @@ def diagnose(
     progress("comparing the model with the recording")
     aligned = thinned(aligned, MOST_ROWS)
     before = compare(aligned, fitted, covariance)
+    explanation = explain_residual(before, effects, progress, criteria)
+    progress("fitting on the real forward model")
+    return _diagnosis(explanation, covariance)
+
+
+def explain_residual(
+    before: Comparison,
+    effects: Sequence[Effect],
+    progress: Progress = lambda status: None,
+    criteria: Criteria = Criteria(),
+) -> Explanation:
+    """What explains the residual of a comparison: effects, descriptions, the constant; nothing is fitted yet.
+
+    effects, progress, criteria : as of `diagnose`.
+    """
     progress("what each effect would do")
-    present = [effect.effect.id for effect in fitted]
+    aligned = before.aligned
+    present = [effect.effect.id for effect in before.fitted]
     pool = library_pool(aligned, effects, present)
     tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
     pool = replace(
@@ -84,9 +101,7 @@ def diagnose(
     members = [explanation.losses.candidates[k] for k in explanation.members]
     weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
-    explanation = name_constant(explain_again(problem, explanation, progress))
-    progress("fitting on the real forward model")
-    return _diagnosis(explanation, covariance)
+    return name_constant(explain_again(problem, explanation, progress))
 
 
 def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:

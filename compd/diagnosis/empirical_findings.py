@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.diagnosis.candidates.changes import ChangeCandidate
 from compd.diagnosis.candidates.proxies import ProxyCandidate
-from compd.diagnosis.findings import EmpiricalFinding
+from compd.diagnosis.findings import EmpiricalFinding, NonlinearConstant
 from compd.diagnosis.search.empirical_search import EmpiricalFit
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
@@ -90,8 +90,10 @@ class _Remainder:
         own = Family([complement(losses.values[k])], complement(losses.data.y))
         p_value = float(p_values([own], losses.data.block)[0])
         loss, without = losses.loss(self._explanation.members), losses.loss(rest)
+        covariate = candidate.quantity if isinstance(candidate, ProxyCandidate) else "time_s"
+        units = {constant.name: constant.unit for constant in candidate.effect.constants}
         return EmpiricalFinding(
-            covariate=candidate.quantity if isinstance(candidate, ProxyCandidate) else "time_s",
+            covariate=covariate,
             form=candidate.kind,
             port=candidate.effect.port,
             p_value=p_value,
@@ -101,6 +103,9 @@ class _Remainder:
             parameters=(dict(zip(names, theta.tolist(), strict=True)),),
             effect=candidate.effect.id,
             time_s=candidate.time_s if isinstance(candidate, ChangeCandidate) else float("nan"),
+            constants=tuple(
+                NonlinearConstant(covariate, name, value, units[name]) for name, value in candidate.constants.items()
+            ),
         )
 
     def finding(self, fits: Sequence[EmpiricalFit], p_value: float, loss: float) -> EmpiricalFinding:
@@ -137,6 +142,11 @@ class _Remainder:
             formula_effects=tuple(part[2] for part in kept),
             parameters=tuple(part[3] for part in kept),
             beside=tuple(dict.fromkeys(f.term.covariate for f in fits if f.term.covariate != main.covariate)),
+            constants=tuple(
+                NonlinearConstant(fit.term.covariate, fit.term.constant, fit.constant, fit.term.constant_unit)
+                for fit in fits
+                if fit.constant is not None
+            ),
         )
 
     def _losses(self, families: Sequence[Sequence[EmpiricalFit]]) -> FloatArray:

@@ -67,6 +67,33 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class NonlinearConstant:
+    """A number that a description has beside its fitted parameters: a period, a lag, a knee.
+
+    Attributes
+    ----------
+    covariate : str
+        Whose term has it.
+    name : str
+        As the formula of that form names it: ``"period"``, ``"tau"`` of a lag, ``"knee"``, ``"start"`` of a step; of an
+        effect, as its equation does.
+    value : float
+        In `unit`; it was searched and has no standard error.
+    unit : str
+        The covariate's, or ``"s"`` of a lag.
+    """
+
+    covariate: str
+    name: str
+    value: float
+    unit: str
+
+    def as_json(self) -> dict[str, object]:
+        """Keys of one of a description's `constants`."""
+        return {"covariate": self.covariate, "name": self.name, "value": self.value, "unit": self.unit}
+
+
+@dataclass(frozen=True)
 class EmpiricalFinding:
     """One covariate that the residual follows without a known cause.
 
@@ -95,6 +122,8 @@ class EmpiricalFinding:
         temperature was not measured and that `covariate` stands for; ``""`` for every other form.
     time_s : float
         Of a ``"change"``, when, on the recording's clock, s; nan for every other form.
+    constants : tuple of NonlinearConstant
+        The nonlinear constants of its terms, which the formulas have as numbers.
     """
 
     covariate: str
@@ -108,6 +137,7 @@ class EmpiricalFinding:
     beside: tuple[str, ...] = ()
     effect: str = ""
     time_s: float = math.nan
+    constants: tuple[NonlinearConstant, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict's `depends_on`."""
@@ -121,6 +151,7 @@ class EmpiricalFinding:
             "formula_effect": self.formula_effects[0] if self.formula_effects else None,
             "formula_effects": list(self.formula_effects),
             "fitted": list(self.parameters),
+            "constants": [constant.as_json() for constant in self.constants],
             "beside": list(self.beside),
             **({"effect": self.effect} if self.effect else {}),
             **({"time_s": self.time_s} if math.isfinite(self.time_s) else {}),

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.verdict import Diagnosis
 
 
@@ -24,9 +25,10 @@ class Holdout:
     @property
     def summary(self) -> str:
         """The result in a sentence."""
+        aligned = self.after.aligned
         return (
-            f"Sealed until now, {self.after.aligned.recording.path}: {self.before.rms_um:.3g} um -> "
-            f"{self.after.rms_um:.3g} um, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left)."
+            f"Sealed until now, {aligned.recording.path}: {self.before.rms_um:.3g} -> {self.after.rms_um:.3g} "
+            f"{aligned.unit}, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left)."
         )
 
     def as_json(self) -> dict[str, Any]:

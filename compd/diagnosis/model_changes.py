@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates.candidates import library_pool
@@ -90,6 +91,7 @@ def undo(stored: StoredModel, where: str) -> StoredModel:
         rms_after_um=last.rms_before_um,
         noise_floor_um=last.noise_floor_um,
         replaced={},
+        unit=last.unit,
     )
     return StoredModel(stored.machine, last.replaced, (*steps, undoing), stored.geometry)
 
@@ -117,6 +119,7 @@ def _changed(
         rms_after_um=after.rms_um,
         noise_floor_um=after.floor.um,
         replaced=old.state(),
+        unit=aligned.unit,
     )
     return replace(
         model,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.findings import (
     CandidateResult,
     ConstantFinding,
@@ -97,6 +97,7 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         tried = [candidate for candidate in self.candidates if candidate.status in ("explains", "partial")]
+        unit = self.before.aligned.unit
         remarks = [
             f"{step.effect.id}: "
             + ", ".join(
@@ -105,7 +106,7 @@ class Diagnosis:
             for step in self.steps
         ]
         remarks += [
-            f"the rest follows {finding.covariate}: {finding.heldout_rms_um:.3g} um are left with it"
+            f"the rest follows {finding.covariate}: {finding.heldout_rms_um:.3g} {unit} are left with it"
             for finding in self.depends_on[:1]
         ]
         others = len(self.candidates) - len(tried)

@@ -20,10 +20,7 @@ from compd.model.kernels.forward import forward
 from compd.model.kernels.inverse import inverse
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
 from compd.model.kernels.linear import all_finite
-from compd.model.solve_status import Reason
-
-OK = int(Reason.OK)
-NOT_FINITE = int(Reason.NOT_FINITE)
+from compd.model.kernels.reason_codes import NOT_FINITE, OK
 
 
 class Mechanism(NamedTuple):

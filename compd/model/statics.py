@@ -21,12 +21,9 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.closure import evaluate_closure, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
 from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve
+from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 from compd.model.kinematics import Mechanism, check_mechanism
-from compd.model.solve_status import AMPLIFICATION_LIMIT, Reason
-
-OK = int(Reason.OK)
-NOT_FINITE = int(Reason.NOT_FINITE)
-NEAR_SINGULAR = int(Reason.NEAR_SINGULAR)
+from compd.model.solve_status import AMPLIFICATION_LIMIT
 
 
 class LinkForces(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from plotly.graph_objects import Figure
 
 from compd.arrays import rms
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.comparison.covariates import covariates
 from compd.comparison.display_unit import format_error
 from compd.model_file import parameter_estimates

@@ -26,6 +26,8 @@ from compd.report.page_table import PageTable
 YAML_WIDTH = 76
 # Single gross rows that are listed.
 GROSS_ROWS = 40
+# Digits of a nonlinear constant: a period is searched to less than a thousandth.
+CONSTANT_DIGITS = 4
 
 
 def step_rows(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> list[tuple[str, str]]:
@@ -79,7 +81,7 @@ def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
     rows = [
         (
             change_text(finding, diagnosis) if is_change(finding) else short_name(finding),
-            finding.form,
+            _form(finding),
             finding.port,
             percent_text(finding.explained_fraction),
             number_text(finding.heldout_rms_um),
@@ -88,6 +90,15 @@ def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
         for finding in diagnosis.depends_on
     ]
     return PageTable(("follows", "form", "port", "explains", f"left, {fall.unit}", "by noise alone"), rows)
+
+
+def _form(finding: EmpiricalFinding) -> str:
+    """The form with its nonlinear constants: "periodic, period = 1.37 mm"; of another covariate, with its name."""
+    texts = [finding.form]
+    for constant in finding.constants:
+        whose = "" if constant.covariate == finding.covariate else f" of {constant.covariate}"
+        texts.append(f"{constant.name} = {number_text(constant.value, constant.unit, CONSTANT_DIGITS)}{whose}")
+    return ", ".join(texts)
 
 
 def candidates_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.model.effect import FittedEffect
 from compd.model.sensitivity import link_residuals

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
+from compd.comparison.display_unit import format_error
 from compd.model_document import StoredModel
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
 
-LEDGER_HEAD = ("", "step", "fitted on", "before, um", "after, um", "floor, um", "date")
+LEDGER_HEAD = ("", "step", "fitted on", "before", "after", "floor", "unit", "date")
 
 
 def write_ledger_page(path: Path, model: StoredModel) -> None:
@@ -21,15 +22,18 @@ def write_ledger_page(path: Path, model: StoredModel) -> None:
     labels = ["at the start", *(f"{k}. {step.kind}<br>{step.effect or 'all'}" for k, step in enumerate(steps, start=1))]
     rms_um = [steps[0].rms_before_um, *(step.rms_after_um for step in steps)]
     floors_um = [steps[0].noise_floor_um, *(step.noise_floor_um for step in steps)]
+    first, last = steps[0], steps[-1]
     verdict = (
-        f"After {len(steps)} steps the residual is {rms_um[-1]:.3g} um; it was {rms_um[0]:.3g} um. "
-        f"Noise alone would be {floors_um[-1]:.3g} um."
+        f"After {len(steps)} steps the residual is {format_error(last.rms_after_um, last.unit, 3)}; it was "
+        f"{format_error(first.rms_before_um, first.unit, 3)}. "
+        f"Noise alone would be {format_error(last.noise_floor_um, last.unit, 3)}."
     )
+    unit = " or ".join(dict.fromkeys(step.unit for step in steps))
     panels = [
         Panel(
             "The falling error",
             "Residual after each step, on the recording it was fitted on.",
-            plot_error_by_step(labels, rms_um, floors_um),
+            plot_error_by_step(labels, rms_um, floors_um, unit),
         ),
         Panel(
             "Every step",
@@ -50,14 +54,17 @@ def ledger_rows(model: StoredModel) -> list[list[str]]:
             f"{step.rms_before_um:.3g}",
             f"{step.rms_after_um:.3g}",
             f"{step.noise_floor_um:.3g}",
+            step.unit,
             step.date[:10],
         ]
         for k, step in enumerate(model.steps, start=1)
     ]
 
 
-def plot_error_by_step(labels: Sequence[str], rms_um: Sequence[float], floors_um: Sequence[float]) -> Figure:
-    """The error after each step of a model, and the noise floor that it cannot fall below."""
+def plot_error_by_step(
+    labels: Sequence[str], rms_um: Sequence[float], floors_um: Sequence[float], unit: str = "um"
+) -> Figure:
+    """The error after each step of a model, and the noise floor that it cannot fall below; unit : in place of um."""
     figure = Figure()
     figure.add_trace(
         Scatter(
@@ -80,7 +87,7 @@ def plot_error_by_step(labels: Sequence[str], rms_um: Sequence[float], floors_um
             marker={"size": 9},
         )
     )
-    style_figure(figure, "", "residual, um rms per coordinate", 420)
+    style_figure(figure, "", f"residual, {unit} rms per coordinate", 420)
     ends = np.log10([0.7 * min(*rms_um, *floors_um), 1.6 * max(*rms_um, *floors_um)])
     return figure.update_yaxes(type="log", dtick="D2", tickformat=".3~g", range=ends.tolist()).update_layout(
         margin={"b": 90}, xaxis={"tickangle": 0}

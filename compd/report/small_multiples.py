@@ -9,7 +9,7 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.comparison.covariates import Covariate
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable

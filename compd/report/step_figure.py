@@ -9,7 +9,7 @@ from plotly.graph_objects import Box, Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.words.error_fall import ErrorFall
 from compd.model.effect import FittedEffect
 from compd.report.driver import Driver, find_driver
@@ -72,7 +72,9 @@ def _add_series(figure: Figure, row: int, part: ErrorPart, k: int, driver: Drive
         if discrete:
             _add_boxes(figure, (row, col), driver, values, used, colour)
         else:
-            add_dots_and_means(figure, (row, col), driver.values, values, used, part.series[k], colour, legend=False)
+            add_dots_and_means(
+                figure, (row, col), driver.values, values, used, part.series[k], colour, legend=False, unit=fall.unit
+            )
             figure.update_xaxes(title_text=driver.title, title_standoff=4, row=row, col=col)
         if fall.noise_known:
             figure.add_hrect(-fall.noise, fall.noise, fillcolor="#8a8f98", opacity=0.18, line_width=0, row=row, col=col)

@@ -7,9 +7,16 @@ import inspect
 import compd
 from compd.client import Client
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.configuration import Configuration
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
+from compd.diagnosis.findings import (
+    CandidateResult,
+    DiagnosisStep,
+    EmpiricalFinding,
+    NonlinearConstant,
+    ParameterEstimate,
+    Rival,
+)
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import (
@@ -37,6 +44,7 @@ RESULTS: tuple[type, ...] = (
     Rival,
     CandidateResult,
     EmpiricalFinding,
+    NonlinearConstant,
     ModelFile,
     EffectNumber,
     ModelStep,

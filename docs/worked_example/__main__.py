@@ -7,7 +7,7 @@ from pathlib import Path
 
 from docs.worked_example.example import make_example
 from docs.worked_example.pictures import pictures
-from docs.worked_example.sheets import Sheets
+from docs.worked_example.workbook import make_sheets
 
 # The page takes the pictures and the spreadsheet from here.
 FOLDER = Path(__file__).parent.parent / "_build" / "worked-example"
@@ -19,7 +19,7 @@ def main() -> None:
     shutil.rmtree(FOLDER, ignore_errors=True)
     FOLDER.mkdir(parents=True)
     example = make_example()
-    sheets = Sheets(example)
+    sheets = make_sheets(example)
     sheets.save(FOLDER / SPREADSHEET)
     for name, svg in pictures(example, sheets).items():
         (FOLDER / f"{name}.svg").write_text(svg, encoding="utf-8")

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
@@ -19,14 +19,12 @@ from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.open import open_recording
 from compd.comparison.statistics.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.candidates.candidates import Candidate, library_pool
-from compd.diagnosis.candidates.proxies import proxy_candidates
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.candidates.candidates import Candidate
+from compd.diagnosis.diagnose import diagnose, explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
-from compd.diagnosis.search.explanation import Explanation, explain, explain_again
+from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.gross_rows import EXPONENT, RIDGE, ROUNDS
-from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import load_library
 
@@ -67,15 +65,9 @@ def make_example() -> Example:
         with redirect_stdout(StringIO()):
             app(["campaign", *shape, "--out", "loaded.csv"], standalone_mode=False)
         aligned = open_recording(Path("loaded.csv"))
-    effects, criteria = list(load_library().values()), Criteria()
-    comparison = compare(aligned)
-    pool = replace(library_pool(aligned, effects, []), proxies=proxy_candidates(aligned, effects, []))
-    problem = build_problem(comparison, pool, criteria)
-    first = explain(problem, _quiet)
-    chosen = [first.losses.candidates[k] for k in first.members]
-    problem = build_problem(comparison, pool, criteria, problem.weigh_beside(chosen))
-    explanation = explain_again(problem, first, _quiet)
-    best = explanation.losses.best_variants
+    effects = list(load_library().values())
+    explanation = explain_residual(compare(aligned), effects)
+    problem, best = explanation.problem, explanation.losses.best_variants
     members = tuple(best[name].members[0] for name in (HIDDEN, SECOND, ALIKE))
     return Example(
         diagnosis=diagnose(aligned, (), None, effects),
@@ -84,7 +76,7 @@ def make_example() -> Example:
         members=(members[0], members[1], members[2]),
         splits=row_splits(aligned),
         block=neighbour_blocks(aligned.recording),
-        robust_fit=_robust_fit(problem, chosen[0]),
+        robust_fit=_robust_fit(problem, explanation.losses.candidates[members[0]]),
     )
 
 
@@ -96,10 +88,6 @@ def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
     return robust_regression(
         columns, problem.residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
     )
-
-
-def _quiet(status: str) -> None:
-    """Show no progress."""
 
 
 @contextmanager

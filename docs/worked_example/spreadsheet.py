@@ -114,7 +114,7 @@ class Spreadsheet:
         """The value of a formula on a sheet."""
         parts = _QUOTED.split(formula[1:])
         expression = "".join(part if k % 2 else self._translated(part, sheet) for k, part in enumerate(parts))
-        # the formulas are those of docs/worked_example/sheets.py
+        # the formulas are those of docs/worked_example
         value = eval(expression, {"__builtins__": {}, "_cells": self._cells, **_FUNCTIONS})
         return value if isinstance(value, str) else float(value)
 

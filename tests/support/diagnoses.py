@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from compd.comparison.aligned_recording import AlignedRecording, align_recording
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.noise_floor import NoiseFloor
 from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
 from compd.diagnosis.verdict import Diagnosis, Verdict
@@ -26,6 +27,7 @@ from tests.support.measured import aligned as align_tripod
 from tests.support.measured import gauges, record
 
 ROWS = 60
+FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 
 
 @cache
@@ -114,6 +116,22 @@ def description(covariate: str, form: str, left_um: float, share: float, **more:
     }
     fields: dict[str, Any] = {"formula_effects": (term,), "parameters": ({"k": 1.0},), "p_value": 0.001, **more}
     return EmpiricalFinding(covariate, form, "reference", explained_fraction=share, heldout_rms_um=left_um, **fields)
+
+
+def described_by_two(physics: str, **fields: Any) -> Diagnosis:
+    """An error that two temperatures describe, each by a formula; physics : in words, of the first; fields : others."""
+    first, second = (description(name, "linear", 5.5, 0.998).formula_effects[0] for name in FRAME)
+    finding = description(
+        FRAME[0],
+        "linear",
+        5.5,
+        0.998,
+        beside=FRAME[1:],
+        formula_effects=({**first, "physics": physics}, second),
+        parameters=({"k": 0.4}, {"k": -0.2}),
+    )
+    recording = external_recording("x", quantities=FRAME)
+    return diagnosis("unexplained", 115.0, 115.0, Noise(1.1), recording, depends_on=[finding], **fields)
 
 
 @dataclass(frozen=True)

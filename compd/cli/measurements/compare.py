@@ -11,7 +11,7 @@ import typer
 from compd.cli.options import MachineOption
 
 if TYPE_CHECKING:
-    from compd.comparison.compare import Comparison
+    from compd.comparison.comparison import Comparison
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -32,7 +32,7 @@ def compare(
     ] = None,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
-    from compd.api import compare as compare_recording
+    from compd.api.diagnosis import compare as compare_recording
     from compd.comparison.open import open_recording
     from compd.errors import CompdError, Problem
 

@@ -30,7 +30,7 @@ def diagnose(
     """Learn which physical effect is missing: twelve lines with the verdict and what to do next, then the evidence."""
     from rich.console import Console
 
-    from compd.api import diagnose as diagnose_recording
+    from compd.api.diagnosis import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
     from compd.comparison.open import open_recording
     from compd.diagnosis.holdout import evaluate_holdout

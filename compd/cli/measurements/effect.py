@@ -81,7 +81,7 @@ def add(
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
-    from compd.api import add_effect
+    from compd.api.models import add_effect
     from compd.comparison.open import open_recording
 
     aligned = open_recording(recording, machine)
@@ -149,7 +149,7 @@ def _finish(
     from rich.console import Console
     from rich.table import Table
 
-    from compd.api import compare
+    from compd.api.diagnosis import compare
     from compd.comparison.display_unit import format_error
 
     if dry_run:

@@ -28,6 +28,10 @@ def ledger(
         return
     largest = max(max(step.rms_before_um, step.rms_after_um) for step in steps)
     table = Table(*LEDGER_HEAD, "", title=f"{model}: {stored.machine}", title_justify="left")
+    for column in table.columns[1:3]:
+        column.overflow = "fold"  # names are to be copied whole
+    for column in table.columns[3:-1]:
+        column.no_wrap = True  # no number, unit or date is cut
     for row, step in zip(ledger_rows(stored), steps, strict=True):
         table.add_row(*row, "#" * max(1, round(16 * step.rms_after_um / largest)))
     console.print(table)

@@ -46,7 +46,7 @@ def plan(
     ] = None,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds, other settings) on which two rival effects differ most."""
-    from compd.api import plan_measurement
+    from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
 
     first, second = _pair(rivals)

@@ -40,8 +40,8 @@ FORMS_BY_KIND: Mapping[Kind, tuple[str, ...]] = {
 }
 # A parabola needs three values of its covariate, a knee with two slopes four.
 FEWEST_VALUES = {"square": 3, "knee": 4}
-# Unit of a parameter by its name, {} for the covariate's; um where it is not here.
-_UNITS = {"k": "um/{}", "m": "um/{}", "k2": "um/{}^2"}
+# Behind the residual's unit in a parameter's, by its name, {} for the covariate's; nothing where it is not here.
+_PER_COVARIATE = {"k": "/{}", "m": "/{}", "k2": "/{}^2"}
 _UNITS_OF_STRAIN = {"k": "ppm/{}", "c": "ppm"}
 # Plausible range of a parameter of which nothing is known, in its unit; of a fitted one, times its size.
 UNKNOWN_RANGE = 1e3
@@ -58,6 +58,7 @@ class EmpiricalTerm:
     axes : of a port that takes a vector, one effect each; ("",) for the links.
     with_constant : whether the formula has a constant of its own; none where every fit has one along each coordinate.
     grid : values of the nonlinear constant; empty for a form without one.
+    residual_unit : in place of um.
     """
 
     covariate: str
@@ -69,6 +70,7 @@ class EmpiricalTerm:
     axes: tuple[str, ...] = ("",)
     with_constant: bool = True
     grid: tuple[float, ...] = ()
+    residual_unit: str = "um"
 
     @property
     def unit(self) -> str:
@@ -79,6 +81,11 @@ class EmpiricalTerm:
     def constant(self) -> str:
         """Name of the nonlinear constant, "" for none."""
         return CONSTANTS.get(self.form, "")
+
+    @property
+    def constant_unit(self) -> str:
+        """Unit of the nonlinear constant: s of a lag, else the covariate's."""
+        return "s" if self.form == "lagged" else self.unit
 
     def effect(self) -> Effect:
         """The formula as an effect, its constant a parameter; along the first axis where there are several."""
@@ -124,17 +131,16 @@ class EmpiricalTerm:
             if not re.search(rf"\b{name}\b", formula):
                 continue
             size = RANGE_PER_SIZE * abs((sizes or {}).get(name, 0.0)) or UNKNOWN_RANGE
-            units = {} if self.form == "step" else _UNITS_OF_STRAIN if self.form == "strain" else _UNITS
             parameters[name] = {
-                "unit": units.get(name, "um").format(self.unit),
+                "unit": self._parameter_unit(name),
                 "plausible": [-float(f"{size:.3g}"), float(f"{size:.3g}")],
                 "source": SOURCE,
             }
             if self.per_link:
                 parameters[name]["per"] = "link"
         if self.constant and value is None:
-            unit = "s" if self.form == "lagged" else self.unit
-            parameters[self.constant] = {"unit": unit, "plausible": list(self._constant_range()), "source": SOURCE}
+            plausible = list(self._constant_range())
+            parameters[self.constant] = {"unit": self.constant_unit, "plausible": plausible, "source": SOURCE}
         return {
             "id": self._id(axis),
             "port": self.port,
@@ -143,6 +149,13 @@ class EmpiricalTerm:
             "physics": "A description, not a cause: the residual follows this on the recordings that were looked at.",
             "parameters": parameters,
         }
+
+    def _parameter_unit(self, name: str) -> str:
+        """Unit of a fitted parameter: "um/degC", "ppm/degC" of a strain, "arcsec" of a constant."""
+        if self.form == "strain":
+            return _UNITS_OF_STRAIN[name].format(self.unit)
+        per_covariate = "" if self.form == "step" else _PER_COVARIATE.get(name, "")
+        return self.residual_unit + per_covariate.format(self.unit)
 
     def _id(self, axis: str) -> str:
         """Where and what: link_follows_humidity, z_follows_temperature_frame_lagged, tool_x_follows_force_y_square."""
@@ -243,10 +256,12 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
             yield EmpiricalTerm("", "", "tool", 0.0, 0.0, axes=("x", "y", "z"))
     elif aligned.of_links:
         # of a single link both are the same
-        yield EmpiricalTerm("", "", "link", 0.0, 0.0, per_link=len(aligned.axes) > 1, with_constant=with_constant)
+        several = len(aligned.axes) > 1
+        yield EmpiricalTerm("", "", "link", 0.0, 0.0, several, with_constant=with_constant, residual_unit=aligned.unit)
     if not aligned.of_links:
         axes = tuple("xyz"[axis] for axis in aligned.axes)
-        yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=with_constant)
+        unit = aligned.unit
+        yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=with_constant, residual_unit=unit)
 
 
 def _link_covariates(aligned: AlignedRecording, rows: BoolArray) -> Iterator[tuple[str, float, str]]:

@@ -11,7 +11,7 @@ from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.statistics.robust import LEAST_SIGMA, trimmed_scale

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effect import Effect

@@ -18,11 +18,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.model.kernels.linear import all_finite
-from compd.model.solve_status import Reason
-
-OK = int(Reason.OK)
-NOT_FINITE = int(Reason.NOT_FINITE)
-NEAR_SINGULAR = int(Reason.NEAR_SINGULAR)
+from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 
 # Two joint centres nearer than this coincide: the link between them has no direction.
 SHORTEST_LINK_MM = 1e-6

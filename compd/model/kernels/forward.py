@@ -18,6 +18,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
 from compd.model.kernels.rotation import orthonormalise, rotate_in_place
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
@@ -25,15 +26,7 @@ from compd.model.solve_status import (
     RESIDUAL_TOLERANCE_MM,
     STEP_LIMIT,
     STEP_TOLERANCE_MM,
-    Reason,
 )
-
-OK = int(Reason.OK)
-NOT_FINITE = int(Reason.NOT_FINITE)
-UNREACHABLE = int(Reason.UNREACHABLE)
-NO_CONVERGENCE = int(Reason.NO_CONVERGENCE)
-NEAR_SINGULAR = int(Reason.NEAR_SINGULAR)
-OTHER_ASSEMBLY = int(Reason.OTHER_ASSEMBLY)
 
 
 @helper

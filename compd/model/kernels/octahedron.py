@@ -26,6 +26,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
 from compd.model.kernels.rotation import set_rotation_vector
 from compd.model.solve_status import (
     AMPLIFICATION_LIMIT,
@@ -33,15 +34,7 @@ from compd.model.solve_status import (
     RESIDUAL_TOLERANCE_MM,
     STEP_LIMIT,
     STEP_TOLERANCE_MM,
-    Reason,
 )
-
-OK = int(Reason.OK)
-NOT_FINITE = int(Reason.NOT_FINITE)
-UNREACHABLE = int(Reason.UNREACHABLE)
-NO_CONVERGENCE = int(Reason.NO_CONVERGENCE)
-NEAR_SINGULAR = int(Reason.NEAR_SINGULAR)
-OTHER_ASSEMBLY = int(Reason.OTHER_ASSEMBLY)
 
 # Equation (3): distance u_k runs from support k // 2 to this plate point.
 PLATE_POINT_OF_DISTANCE = (0, 2, 0, 1, 1, 2)

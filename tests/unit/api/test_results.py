@@ -11,7 +11,7 @@ import pytest
 
 import compd
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.compare import Comparison
+from compd.comparison.comparison import Comparison
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, ConfigurationError, PluginError, RecordingError, StateError

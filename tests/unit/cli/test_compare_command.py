@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 import yaml
@@ -14,7 +16,12 @@ from compd.cli.measurements.compare import compare
 from compd.cli.measurements.effect import add, fit, remove, undo
 from compd.cli.measurements.ledger import ledger
 from compd.errors import CompdError, RecordingError, StateError
+from compd.model_file import read_model_file
+from tests.support.external import write_external
 from tests.support.measured import gauges, hidden, record
+
+# The unit as a word; the names of columns and keys keep theirs.
+UM = re.compile(r"(?<![\w.{])um(?![\w}])")
 
 app = typer.Typer()
 for command in (compare, ledger, add, remove, fit, undo):
@@ -130,6 +137,29 @@ def test_every_step_is_in_the_ledger_and_can_be_undone(recording: Path, tmp_path
     assert [step["kind"] for step in yaml.safe_load(model.read_text())["steps"]] == ["add", "add", "undo", "undo"]
     assert "undone" in said
     assert "The falling error" in page.read_text()
+
+
+def test_the_ledger_is_in_the_unit_of_the_recordings(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    elevation_deg = np.repeat(rng.uniform(20, 80, 40), 2)
+    droop_arcsec = 25 * np.cos(np.deg2rad(elevation_deg)) + rng.normal(0, 1, 80)
+    columns = {"elevation_deg": elevation_deg, "model_y_arcsec": 0 * droop_arcsec, "reference_y_arcsec": droop_arcsec}
+    reference = {"quantity": "tool_position", "unit": "arcsec", "sigma": 1.0}
+    stars = write_external(tmp_path, columns, reference, name="stars")
+    model, page = tmp_path / "pointing.yaml", tmp_path / "ledger.html"
+    said = run("add", "telescope:tf", "--recording", stars, "--model", model, "--dry-run")
+    assert "arcsec ->" in said
+    assert not UM.search(said)
+    run("add", "telescope:tf", "--recording", stars, "--model", model)
+    run("undo", "--model", model)
+    said = run("ledger", model, "--html", page)
+    assert said.count(" arcsec ") == 2, "one of each step"
+    text = re.sub(r"<script>.*?</script>", "", page.read_text(encoding="utf-8"), count=1, flags=re.S)
+    assert "residual, arcsec rms" in text
+    notebook = read_model_file(model, "external", None)._repr_html_()
+    assert "arcsec (undone)" in notebook
+    for shown in (said, text, notebook):
+        assert not UM.search(shown)
 
 
 def test_remove_fits_the_rest_again(recording: Path, tmp_path: Path) -> None:

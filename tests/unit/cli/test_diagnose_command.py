@@ -18,12 +18,20 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.summary_lines import MOST_LINES, WIDTH, summary_lines
 from compd.model.library import find_effect
 from compd.report.diagnosis_text import print_diagnosis
-from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step
+from tests.support.diagnoses import (
+    FRAME,
+    Noise,
+    described_by_two,
+    description,
+    diagnosis,
+    external_recording,
+    formula,
+    step,
+)
 from tests.support.measured import gauges, hidden, record
 
 app = typer.Typer()
 app.command()(diagnose)
-FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 
 
 def printed(made: Diagnosis, width: int = 80) -> str:
@@ -34,20 +42,8 @@ def printed(made: Diagnosis, width: int = 80) -> str:
 
 
 def described() -> Diagnosis:
-    parts = [description(name, "linear", 5.5, 0.998).formula_effects[0] for name in FRAME]
-    finding = description(
-        FRAME[0],
-        "linear",
-        5.5,
-        0.998,
-        beside=FRAME[1:],
-        formula_effects=tuple(parts),
-        parameters=({"k": 0.4}, {"k": -0.2}),
-    )
     vary = {"measure": "vary temperature_frame_degC alone", "why": "the rest follows it"}
-    recording = external_recording("x", quantities=FRAME)
-    fields = {"depends_on": [finding], "next_measurement": [vary]}
-    return diagnosis("unexplained", 115.0, 115.0, Noise(1.1), recording, **fields)
+    return described_by_two("A description, not a cause.", next_measurement=[vary])
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.compare import Comparison, compare
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
 from compd.comparison.covariates import covariates
 from compd.comparison.display_unit import format_error
 from compd.comparison.open import open_recording
+from compd.diagnosis.diagnose import diagnose
+from compd.model.library import load_library
 from compd.report.comparison_page import write_comparison_page
+from tests.support.command import run_in_process
 from tests.support.external import measured_places, write_external
 
 # Columns and keys keep their names; sha256 and scripts are no text.
@@ -64,6 +68,23 @@ def test_trends_and_covariates_are_in_the_unit(tmp_path: Path) -> None:
     place = next(covariate for covariate in covariates(arcsec.aligned) if covariate.name == "x")
     assert place.unit == "arcsec"
     np.testing.assert_allclose(place.values, arcsec.aligned.recording.columns["model_x_arcsec"])
+
+
+def test_a_diagnosis_is_in_the_unit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    azimuth_deg, tube_degC = np.repeat(rng.uniform(0, 360, 60), 2), np.repeat(rng.uniform(0, 20, 60), 2)
+    away_arcsec = 3.0 * tube_degC + rng.normal(0, 1, 120)
+    columns = {"azimuth_deg": azimuth_deg, "temperature_tube_degC": tube_degC}
+    columns |= {"model_x_arcsec": 0 * away_arcsec, "reference_x_arcsec": away_arcsec}
+    reference = {"quantity": "tool_position", "unit": "arcsec", "sigma": 1.0}
+    path, page = write_external(tmp_path, columns, reference), tmp_path / "page.html"
+    said = run_in_process("diagnose", str(path), str(path), "--html", str(page))
+    assert "temperature_tube_degC" in said
+    text = re.sub(r"<script>.*?</script>", "", page.read_text(encoding="utf-8"), count=1, flags=re.S)
+    notebook = diagnose(open_recording(path), (), None, list(load_library().values()))._repr_html_()
+    for shown in (said, text, notebook):
+        assert "arcsec" in shown
+        assert not UM.search(shown), shown
 
 
 def test_the_page_is_in_the_unit(tmp_path: Path) -> None:

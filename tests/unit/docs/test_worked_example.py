@@ -12,6 +12,7 @@ import pytest
 from docs.worked_example.example import Example, make_example
 from docs.worked_example.sheets import Sheets
 from docs.worked_example.spreadsheet import Address, Spreadsheet, column_letters
+from docs.worked_example.workbook import make_sheets
 
 MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 
@@ -23,7 +24,7 @@ def example() -> Example:
 
 @pytest.fixture(scope="module")
 def sheets(example: Example) -> Sheets:
-    return Sheets(example)
+    return make_sheets(example)
 
 
 @pytest.fixture(scope="module")

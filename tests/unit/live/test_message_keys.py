@@ -12,9 +12,9 @@ from compd.live.service.message_keys import Keys
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import SENT_MESSAGES
 from tests.support.live_machine import machine
+from tests.support.live_models import file_with
 from tests.support.recorded_run import Run
 from tests.unit.live.test_daemon import configuration, running, still
-from tests.unit.live.test_effects import file_with
 
 __all__ = ["still"]
 

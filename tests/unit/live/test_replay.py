@@ -20,8 +20,8 @@ from compd.live.service.state_json import from_plain, to_plain
 from compd.model.apply_effects import EffectMemory
 from compd.model.motion import Motion
 from tests.support.live_machine import CONFIG, machine
+from tests.support.live_models import file_with
 from tests.support.recorded_run import ROOMY, Run
-from tests.unit.live.test_effects import file_with
 
 CYCLES = 400
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,22 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert dict(found.fitted[1].constants) == {"tau": 1300.0}
     np.testing.assert_array_equal(found.covariance, example().covariance)
     np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
+
+
+def test_a_model_whose_effects_were_all_taken_out_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    ModelFile("tripod-cmm", 3).write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.fitted == ()
+    assert found.covariance.shape == (0, 0)
+
+
+def test_a_step_names_its_unit_only_where_release_0_2_0_would_take_it_for_um(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    (step,) = example().steps
+    replace(example(), steps=(step, replace(step, unit="arcsec"))).write(path)
+    assert ["unit" in data for data in yaml.safe_load(path.read_text())["steps"]] == [False, True]
+    assert [read.unit for read in read_stored(path).steps] == ["um", "arcsec"]
 
 
 def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:

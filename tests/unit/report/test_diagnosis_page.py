@@ -26,13 +26,21 @@ from compd.report.falling_error import NAME_WIDTH, plot_falling_error
 from compd.report.small_multiples import axis_title, axis_unit
 from compd.report.step_figure import plot_step
 from compd.report.time_figure import plot_time
-from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step
+from tests.support.diagnoses import (
+    FRAME,
+    Noise,
+    described_by_two,
+    description,
+    diagnosis,
+    external_recording,
+    formula,
+    step,
+)
 from tests.support.measured import aligned as align_tripod
 from tests.support.measured import gauges, hidden, record
 
 FALL = ErrorFall(1.0, (0.2,), 0.2, 0.15, "repeats", "arcsec", left_out=True)
 LONG = "a_name_of_an_effect_that_is_longer_than_the_room_beside_a_bar"
-FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 
 
 def texts(figure: Figure) -> str:
@@ -51,19 +59,7 @@ def step_figure(recording: AlignedRecording, *effects: FittedEffect) -> Figure:
 
 
 def described() -> Diagnosis:
-    parts = [description(name, "linear", 5.5, 0.998).formula_effects[0] for name in FRAME]
-    parts[0] = {**parts[0], "physics": 'It\'s a description: "no" cause, & nothing < or > than that.'}
-    finding = description(
-        FRAME[0],
-        "linear",
-        5.5,
-        0.998,
-        beside=FRAME[1:],
-        formula_effects=tuple(parts),
-        parameters=({"k": 0.4}, {"k": -0.2}),
-    )
-    recording = external_recording("x", quantities=FRAME)
-    return diagnosis("unexplained", 115.0, 115.0, Noise(1.1), recording, depends_on=[finding])
+    return described_by_two('It\'s a description: "no" cause, & nothing < or > than that.')
 
 
 def page_of(made: Diagnosis, tmp_path: Path) -> str:

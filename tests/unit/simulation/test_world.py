@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,29 +16,12 @@ from compd.errors import CompdError
 from compd.simulation.truth.closure import homogeneous
 from compd.simulation.truth.frame import DISTANCES, distances_mm
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.strengths import NOTHING, Strengths
+from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from compd.simulation.truth.world import World
 from tests.support.simulated import HEXAPOD, hexapod, tripod, tripod_with_tool_on_plate, wiring
 
 MACHINES = [(tripod(), wiring()), (hexapod(), wiring(HEXAPOD))]
 ROLE_WEIGHT = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}
-# What the comparators do see, with nothing that they do not: joints along the links, and the frame.
-FULLY_MEASURED = replace(
-    Strengths(),
-    ball_runout_across_share=0.0,
-    ball_give_across_um_per_N=0.0,
-    support_expansion_ppm_per_K=0.0,
-    plate_expansion_ppm_per_K=0.0,
-    frame_rod_expansion_ppm_per_K=0.0,
-    scale_rod_expansion_ppm_per_K=0.0,
-    platform_expansion_ppm_per_K=0.0,
-    tool_expansion_ppm_per_K=0.0,
-    comparator_noise_um=0.0,
-    comparator_step_um=0.0,
-    scale_noise_um=0.0,
-    thermometer_noise_K=0.0,
-)
-
 # Figures 14 and 15: the base under or beside the work, the work on the moving platform.
 OTHERS = [
     (tripod((np.pi, 0.0, 0.0)), wiring()),
@@ -127,7 +109,7 @@ def test_ideal_machine_is_where_the_drawing_says(geometry: Geometry, wires: Wiri
 
 @arrangements
 def test_gauges_explain_joints_and_frame_by_the_papers_equations(geometry: Geometry, wires: Wiring) -> None:
-    world = World(geometry, wires, seed=2, speedup=300.0, strengths=FULLY_MEASURED)
+    world = World(geometry, wires, seed=2, speedup=300.0, strengths=FULLY_MEASURED_WITHOUT_NOISE)
     for _ in range(8):
         run(world, 5.0)
         assert compensated_tip(world, geometry, wires) == pytest.approx(true_tip(world), abs=1e-6)

@@ -187,6 +187,13 @@ def test_ids_say_where_and_what(tmp_path: Path) -> None:
     assert terms["temperature_bed_degC", "lagged"].declaration("x", 700.0)["id"] == "x_follows_temperature_bed_lagged"
 
 
+def test_a_lag_is_in_seconds_and_a_knee_in_the_unit_of_its_covariate(tmp_path: Path) -> None:
+    columns = {"temperature_bed_degC": WARM_degC, "load_kg": np.linspace(0.0, 5.0, ROWS)}
+    terms = terms_of(record_external(tmp_path / "run.csv", columns, {"x": NOISE_UM}))
+    assert terms["temperature_bed_degC", "lagged"].constant_unit == "s"
+    assert terms["load_kg", "knee"].constant_unit == "kg"
+
+
 def explained(aligned: AlignedRecording, term: EmpiricalTerm, constant: float) -> float:
     """Share of the residual's variation that a term explains at a value of its constant."""
     y: FloatArray = residual_um(aligned)

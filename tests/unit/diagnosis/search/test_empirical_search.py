@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,9 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import error_fall
 from compd.model.library import find_effect
+from compd.report.diagnosis_evidence import findings_table
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
 
@@ -97,6 +100,16 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     assert finding["fitted"][0]["k"] == pytest.approx(slope, abs=1e-3)
     low, high = finding["formula_effect"]["parameters"]["k"]["plausible"]
     assert low < slope < high
+
+
+def test_a_period_is_told_with_its_unit(tmp_path: Path) -> None:
+    diagnosis = diagnose_with_cause(tmp_path, swing_in_time, {})
+    (constant,) = diagnosis.depends_on[0].as_json()["constants"]
+    assert (constant["covariate"], constant["name"], constant["unit"]) == ("time_s", "period", "s")
+    assert constant["value"] == pytest.approx(800.0, rel=0.02)
+    assert f"/ {constant['value']:.15g})" in diagnosis.depends_on[0].formula_effects[0]["formula"]
+    form = findings_table(diagnosis, error_fall(diagnosis)).rows[0][1]
+    assert re.fullmatch(r"periodic, period = (79\d|8\d\d)(\.\d)? s", form)
 
 
 def test_one_effect_and_a_cause_outside_are_both_told(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""The public functions that put several rooms together: what `import compd` and the commands offer."""

@@ -1,0 +1,57 @@
+"""What the public functions take: a recording, a model and effects, each opened already or named by its path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.open import open_recording
+from compd.errors import Problem, StateError
+from compd.model.effect import Effect
+from compd.model_file import ModelFile, read_model_file
+
+# An opened recording, or the path of one whose machine is found by its name.
+Recorded: TypeAlias = AlignedRecording | str | Path
+# An opened model or its path; None for the machine without effects.
+Model: TypeAlias = ModelFile | str | Path | None
+# Effects of one's own: an effect, a source of effects as `load_effects` takes it, or several of these.
+Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
+
+
+def opened_recording(recording: Recorded) -> AlignedRecording:
+    """A recording, opened with its machine where it is named by its path."""
+    return recording if isinstance(recording, AlignedRecording) else open_recording(recording)
+
+
+def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
+    """The model of the recording's machine. Raises StateError where it is of another one."""
+    machine, links = aligned.recording.machine, aligned.rows.links
+    if model is None:
+        return ModelFile(machine, links)
+    if not isinstance(model, ModelFile):
+        return read_model_file(Path(model), machine, links)
+    if model.machine != machine:
+        raise StateError(
+            Problem(
+                where="model",
+                what="belongs to another machine than the recording",
+                value=model.machine,
+                allowed=machine,
+                next_step="give this machine's model, or begin a new one",
+            )
+        )
+    if model.links not in (0, links):
+        raise StateError(
+            Problem(
+                where="model",
+                what="has another number of links than the recording",
+                value=str(model.links),
+                allowed=str(links),
+                next_step="give the model of these links, or begin a new one",
+            )
+        )
+    # of an external model, whose effects had no number of a single link
+    return replace(model, links=links)

@@ -1,0 +1,111 @@
+"""What a recording says of the model: by how much they differ, and which effect is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
+from compd.comparison.compare import compare as compare_aligned
+from compd.comparison.comparison import Comparison
+from compd.diagnosis.diagnose import diagnose as diagnose_aligned
+from compd.diagnosis.verdict import Diagnosis
+from compd.model.effect_needs import can_concern
+from compd.model.library import load_library
+from compd.model.library.effects_file import gather_effects
+
+
+def compare(recording: Recorded, model: Model = None) -> Comparison:
+    """Compare a recording with the model of its machine; nothing is fitted.
+
+    Parameters
+    ----------
+    recording : AlignedRecording, str or Path
+        What was measured, as `open_recording` returns it; or the path of a recording whose machine comes with compd.
+    model : ModelFile, str or Path, optional
+        The effects that the model has; left out, none: what is left then is everything that the gauges do not see.
+
+    Returns
+    -------
+    Comparison
+        Residuals in um, the noise floor, what each part contributes, and what the residual follows.
+
+    Raises
+    ------
+    RecordingError
+        Where fewer than five rows have everything that is needed.
+    StateError
+        Where the model belongs to another machine.
+    CompdError
+        Where an effect of the model needs a quantity that the recording does not have.
+
+    Examples
+    --------
+    >>> import compd
+    >>> comparison = compd.compare("monday.csv")
+    >>> round(comparison.rms_um, 2)  # error, um per coordinate
+    0.82
+    >>> round(comparison.floor.um, 2)  # what noise alone would be
+    0.16
+    """
+    aligned = opened_recording(recording)
+    file = opened_model(model, aligned)
+    return compare_aligned(aligned, file.fitted, file.covariance)
+
+
+def diagnose(
+    recording: Recorded,
+    model: Model = None,
+    *,
+    effects: Effects = (),
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Learn which physical effect the model of the machine lacks.
+
+    Every effect of the library, every pair and the best triples are fitted to one part of the recording and tried on
+    rows that were left out; so is every measured quantity, for causes that the library does not have.
+
+    Parameters
+    ----------
+    recording : AlignedRecording, str or Path
+        What to learn from, as for `compare`. Sessions on several days, different loads, temperatures and directions
+        make effects distinguishable.
+    model : ModelFile, str or Path, optional
+        What is known already; its effects are fitted along. The file is not changed.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own, tried beside those that are installed: each an effect, or a source of several as
+        `load_effects` takes it.
+    progress : callable
+        Called with a text when a stage of the search begins. A diagnosis takes seconds.
+
+    Returns
+    -------
+    Diagnosis
+        The verdict with its evidence.
+
+    Raises
+    ------
+    CompdError
+        As `compare`, and as `load_effects` for `effects`.
+
+    Notes
+    -----
+    With ``machine: external`` only those effects of the library are tried that act on what was predicted; the others
+    act inside a machine that compd does not know.
+
+    The selection is by cross-validation over sessions with a penalty for each further effect (M. Stone, J. R. Stat.
+    Soc. B 36 (1974) 111); every threshold stands with its reason in `compd.diagnosis.criteria`.
+
+    Examples
+    --------
+    >>> import compd
+    >>> diagnosis = compd.diagnose("monday.csv")
+    >>> diagnosis.verdict, [step.effect.id for step in diagnosis.steps]
+    ('identified', ['link_expansion'])
+    """
+    aligned = opened_recording(recording)
+    file = opened_model(model, aligned)
+    given = gather_effects(effects)
+    rows = aligned.rows
+    library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
+    candidates = [*library, *given.values()]
+    return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress or (lambda status: None))

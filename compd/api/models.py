@@ -1,0 +1,141 @@
+"""The model of a machine: opened from its file, and with one effect more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
+from compd.configuration.shipped import Machine, load_machine, shipped_names
+from compd.diagnosis import model_changes
+from compd.errors import CompdError, Problem, StateError
+from compd.model.effect import Effect
+from compd.model.library import find_effect, load_library
+from compd.model.library.effects_file import gather_effects, named_effect
+from compd.model_document import read_stored
+from compd.model_file import ModelFile, read_model_file
+from compd.recording.sidecar import EXTERNAL
+
+
+def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
+    """Open a model file: the effects that a machine's model has, with their numbers and the ledger.
+
+    Parameters
+    ----------
+    path : str or Path
+        The model file (YAML), as `ModelFile.write` and `compd effect add` write it.
+    machine : str, Path or Configuration, optional
+        The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
+        the file.
+
+    Returns
+    -------
+    ModelFile
+
+    Raises
+    ------
+    StateError
+        With every problem of the file; or where it belongs to another machine.
+    ConfigurationError
+        Where the machine's configuration cannot be used, or none of this name comes with compd.
+
+    Examples
+    --------
+    >>> import compd
+    >>> model = compd.open_model("tripod.model.yaml")
+    >>> for number in model.numbers():
+    ...     print(number.parameter, round(number.value, 2), number.unit)
+    a 1.11 ppm/K
+    """
+    path = Path(path)
+    if machine is None:
+        name = read_stored(path).machine
+        links = None if name == EXTERNAL else _shipped_links(name, path)
+    else:
+        configuration = load_machine(machine)
+        name, links = configuration.machine, configuration.geometry.links
+    return read_model_file(path, name, links)
+
+
+def add_effect(
+    model: Model,
+    effect: Effect | str | Path | Mapping[str, Any],
+    recording: Recorded,
+    *,
+    effects: Effects = (),
+) -> ModelFile:
+    """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
+
+    Parameters
+    ----------
+    model : ModelFile, str, Path or None
+        The model as it is; None begins a new one. It is not changed, nor is its file: the result is a new model, kept
+        by its `write`.
+    effect : Effect, str, Path or dict
+        An effect of the library or of `effects`, or its id; ``"file.py:NAME"``; a formula as a mapping, such as
+        `EmpiricalFinding.formula_effects` has; the path of a YAML file with one effect, or ``"file.yaml:ID"``.
+    recording : AlignedRecording, str or Path
+        What to fit on.
+    effects : str, Path, Effect, or a sequence of these
+        Effects of your own beside those that are installed, as for `diagnose`.
+
+    Returns
+    -------
+    ModelFile
+        The model with the effect, with standard errors and the joint covariance of all numbers.
+
+    Raises
+    ------
+    StateError
+        Where the model has the effect already, or belongs to another machine.
+    PluginError, ConfigurationError
+        Where there is no such effect, or the formula is faulty.
+    CompdError
+        Where the recording lacks a quantity that the effect needs, or the effect cannot be written into a file.
+
+    Examples
+    --------
+    >>> import compd
+    >>> monday = compd.open_recording("monday.csv")
+    >>> model = compd.add_effect(None, "link_expansion", monday)
+    >>> model.write("tripod.model.yaml")
+    >>> round(compd.compare(monday, model).rms_um, 2)
+    0.18
+    """
+    found = _found(effect, gather_effects(effects))
+    declared = found.declared if isinstance(found.declared, str) else dict(found.declared)
+    aligned = opened_recording(recording)
+    return model_changes.add(opened_model(model, aligned), declared or found.id, found, aligned)
+
+
+def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:
+    """The effect that is to be added, such that a model file can name it. Raises CompdError with every problem."""
+    if isinstance(effect, Mapping):
+        return find_effect(effect, "effect")
+    if not isinstance(effect, Effect):
+        return named_effect(str(effect), "effect", given)
+    if not effect.declared and load_library().get(effect.id) != effect:
+        raise CompdError(
+            Problem(
+                where=f"effect {effect.id}",
+                what="is not installed, so that a model file could not name it",
+                next_step='put it into a file and give "/absolute/file.py:NAME"',
+            )
+        )
+    return effect
+
+
+def _shipped_links(name: str, path: Path) -> int:
+    """Links of the machine that comes with compd under the name in a model file."""
+    if name not in shipped_names():
+        raise StateError(
+            Problem(
+                where=str(path),
+                what="no configuration of its machine comes with compd",
+                value=name,
+                allowed=", ".join([*shipped_names(), EXTERNAL]),
+                next_step='give the configuration: machine="my-machine.yaml"',
+            )
+        )
+    return load_machine(name).geometry.links

@@ -1,0 +1,274 @@
+"""What a comparison of the model with a recording says: residual, noise floor, what each source contributes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import fdtri
+
+from compd.arrays import BoolArray, FloatArray, TextArray, rms
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.contributions import Contribution
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.display_unit import format_error, residual_ending
+from compd.comparison.noise_floor import NoiseFloor
+from compd.comparison.prediction_uncertainty import Uncertainty
+from compd.comparison.residual_trends import Trend
+from compd.json_text import nan_to_null
+from compd.model.effect import FittedEffect
+from compd.model.uncertainty import GaugeNoise
+from compd.recording.reference import sigma_key
+from compd.tables import data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Why a row does not count, beside the reasons of the recording itself.
+NO_QUANTITY = "a quantity that an effect needs is empty"
+OUTLIER = "beyond all noise"
+# Trends that a notebook shows.
+MOST_TRENDS = 4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """One recording of N rows with m measured coordinates against one model.
+
+    Attributes
+    ----------
+    aligned : AlignedRecording
+        The recording with its machine.
+    fitted : tuple of FittedEffect
+        The effects of the model.
+    residual_um : (N, m) array
+        Measured minus modelled, um (or in `aligned.unit`, as all numbers in um); nan where a row cannot be used.
+    used : (N,) array of bool
+        The rows that count.
+    outlier : (N,) array of bool
+        Rows whose residual no noise explains; they are not used.
+    left_out : dict
+        Reason, and the number of rows that cannot be used for it.
+    floor : NoiseFloor
+        What noise alone makes of the residual: `floor.um` per coordinate, `floor.how` says where it is from,
+        `floor.known` whether it was measured or declared.
+    uncertainty : Uncertainty
+        Standard uncertainty of the prediction, um, by gauges and by fitted parameters.
+    gauges : GaugeNoise or None
+        Noise of the gauges; None for an external model.
+    contributions : dict
+        What each source contributes: joints, frame, each effect.
+    trends : tuple of Trend
+        What the residual follows, the strongest first; `trend.text` says it in a sentence.
+    link_residual_um : (N, n) array or None
+        The residual as errors of link lengths, um; None where none can be inferred.
+    attitude_residual_urad : (N, 3) array or None
+        Rotation vector from the modelled to the measured attitude in {M}, urad; None where none was measured.
+    criteria : ComparisonCriteria
+        The thresholds on which it rests, each with unit, meaning and reason.
+    constant_um : (m,) array
+        Constant of each coordinate that was taken off the residual, um: of an external model, or an instrument's frame;
+        zeros for a machine in its own frame.
+    """
+
+    aligned: AlignedRecording
+    fitted: tuple[FittedEffect, ...]
+    residual_um: FloatArray
+    used: BoolArray
+    outlier: BoolArray
+    left_out: Mapping[str, int]
+    floor: NoiseFloor
+    uncertainty: Uncertainty
+    gauges: GaugeNoise | None
+    contributions: Mapping[str, Contribution]
+    trends: tuple[Trend, ...]
+    link_residual_um: FloatArray | None
+    attitude_residual_urad: FloatArray | None
+    criteria: ComparisonCriteria
+    constant_um: FloatArray
+
+    @cached_property
+    def rms_by_axis_um(self) -> FloatArray:
+        """(m,) root mean square of each coordinate over the rows used."""
+        return np.asarray(np.sqrt(np.mean(self.residual_um[self.used] ** 2, axis=0)))
+
+    @property
+    def rms_um(self) -> float:
+        """Root mean square per coordinate, over rows and axes."""
+        return rms(self.rms_by_axis_um)
+
+    @cached_property
+    def distance_um(self) -> FloatArray:
+        """(N,) length of the residual vector; of link lengths, the largest absolute residual."""
+        if self.aligned.of_links:
+            return np.asarray(np.abs(self.residual_um).max(axis=1))
+        return np.asarray(np.linalg.norm(self.residual_um, axis=1))
+
+    @property
+    def floor_ratio(self) -> float:
+        """(rms / floor)^2, which is the reduced chi-squared; 1 at the noise floor, inf where the floor is 0."""
+        return (self.rms_um / self.floor.um) ** 2 if self.floor.um > 0 else math.inf
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether noise alone could have made the floor ratio as large as it is; False where noise is not known.
+
+        By an F test, a ratio of two variances with as many degrees of freedom as measured values and as the floor
+        rests on.
+        """
+        if not self.floor.known:
+            return False
+        numbers = float(self.used.sum() * len(self.aligned.labels))
+        dof = min(self.floor.dof, 1e9)
+        return self.floor_ratio <= float(fdtri(numbers, dof, self.criteria.at_floor_confidence))
+
+    @property
+    def verdict(self) -> str:
+        """The result in a sentence or two, for a person at the machine."""
+        unit = self.aligned.unit
+        error, noise = format_error(self.rms_um, unit, 3), format_error(self.floor.um, unit, 3)
+        who = f"{self.aligned.recording.machine}: measured and modelled differ by {error} (rms per coordinate)"
+        if not self.floor.known:
+            return (
+                f"{who}. How much of it is noise cannot be known: measure one point twice, with the same number in the "
+                f"column `visit`, or declare the reference's uncertainty, `{sigma_key(unit)}`."
+            )
+        if self.at_floor:
+            return f"{who}, which is the noise of the measurement itself ({noise}): nothing is missing."
+        share = 1 - 1 / self.floor_ratio
+        return (
+            f"{who}; noise alone would be {noise}. {100 * share:.0f} % of the squared error has a cause that the model "
+            "does not have."
+        )
+
+    @property
+    def why_left_out(self) -> TextArray:
+        """(N,) why each row is not used, in words; "" for a row that is used."""
+        reason = self.aligned.usable.reason.copy()
+        reason[(reason == "") & ~np.isfinite(self.residual_um).all(axis=1)] = NO_QUANTITY
+        reason[self.outlier] = OUTLIER
+        return reason
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per row of the recording, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            N rows: `row`, the row as a spreadsheet shows it; `time_s`; for each measured coordinate `residual_x_um`
+            (or `residual_link_1_um`; in another unit `residual_x_arcsec` ...), measured minus modelled, nan where a row
+            cannot be used; `used` and `outlier`, true or false; `why_left_out`, the reason in words or an empty text.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        names, ending = self.aligned.label_names, residual_ending(self.aligned.unit)
+        return data_frame(
+            {
+                "row": self.aligned.recording.row,
+                "time_s": self.aligned.recording.time_s,
+                **{f"residual_{name}_{ending}": self.residual_um[:, k] for k, name in enumerate(names)},
+                "used": self.used,
+                "outlier": self.outlier,
+                "why_left_out": self.why_left_out,
+            }
+        )
+
+    def _repr_html_(self) -> str:
+        size_um, ending = np.abs(self.residual_um[self.used]), residual_ending(self.aligned.unit)
+        table = {
+            "coordinate": self.aligned.labels,
+            f"rms_{ending}": self.rms_by_axis_um.tolist(),
+            f"noise_floor_{ending}": self.floor.by_axis_um.tolist(),
+            f"95_percent_{ending}": np.quantile(size_um, 0.95, axis=0).tolist(),
+            f"largest_{ending}": size_um.max(axis=0).tolist(),
+        }
+        remarks = [
+            f"{int(self.used.sum())} rows used, {len(self.used) - int(self.used.sum())} not. "
+            f"Noise floor: {self.floor.how}.",
+            *([self.floor.contradiction] if self.floor.contradiction else []),
+            *(trend.text for trend in self.trends[:MOST_TRENDS]),
+        ]
+        return html_table(self.verdict, table, remarks)
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self.verdict}>"
+
+    def as_json(self) -> dict[str, Any]:
+        """What `compd compare --json` prints, as plain data; nan and inf are None.
+
+        Keys that end in `_um` hold numbers in `unit`, which is um unless the sidecar names another.
+        """
+        recording = self.aligned.recording
+        size = np.abs(self.residual_um[self.used])
+        distance = self.distance_um[self.used]
+        excluded = recording.rows - int(self.used.sum()) + sum(recording.left_out.values())
+        report: dict[str, Any] = {
+            "recording": str(recording.path),
+            "sha256": recording.sha256,
+            "machine": recording.machine,
+            "unit": self.aligned.unit,
+            "effects": [effect.effect.id for effect in self.fitted],
+            "axes": list(self.aligned.labels),
+            "residual_rms_um": self.rms_um,
+            "residual_rms_xyz_um": self._by_axis(self.rms_by_axis_um),
+            "constant_xyz_um": self._by_axis(self.constant_um),
+            "residual_mean_xyz_um": self._by_axis(self.residual_um[self.used].mean(axis=0)),
+            "residual_p95_xyz_um": self._by_axis(np.quantile(size, 0.95, axis=0)),
+            "residual_max_xyz_um": self._by_axis(size.max(axis=0)),
+            "residual_3d_um": {
+                "rms": rms(distance),
+                "p95": float(np.quantile(distance, 0.95)),
+                "max": float(distance.max()),
+            },
+            "noise_floor_um": self.floor.um,
+            "noise_floor_xyz_um": self._by_axis(self.floor.by_axis_um),
+            "noise_floor_source": self.floor.source,
+            "noise_floor_how": self.floor.how,
+            "noise_floor_remark": self.floor.contradiction,
+            "floor_ratio": self.floor_ratio,
+            "at_floor": self.at_floor,
+            "rows_used": int(self.used.sum()),
+            "rows_excluded": excluded,
+            "excluded_by_reason": {**self.left_out, **self._outlier_count()},
+            "outlier_rows": recording.row[self.outlier].tolist(),
+            "contributions": {source: part._asdict() for source, part in self.contributions.items()},
+            "prediction_std_um": {
+                "total": rms(self.uncertainty.total_um[self.used]),
+                "gauges": rms(self.uncertainty.gauges_um[self.used]),
+                "parameters": rms(self.uncertainty.parameters_um[self.used]),
+                "how": "no gauges of its own" if self.gauges is None else self.gauges.how,
+            },
+            "where_it_fails": [trend.as_json() for trend in self.trends],
+            "verdict": self.verdict,
+        }
+        if self.aligned.registered:
+            report["registration"] = self._registration()
+        if self.attitude_residual_urad is not None:
+            attitude_urad = self.attitude_residual_urad[self.used]
+            report["attitude_rms_urad"] = float(np.sqrt(np.nanmean(attitude_urad**2)))
+        finite: dict[str, Any] = nan_to_null(report)
+        return finite
+
+    def _by_axis(self, values: FloatArray) -> dict[str, float]:
+        return {label: float(value) for label, value in zip(self.aligned.labels, values, strict=True)}
+
+    def _outlier_count(self) -> dict[str, int]:
+        count = int(self.outlier.sum())
+        return {OUTLIER: count} if count else {}
+
+    def _registration(self) -> dict[str, Any]:
+        registration = self.aligned.registration
+        if registration is None:
+            return {"how": "displacements and small rotations fitted along"}
+        return {
+            "how": "laid over the prediction, six parameters fitted along",
+            "translation_mm": registration.translation_mm.tolist(),
+            "rotation": registration.rotation.tolist(),
+        }

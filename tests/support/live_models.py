@@ -1,0 +1,49 @@
+"""Models for a live machine: files of effects, thermometers that warm up, gauges with declared noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from compd.live.loop.model_loader import Models
+from compd.model.effect import FittedEffect
+from compd.model.library import find_effect
+from compd.model_file import ModelFile
+from tests.support.live_machine import Machine
+
+
+def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Path:
+    """A model file with these effects; numbers by id, else ones."""
+    fitted = []
+    for declaration in declared:
+        effect = find_effect(declaration, "here")
+        columns = effect.columns(links)
+        numbers = np.broadcast_to(theta.get(effect.id, 1.0), (len(columns),)).astype(float)
+        shape = {constant.name: constant.grid[0] for constant in effect.constants}
+        fitted.append(FittedEffect(effect, numbers, shape))
+    count = sum(len(effect.theta) for effect in fitted)
+    ModelFile(name, links, tuple(declared), tuple(fitted), np.eye(count) * 1e-2).write(path)
+    return path
+
+
+def thermal(live: Machine, tmp_path: Path, effect="link_expansion") -> Models:
+    return Models(live.loader.read(file_with(tmp_path / "thermal.yaml", effect, **{effect: 10.0})))
+
+
+def warm(live: Machine, degC: float) -> None:
+    """Every thermometer, which the machine's own gauges leave at 20 degC."""
+    step = live.latest.put
+
+    def put(slot, reading):
+        thermometer = live.latest.channels[slot] not in live.change_mm
+        step(slot, reading._replace(value=degC) if thermometer and reading.ok else reading)
+
+    live.latest.put = put
+
+
+def with_noise(live: Machine, um: float) -> Machine:
+    loaded = live.configuration
+    gauges = {name: options.model_copy(update={"noise_um": um}) for name, options in loaded.gauges.items()}
+    return Machine(replace(loaded, gauges=gauges))
