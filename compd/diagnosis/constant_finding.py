@@ -1,9 +1,8 @@
-"""The constant in a diagnosis: the effect that is named in its place, and what is reported of it beside effects."""
+"""The constant in a diagnosis: its values, and the effects that it may come from."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,17 +11,6 @@ from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.rivals import find_rivals
 from compd.model.effect import FittedEffect
-
-
-def name_constant(explanation: Explanation) -> Explanation:
-    """Where nothing but a constant was found, the effect that makes it best in its place, with its rivals.
-
-    Beside effects that vary a constant is told on a line of its own; alone, it is what is wrong with the machine.
-    """
-    if len(explanation.members) != 1 or not explanation.constants:
-        return explanation
-    family = find_rivals(explanation.losses, explanation.members, explanation.constants[0])
-    return replace(explanation, members=(family[0].member,)) if family else explanation
 
 
 def describe_constant(

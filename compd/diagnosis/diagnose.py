@@ -17,10 +17,11 @@ from compd.diagnosis.candidate_results import candidate_results, explained_fract
 from compd.diagnosis.candidates.candidates import library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
-from compd.diagnosis.constant_finding import describe_constant, name_constant
+from compd.diagnosis.constant_finding import describe_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.naming import named_members
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.search.gross_rows import gross_rows
@@ -101,7 +102,8 @@ def explain_residual(
     members = [explanation.losses.candidates[k] for k in explanation.members]
     weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
-    return name_constant(explain_again(problem, explanation, progress))
+    explanation = explain_again(problem, explanation, progress)
+    return replace(explanation, members=named_members(explanation.losses, explanation.members))
 
 
 def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
