@@ -94,7 +94,7 @@ class EmpiricalFinding:
         Of a ``"change"``, the effect of the library that begins or changes; of a ``"proxy"``, the effect whose own
         temperature was not measured and that `covariate` stands for; ``""`` for every other form.
     time_s : float
-        Of a ``"change"``, when, on the recording's clock, s; nan for every other form.
+        Of a ``"change"`` and a ``"step"``, when, on the recording's clock, s; nan for every other form.
     """
 
     covariate: str

@@ -81,14 +81,14 @@ def chance_clause(p_values: Sequence[float]) -> str:
 
 
 def is_change(finding: EmpiricalFinding) -> bool:
-    """Whether something changed in the middle of the recording."""
-    return finding.form == "change"
+    """Whether something changed in the middle of the recording: an effect, or everything at once."""
+    return finding.form == "change" or (finding.form == "step" and not finding.beside)
 
 
 def short_name(finding: EmpiricalFinding) -> str:
     """A finding by a name, for tables and bars: its covariates, or the effect that changes or that it stands for."""
     if is_change(finding):
-        return f"a change of {finding.effect}"
+        return f"a change of {finding.effect}" if finding.effect else "a step in time"
     names = " with ".join([finding.covariate, *finding.beside])
     return f"{names}, as {finding.effect}" if finding.effect else names
 
@@ -114,7 +114,10 @@ def rivals_text(step: DiagnosisStep) -> str:
 
 def change_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
     """A change in the middle of a recording: "from 6000 s on (row 410) backlash is larger"."""
-    return f"from {moment_text(finding, diagnosis)} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+    moment = moment_text(finding, diagnosis)
+    if not finding.effect:
+        return f"from {moment} every row is shifted alike"
+    return f"from {moment} {finding.effect} {_how_it_changed(finding, diagnosis)}"
 
 
 def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:

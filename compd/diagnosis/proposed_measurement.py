@@ -7,6 +7,7 @@ from typing import Any
 from compd.diagnosis.explanation import Explanation
 from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
+from compd.diagnosis.phrases import is_change
 from compd.diagnosis.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis
 
@@ -35,11 +36,12 @@ def propose_measurement(
     if likely:
         return measurement_to_test(aligned, fitted, likely[0], problem.sigma_um).as_json()
     for finding in diagnosis.depends_on[:1]:
-        if finding.form == "change":
+        if is_change(finding):
             return [
                 {
                     "measure": "some of the first rows once more: is the machine as it was then?",
-                    "why": f"{finding.effect} changed at {finding.time_s:.0f} s: look what happened there",
+                    "why": f"{finding.effect or 'everything'} changed at {finding.time_s:.0f} s: look what happened "
+                    "there",
                 }
             ]
     if not problem.floor_known:
