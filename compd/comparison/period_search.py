@@ -82,14 +82,31 @@ def promising_constants(
     return PromisingConstants(trials[:count], search.independent)
 
 
+def longest_period(effect: Effect, constant: Constant, aligned: AlignedRecording) -> float:
+    """The longest period that is seen to repeat: the rows cover a turn of it, to a quarter of one.
+
+    Over less a sine of any period and phase is a slope and a bend, and would take the place of what makes these.
+    """
+    return min(constant.high, _span(effect, constant, aligned) / (1 - QUARTER_TURN))
+
+
 def neighbouring_periods(
     effect: Effect, constant: Constant, aligned: AlignedRecording, period: float
 ) -> tuple[float, float]:
-    """The periods a quarter of a turn away over the range of the quantity: there a period fits half as well at best."""
-    quantity = column_values(aligned.rows, constant.period_of, effect.ports[0])
-    turns = float(np.nanmax(quantity) - np.nanmin(quantity)) / period
+    """The periods a quarter of a turn away over the range of the quantity: there a period fits half as well at best.
+
+    None is beyond what is plausible, or too long to be seen to repeat.
+    """
+    turns = _span(effect, constant, aligned) / period
     share = min(QUARTER_TURN / max(turns, QUARTER_TURN), 0.5)
-    return period / (1 + share), period / (1 - share)
+    longest = max(longest_period(effect, constant, aligned), period)
+    return max(period / (1 + share), min(constant.low, period)), min(period / (1 - share), longest)
+
+
+def _span(effect: Effect, constant: Constant, aligned: AlignedRecording) -> float:
+    """How far the quantity of a period ranges."""
+    quantity = column_values(aligned.rows, constant.period_of, effect.ports[0])
+    return float(np.nanmax(quantity) - np.nanmin(quantity))
 
 
 def _at_places(

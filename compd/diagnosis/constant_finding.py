@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from compd.arrays import FloatArray
 from compd.diagnosis.findings import ConstantFinding
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
@@ -14,11 +15,12 @@ from compd.model.effect import FittedEffect
 
 
 def describe_constant(
-    problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect]
+    problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect], constant_um: FloatArray
 ) -> ConstantFinding | None:
     """The constant that was taken off or found, and the effects that it may come from; None where there is none.
 
-    named : the fitted effect of each named member.
+    named : the fitted effect of each named member.  constant_um : (m,) what was taken off beside these: the mean of
+    what an effect does is the effect's.
     """
     aligned, losses = problem.aligned, explanation.losses
     if explanation.constants:
@@ -27,7 +29,7 @@ def describe_constant(
         rivals = find_rivals(losses, explanation.members, member)
         effects = [losses.candidates[rival.member].effect for rival in rivals]
     elif aligned.registration_columns.shape[2] and not aligned.registered:
-        values, std = problem.comparison.constant_um, np.full(len(aligned.labels), np.nan)
+        values, std = constant_um, np.full(len(aligned.labels), np.nan)
         effects = [candidate.effect for candidate in problem.same_as_nuisance]
     else:
         return None

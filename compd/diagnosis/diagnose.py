@@ -134,7 +134,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         steps,
         candidates,
         describe_remainder(problem, explanation) if above else (),
-        constant=describe_constant(problem, explanation, named),
+        constant=describe_constant(problem, explanation, named, after.constant_um),
         gross=gross_rows(problem.gross, aligned.recording.row),
         untested=_untested(problem, explanation, steps),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),

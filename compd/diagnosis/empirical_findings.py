@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -131,7 +132,8 @@ class _Remainder:
         parts.sort(key=lambda part: -part[0])
         least = DIRECTION_SHARE * sum(part[0] for part in parts)
         kept = [part for part in parts if part[0] >= least]
-        main = next(fit for fit in fits if fit.term.covariate == parts[0][1]).term
+        main_fit = next(fit for fit in fits if fit.term.covariate == parts[0][1])
+        main = main_fit.term
         return EmpiricalFinding(
             covariate=main.covariate,
             form=main.form,
@@ -147,6 +149,7 @@ class _Remainder:
                 for fit in fits
                 if fit.constant is not None
             ),
+            time_s=main_fit.constant if main.form == "step" and main_fit.constant is not None else math.nan,
         )
 
     def _losses(self, families: Sequence[Sequence[EmpiricalFit]]) -> FloatArray:

@@ -121,7 +121,7 @@ class EmpiricalFinding:
         Of a ``"change"``, the effect of the library that begins or changes; of a ``"proxy"``, the effect whose own
         temperature was not measured and that `covariate` stands for; ``""`` for every other form.
     time_s : float
-        Of a ``"change"``, when, on the recording's clock, s; nan for every other form.
+        Of a ``"change"`` and a ``"step"``, when, on the recording's clock, s; nan for every other form.
     constants : tuple of NonlinearConstant
         The nonlinear constants of its terms, which the formulas have as numbers.
     """
@@ -138,6 +138,11 @@ class EmpiricalFinding:
     effect: str = ""
     time_s: float = math.nan
     constants: tuple[NonlinearConstant, ...] = ()
+
+    @property
+    def is_change(self) -> bool:
+        """Whether something changed in the middle of the recording: an effect, or every row alike."""
+        return self.form == "change" or (self.form == "step" and not self.beside)
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict's `depends_on`."""

@@ -35,11 +35,12 @@ def propose_measurement(
     if likely:
         return measurement_to_test(aligned, fitted, likely[0], problem.sigma_um).as_json()
     for finding in diagnosis.depends_on[:1]:
-        if finding.form == "change":
+        if finding.is_change:
             return [
                 {
                     "measure": "some of the first rows once more: is the machine as it was then?",
-                    "why": f"{finding.effect} changed at {finding.time_s:.0f} s: look what happened there",
+                    "why": f"{finding.effect or 'everything'} changed at {finding.time_s:.0f} s: look what happened "
+                    "there",
                 }
             ]
     if not problem.floor_known:

@@ -126,9 +126,11 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
 )
 # With `machine: external` there is also a column model_... for every column reference_...; and anything else that was
 # measured is a column <name>_<unit>.
-# A name that begins like a column of the format but is none: probably misspelt, so no covariate.
+# A name that begins like a column of the format but is none: probably misspelt, so no covariate. The angle of a robot's
+# joint or of a rotary table, joint_1_deg, is no comparator's or scale's length.
 _RESERVED = re.compile(
-    r"(?:reference|model|approach)(?![a-z])|(?:scale|joint)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
+    r"(?:reference|model|approach)(?![a-z])"
+    r"|(?:scale|joint)(?!_[1-9]\d*_(?:rad|mrad|urad|deg|arcsec)$)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
     r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
 )
 _COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")

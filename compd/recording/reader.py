@@ -58,7 +58,9 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
                 where=str(sidecar_path),
                 what="names no reference",
                 allowed="`reference:` with its `quantity:`",
-                next_step="put an instrument's export beside the gauges with `compd join`",
+                next_step="write reference: {quantity: tool_position, frame: machine}"
+                if sidecar.external
+                else "put an instrument's export beside the gauges with `compd join`",
             )
         )
     table_problems = ProblemList(path)

@@ -24,7 +24,10 @@ EXTERNAL = "external"
 TIME, PLACE = "time", "place"
 
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
-_EXAMPLE = "machine: tripod-cmm, and under it reference: {quantity: tool_position, frame: machine}"
+_EXAMPLE = (
+    "machine: tripod-cmm, or `machine: external` for columns model_... of a model of your own; under it reference: "
+    "{quantity: tool_position, frame: machine}"
+)
 # Row 1 is the header.
 _FIRST_ROW = 2
 

@@ -14,7 +14,6 @@ from compd.diagnosis.words.error_fall import ErrorFall
 from compd.diagnosis.words.phrases import (
     change_text,
     gross_texts,
-    is_change,
     parameter_texts,
     short_name,
     untested_here,
@@ -80,7 +79,7 @@ def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
     """What the rest follows, and what changed, the strongest first."""
     rows = [
         (
-            change_text(finding, diagnosis) if is_change(finding) else short_name(finding),
+            change_text(finding, diagnosis) if finding.is_change else short_name(finding),
             _form(finding),
             finding.port,
             percent_text(finding.explained_fraction),

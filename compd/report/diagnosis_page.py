@@ -13,7 +13,6 @@ from compd.diagnosis.findings import EmpiricalFinding
 from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
-from compd.diagnosis.words.phrases import is_change
 from compd.diagnosis.words.summary_lines import summary_lines
 from compd.model.effect import FittedEffect
 from compd.model.library import find_effect
@@ -71,7 +70,7 @@ def _step_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
 
 def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     """Gross rows and changes in time, where there are any."""
-    if not diagnosis.gross.rows and not any(map(is_change, diagnosis.depends_on)):
+    if not diagnosis.gross.rows and not any(finding.is_change for finding in diagnosis.depends_on):
         return []
     caption = "The error that is left; dashed lines are changes."
     if diagnosis.gross.rows:

@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 from compd.arrays import FloatArray, IntArray
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall
-from compd.diagnosis.words.phrases import change_text, is_change
+from compd.diagnosis.words.phrases import change_text
 from compd.recording.recording import Recording
 from compd.report.page import COLOURS, style_figure
 from compd.report.small_multiples import SERIES_COLOURS, dot_style, thin
@@ -44,7 +44,7 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
         figure.add_trace(crosses, row=k + 1, col=1)
         span = [-1.08 * edge, 1.08 * edge]
         figure.update_yaxes(title_text=f"error in {label}, {fall.unit}", range=span, row=k + 1, col=1)
-    for finding in filter(is_change, diagnosis.depends_on):
+    for finding in [finding for finding in diagnosis.depends_on if finding.is_change]:
         moment = float(np.interp(finding.time_s, recording.time_s, x))
         figure.add_vline(moment, line={"dash": "dash", "color": "black"})
         text = change_text(finding, diagnosis)

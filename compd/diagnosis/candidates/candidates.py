@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.period_search import promising_constants
+from compd.comparison.period_search import longest_period, promising_constants
 from compd.diagnosis.criteria import Criteria
 from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_needs import unmet_needs
@@ -86,7 +86,11 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
             untestable[effect.id] = reason
             continue
         grid = effect.constant_grid(aligned.rows)
-        variants = [variant(effect, constants, aligned, searched_parameters(effect, grid)) for constants in grid]
+        searched, seen = searched_parameters(effect, grid), _seen_to_repeat(effect, grid, aligned)
+        if not seen:
+            untestable[effect.id] = "the rows cover less than one period of it: measure over a longer way"
+            continue
+        variants = [variant(effect, constants, aligned, searched) for constants in seen]
         reason = _reason_for_no_motion(variants, usable)
         if reason:
             untestable[effect.id] = reason
@@ -109,6 +113,17 @@ def periodic_candidates(
             variant(effect, constants, aligned, promising.searched_parameters) for constants in promising.constants
         ]
     return candidates
+
+
+def _seen_to_repeat(
+    effect: Effect, grid: Sequence[dict[str, float]], aligned: AlignedRecording
+) -> Sequence[dict[str, float]]:
+    """Values of the nonlinear constants without the searched periods of which the rows cover less than one."""
+    for constant in effect.constants:
+        if constant.period_of and len({constants[constant.name] for constants in grid}) > 1:
+            longest = longest_period(effect, constant, aligned)
+            grid = [constants for constants in grid if constants[constant.name] <= longest]
+    return grid
 
 
 def searched_parameters(effect: Effect, grid: Sequence[ConstantValues]) -> int:

@@ -18,10 +18,13 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
     other is a rival where its parameters are plausible, it takes most of what the member takes, and the difference is
     below an effect's price or may be chance::
 
-        L_other - L <= rival_share (L_without - L)
+        L_other - min(L, L_both) <= rival_share (L_without - L)
         l_other - l <= effect_price   or   L_other - L <= least_sigmas std(L_other - L)
 
-    All three sets have the constant wherever the member is worth its price beside it, so that rivals are the same
+    L_both is the loss with the member beside the other: where that still gains, the other takes another part of the
+    error, however large, and none of the member's.
+
+    All sets have the constant wherever the member is worth its price beside it, so that rivals are the same
     whether or not one was added to the measured values: a constant tells no effects apart.
 
     Where the set is at the floor and the noise known, what may be chance has to be at the floor too.
@@ -40,7 +43,8 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         name = losses.candidates[k].effect.id
         if name in [rival.name for rival in rivals]:
             continue
-        if subset.cv_loss - loss > criteria.rival_share * (without - loss):
+        missed = subset.cv_loss - min(loss, losses.loss((*key, member)))
+        if missed > criteria.rival_share * (without - loss):
             continue
         more_general = losses.candidates[k].parameter_count > losses.candidates[member].parameter_count
         excess, std = losses.gain(members, key)

@@ -7,7 +7,6 @@ from compd.diagnosis.words.error_fall import ErrorFall
 from compd.diagnosis.words.phrases import (
     best_description,
     is_best_a_change,
-    is_change,
     moment_text,
     thermal_in_one_session,
     untested_here,
@@ -23,7 +22,7 @@ MEASURE_TWICE = "measure one point twice (two rows with the same number in a `vi
 def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """Clauses, the most urgent first."""
     clauses = [] if fall.noise_known else [MEASURE_TWICE]
-    changes = [moment_text(finding, diagnosis) for finding in diagnosis.depends_on if is_change(finding)]
+    changes = [moment_text(finding, diagnosis) for finding in diagnosis.depends_on if finding.is_change]
     clauses += [f"find out what changed from {moment}" for moment in changes[:1]]
     match diagnosis.verdict:
         case "identified":

@@ -77,15 +77,10 @@ def chance_clause(p_values: Sequence[float]) -> str:
     return f"noise alone does{each} {chance_text(max(known))}"
 
 
-def is_change(finding: EmpiricalFinding) -> bool:
-    """Whether something changed in the middle of the recording."""
-    return finding.form == "change"
-
-
 def short_name(finding: EmpiricalFinding) -> str:
     """A finding by a name, for tables and bars: its covariates, or the effect that changes or that it stands for."""
-    if is_change(finding):
-        return f"a change of {finding.effect}"
+    if finding.is_change:
+        return f"a change of {finding.effect}" if finding.effect else "a step in time"
     names = " with ".join([finding.covariate, *finding.beside])
     return f"{names}, as {finding.effect}" if finding.effect else names
 
@@ -111,7 +106,10 @@ def rivals_text(step: DiagnosisStep) -> str:
 
 def change_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
     """A change in the middle of a recording: "from 6000 s on (row 410) backlash is larger"."""
-    return f"from {moment_text(finding, diagnosis)} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+    moment = moment_text(finding, diagnosis)
+    if not finding.effect:
+        return f"from {moment} every row is shifted alike"
+    return f"from {moment} {finding.effect} {_how_it_changed(finding, diagnosis)}"
 
 
 def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
@@ -196,7 +194,7 @@ def best_description(diagnosis: Diagnosis) -> EmpiricalFinding | None:
 
 def is_best_a_change(diagnosis: Diagnosis) -> bool:
     """Whether a change in time describes the rest better than anything that it follows."""
-    return any(is_change(finding) for finding in diagnosis.depends_on[:1])
+    return any(finding.is_change for finding in diagnosis.depends_on[:1])
 
 
 def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:

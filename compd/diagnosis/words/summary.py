@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
-from compd.diagnosis.words.phrases import change_text, followed_text, is_change, rivals_text, was_any_tried
+from compd.diagnosis.words.phrases import change_text, followed_text, rivals_text, was_any_tried
 from compd.number_text import join_words, number_text
 
 CANNOT_KNOW = "how much of it is noise cannot be known"
@@ -50,6 +50,6 @@ def _rest(diagnosis: Diagnosis, what: str) -> list[str]:
         return []
     fall, finding = error_fall(diagnosis), diagnosis.depends_on[0]
     left = f"to describe that leaves {number_text(finding.heldout_rms_um, fall.unit)}, and names no cause"
-    if is_change(finding):
+    if finding.is_change:
         return [f"Something changed: {change_text(finding, diagnosis)}; {left}."]
     return [f"{what} follows {followed_text(finding)}: {left}."]

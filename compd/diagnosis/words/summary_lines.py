@@ -15,7 +15,6 @@ from compd.diagnosis.words.phrases import (
     followed_text,
     gross_texts,
     is_best_a_change,
-    is_change,
     parameter_texts,
     physics_clause,
     rivals_text,
@@ -126,7 +125,7 @@ def _found(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 
 
 def _changed(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
-    changes = [finding for finding in diagnosis.depends_on if is_change(finding)]
+    changes = [finding for finding in diagnosis.depends_on if finding.is_change]
     clauses = [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MOST_NAMED]]
     return [
         *clauses,

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from compd.cli.measurements.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
+from compd.recording.columns import is_covariate
 from compd.recording.reader import check_against, read_recording
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
@@ -34,6 +35,13 @@ from tests.support.recordings import (
 TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
 EXAMPLES = ("elastic-and-backlash", "link-expansion", "not-in-the-library", "nothing-missing", "plate-bending")
 NO_REFERENCE = drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm")
+
+
+@pytest.mark.parametrize("name", ["joint_1_deg", "joint_6_rad", "scale_2_arcsec"])
+def test_the_angle_of_a_joint_is_no_misspelt_length(name: str) -> None:
+    """A robot's joints are recorded in degrees: no comparator shows these."""
+    assert is_covariate(name)
+    assert not is_covariate(name.rsplit("_", 1)[0] + "_mm")
 
 
 @pytest.mark.parametrize("part", ["train", "valid"])

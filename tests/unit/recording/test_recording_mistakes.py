@@ -130,6 +130,10 @@ SIDECARS: dict[str, tuple[str, list[str]]] = {
     "unknown key": (SIDECAR + "machin: x\n", ["run.yaml:6 machin: unknown key", "did you mean `machine`?"]),
     "no machine": (SIDECAR.replace("machine: tripod-cmm\n", ""), ["names no machine"]),
     "no reference": ("machine: tripod-cmm\n", ["names no reference", "compd join"]),
+    "no reference of a model of one's own": (
+        "machine: external\n",
+        ["names no reference", "write reference: {quantity"],
+    ),
     "unknown quantity": (SIDECAR.replace("tool_position", "tip"), ["quantity", "'tip'", "tool_pose, link_length"]),
     "no frame": (SIDECAR.replace("  frame: machine\n", ""), ["reference.frame: is missing", "machine, instrument"]),
     "sigma 0": (SIDECAR.replace("0.15", "0"), ["sigma_um", "greater than 0"]),
@@ -185,6 +189,7 @@ def test_missing_sidecar_does_not_hide_the_rows_mistakes(tmp_path: Path) -> None
     path.with_suffix(".yaml").unlink()
     message = "\n".join(problems_of(path))
     assert "the sidecar is missing" in message
+    assert "`machine: external` for columns model_" in message
     assert "joint_4_um (J), row 7" in message
 
 

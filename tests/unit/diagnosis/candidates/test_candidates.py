@@ -9,7 +9,13 @@ import pytest
 
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.open import open_recording
-from compd.diagnosis.candidates.candidates import CHOICE, LEAST_MOTION_UM, SEARCHED_CONSTANT, library_pool
+from compd.diagnosis.candidates.candidates import (
+    CHOICE,
+    LEAST_MOTION_UM,
+    SEARCHED_CONSTANT,
+    CandidatePool,
+    library_pool,
+)
 from compd.diagnosis.criteria import Criteria
 from compd.units import UM_PER_MM
 from tests.support.candidate_sets import candidate, columns
@@ -83,6 +89,30 @@ def test_a_few_empty_cells_leave_an_effect_in_and_many_do_not(tmp_path: Path, em
     assert bool(pool.candidates) == competes
     if not competes:
         assert pool.untestable == {"bed": "what it needs is empty in 11 % of the rows"}
+
+
+def test_a_searched_period_has_to_be_seen_to_repeat(tmp_path: Path) -> None:
+    """A sine of 50 mm over 30 mm is a slope with a bend: it took the place of a wrong lead."""
+    size = {"unit": "um", "plausible": [-50, 50], "source": "a test"}
+    cycle = along(
+        "x",
+        "cycle",
+        "a * sin(2 * pi * tip_x_mm / p) + b * cos(2 * pi * tip_x_mm / p)",
+        parameters={"a": size, "b": size, "p": {"unit": "mm", "plausible": [0.2, 50], "source": "a test"}},
+    )
+    places = np.linspace(-15, 15, ROWS)
+
+    def over(path: Path, share: float) -> CandidatePool:
+        still = {"x": np.zeros(ROWS)}
+        return library_pool(record_external(path, {}, still, model_mm={"x": share * places}), [cycle], ())
+
+    pool = over(tmp_path / "run.csv", 1.0)
+    assert pool.candidates
+    assert max(each.constants["p"] for each in pool.candidates) < 40
+    assert {each.searched_parameters for each in pool.candidates} == {SEARCHED_CONSTANT}
+    pool = over(tmp_path / "short.csv", 1e-3)
+    assert not pool.candidates
+    assert "less than one period" in pool.untestable["cycle"]
 
 
 def test_an_instruments_frame_is_no_candidate_where_it_is_fitted_along(tmp_path: Path) -> None:

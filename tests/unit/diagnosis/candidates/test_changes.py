@@ -11,6 +11,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, library_pool
 from compd.diagnosis.candidates.changes import MOMENTS, change_candidates, moments_s
 from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 
@@ -66,6 +67,21 @@ def test_play_that_begins_is_a_change_alone(tmp_path: Path) -> None:
     change = diagnosis.depends_on[0]
     assert (change.form, change.effect, change.time_s) == ("change", "play", 1200.0)
     assert diagnosis.steps == ()
+
+
+def test_all_that_is_shifted_from_a_row_on_is_a_change_with_its_time(tmp_path: Path) -> None:
+    """A knocked mirror: no effect changes, and time drives nothing."""
+    rng = np.random.default_rng(1)
+    moved = rng.choice([-1.0, 1.0], ROWS)
+    shift = np.where(np.arange(ROWS) < 150, 0.0, 9.0)
+    aligned = record_external(tmp_path / "run.csv", {"moved_1": moved}, {"x": 2.0 * moved + shift})
+    diagnosis = diagnose(aligned, (), None, [PLAY])
+    finding = diagnosis.depends_on[0]
+    assert (finding.form, finding.covariate) == ("step", "time_s")
+    assert finding.time_s == pytest.approx(1500.0, abs=50.0)
+    text = "\n".join(summary_lines(diagnosis))
+    assert f"from {finding.time_s:.0f} s on (row 153) every row is shifted alike" in text
+    assert "find out what changed" in text
 
 
 def test_play_that_stays_has_no_change(tmp_path: Path) -> None:

@@ -107,6 +107,13 @@ def test_a_constant_changes_nothing_but_the_line_that_tells_it(tmp_path: Path, s
     assert shifted.constant.by_axis_um["x"] - plain.constant.by_axis_um["x"] == pytest.approx(shift_um, abs=0.01)
 
 
+def test_the_mean_of_what_an_effect_does_is_no_part_of_it(tmp_path: Path) -> None:
+    """The gain of the stage is 1 um on average, which is the gain's."""
+    constant = diagnose(stage(tmp_path / "run.csv", 7.0), (), None, [GAIN, PLAY]).constant
+    assert constant is not None
+    assert constant.by_axis_um["x"] == pytest.approx(7.0, abs=0.2)
+
+
 def test_the_family_of_effects_that_may_have_made_it_is_told(tmp_path: Path) -> None:
     diagnosis = diagnose(stage(tmp_path / "run.csv", 7.0), (), None, [GAIN, PLAY, OFFSET, ZERO])
     assert diagnosis.constant is not None

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.diagnosis.candidates.candidates import library_pool
+from compd.diagnosis.candidates.candidates import library_pool, variant
 from compd.diagnosis.candidates.refined_constants import BETWEEN, refined_variants
+from compd.diagnosis.diagnose import diagnose
 from tests.support.external_recordings import along, record_external
+from tests.support.hidden_effects import LIBRARY, record_with_effects
 
 LAG = along(
     "z",
@@ -56,6 +60,54 @@ def test_a_second_round_goes_between_refined_values(aligned: AlignedRecording) -
     widest = max(abs(np.log(each.constants["tau"] / candidates[1].constants["tau"])) for each in again)
     nearest = min(abs(np.log(each.constants["tau"] / candidates[1].constants["tau"])) for each in first)
     assert widest < nearest
+
+
+CYCLE = along(
+    "z",
+    "cycle",
+    "a * sin(2 * pi * way_mm / p) + b * cos(2 * pi * way_mm / p)",
+    parameters={
+        "a": {"unit": "um", "plausible": [-100, 100], "source": "a test"},
+        "b": {"unit": "um", "plausible": [-100, 100], "source": "a test"},
+        "p": {"unit": "mm", "plausible": [10, 400], "source": "a test"},
+    },
+)
+
+
+def test_a_period_is_refined_within_a_quarter_of_a_turn(tmp_path: Path) -> None:
+    aligned = record_external(tmp_path / "run.csv", {"way_mm": np.linspace(0, 300, 200)}, {"z": np.zeros(200)})
+    (chosen,) = [variant(CYCLE, {"p": 75.0}, aligned, 3)]
+    first = refined_variants([chosen], [0], aligned)
+    turns = [300 / each.constants["p"] for each in first]
+    assert len(turns) == 2 * BETWEEN
+    assert all(abs(turn - 4.0) < 0.25 for turn in turns)
+    assert {each.searched_parameters for each in first} == {3}
+
+
+def test_a_period_is_not_refined_beyond_what_is_plausible(tmp_path: Path) -> None:
+    aligned = record_external(tmp_path / "run.csv", {"way_mm": np.linspace(0, 500, 200)}, {"z": np.zeros(200)})
+    for end in (10.0, 400.0):
+        refined = refined_variants([variant(CYCLE, {"p": end}, aligned, 3)], [0], aligned)
+        assert all(10 <= each.constants["p"] <= 400 for each in refined)
+
+
+def test_a_period_that_little_noise_tells_well_is_named_and_not_described(tmp_path: Path) -> None:
+    """Ramps over four turns: the spectrum is as coarse as a description's first value, and coarser than its second."""
+    way = np.concatenate([np.linspace(0, end, 200) for end in (40.0, 150.0, 300.0, 300.0, 150.0, 40.0)])
+    error = 30.0 * np.sin(2 * np.pi * way / 72.0 + 0.4)
+    aligned = record_external(tmp_path / "run.csv", {"way_mm": way}, {"z": error}, declared_um=None)
+    diagnosis = diagnose(aligned, (), None, [CYCLE])
+    (step,) = diagnosis.steps
+    assert step.effect.id == "cycle"
+    assert step.fitted.constants["p"] == pytest.approx(72.0, rel=2e-3)
+    assert diagnosis.heldout_after_um < 0.7  # of a noise of 0.5
+
+
+def test_a_period_that_the_machine_is_said_to_have_stays(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {})
+    cyclic = LIBRARY["scale_cyclic"]
+    ((constants,),) = [cyclic.constant_grid(aligned.rows)]
+    assert refined_variants([variant(cyclic, constants, aligned, 0)], [0], aligned) == []
 
 
 def test_without_a_nonlinear_constant_there_is_nothing_between(aligned: AlignedRecording) -> None:

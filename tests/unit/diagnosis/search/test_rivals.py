@@ -46,6 +46,13 @@ def test_what_misses_most_of_what_the_member_takes_is_no_rival_whatever_the_stan
     assert len(find_rivals(subset_losses(noise(4) + 1.5 * a, losses.candidates, generous), (0,), 0)) == 1
 
 
+def test_what_takes_another_part_of_the_error_that_is_as_large_is_no_rival() -> None:
+    """Beside it the member gains as much as alone."""
+    losses = subset_losses(noise(4) + 1.5 * a + 1.5 * b, [candidate("a", A), candidate("b", B, effect=ELASTICITY)])
+    assert losses.loss((1,)) == pytest.approx(losses.loss((0,)), rel=0.1)
+    assert find_rivals(losses, (0,), 0) == ()
+
+
 def test_a_more_general_effect_is_a_rival_only_where_the_difference_may_be_chance() -> None:
     general = candidate("general", np.concatenate([A + 0.2 * B, columns(6, 4)], axis=2), effect=ELASTICITY)
     as_simple = candidate("simple", A + 0.2 * B, effect=ELASTICITY)
