@@ -123,7 +123,7 @@ def _as_best_of(scores: FloatArray, count: int, numbers: int, blocks: int) -> Fl
     dof = numbers, numbers * max(blocks - 1, 1)
     beyond = np.minimum(fdtrc(*dof, scores**3), 1.0 - ROUNDING)
     beyond = np.maximum(-np.expm1(np.log1p(-beyond) / count), ROUNDING)
-    return np.maximum(scores, fdtri(*dof, 1.0 - beyond) ** (1 / 3))
+    return np.asarray(np.maximum(scores, fdtri(*dof, 1.0 - beyond) ** (1 / 3)))
 
 
 def _sums(by_row: FloatArray, block: IntArray, blocks: int) -> FloatArray:
