@@ -8,8 +8,8 @@ solves the weighted linear problem
 
 by `solve_least_squares`, with Huber weights w_i (`huber_weights`), and then evaluates the full model f again. The
 derivatives G (R are its last columns) are taken once, at each row's readings without any effect. Outliers are found
-from the residual, left out, and the fit is repeated until they no longer change. Standard errors:
-`cluster_covariance`.
+from the residual, left out, and the fit is repeated until they no longer change. Standard errors are those of the
+weighted problem: `cluster_covariance`.
 
 Example::
 
@@ -131,7 +131,10 @@ def fit(
     residual_um[~usable] = np.nan
     used = usable & ~left_out
     block = neighbour_blocks(aligned.recording)[used]
-    whole = cluster_covariance(G_um[used] / sigma_um[:, None], residual_um[used] / sigma_um, block)
+    whitened = residual_um[used] / sigma_um
+    root_weight = np.sqrt(huber_weights(whitened))[:, None]
+    G = G_um[used] / sigma_um[:, None] * root_weight[:, :, None]
+    whole = cluster_covariance(G, whitened * root_weight, block)
     covariance = whole[: len(theta), : len(theta)]
     return FitResult(
         fitted=tuple(

@@ -225,8 +225,10 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
     for name in dict.fromkeys(losses.name(k) for k in library):
         beside = [k for k in members if k != member_by_name[name]] if name in member_by_name else constant
         complement = OrthogonalComplement(losses.nuisance_with(beside).values)
-        variants = [complement(losses.values[k]) for k in library if losses.name(k) == name]
-        families[name] = Family(variants, complement(losses.data.y))
+        own = [k for k in library if losses.name(k) == name]
+        variants = [complement(losses.values[k]) for k in own]
+        best_of = [losses.candidates[k].best_of for k in own]
+        families[name] = Family(variants, complement(losses.data.y), best_of)
     return dict(zip(families, p_values(list(families.values()), losses.data.block).tolist(), strict=True))
 
 

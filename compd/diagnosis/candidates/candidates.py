@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -36,6 +36,8 @@ class Candidate:
     columns_um : (N, m, P) by how many um each parameter moves the prediction.
     limits : (P, 2) plausible range of each parameter; infinite where nothing is known of it.
     searched_parameters : for how many parameters the search for its nonlinear constants counts.
+    best_of : among how many choices of its constants, unlike one another, the residual itself chose this one; 1 where
+        it was chosen without looking at the residual.
     constants : values of its nonlinear constants.
     kind : "effect" names a cause; "proxy" stands for one that was not measured; the others name none.
     """
@@ -47,6 +49,7 @@ class Candidate:
     searched_parameters: int
     constants: ConstantValues = field(default_factory=dict)
     kind: Kind = "effect"
+    best_of: int = field(default=1, kw_only=True)
 
     @property
     def largest(self) -> FloatArray:
@@ -110,7 +113,8 @@ def periodic_candidates(
     for effect in effects:
         promising = promising_constants(effect, aligned, residual_um, rows)
         candidates += [
-            variant(effect, constants, aligned, promising.searched_parameters) for constants in promising.constants
+            replace(variant(effect, constants, aligned, promising.searched_parameters), best_of=promising.independent)
+            for constants in promising.constants
         ]
     return candidates
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import fdtrc, fdtri
 
 from compd.arrays import FloatArray, IntArray
 
@@ -36,10 +37,12 @@ class Family(NamedTuple):
     """Variants of one candidate, of which the best counts, and the residual that they are to explain.
 
     variants : each (R, m, P).  y : (R, m) whitened. Both are orthogonal to what is fitted beside them.
+    best_of : among how many variants, unlike one another, y itself chose each; None where y chose none.
     """
 
     variants: Sequence[FloatArray]
     y: FloatArray
+    best_of: Sequence[int] | None = None
 
 
 def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
@@ -62,7 +65,9 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
 
     which controls the probability of even one false finding among all that were tried, nonlinear constants included
     (max-T: Westfall and Young, Resampling-Based Multiple Testing (1993); Romano and Wolf, Econometrica 73 (2005)
-    1237). What acts in n blocks alone cannot have a p-value below 2^(1 - n): in so few, noise does the same.
+    1237). A variant that y itself chose, as a period is by its spectrum, is not chosen anew for each resample; in its
+    place counts what the best of as many variants would have (`_as_best_of`). What acts in n blocks alone cannot have a
+    p-value below 2^(1 - n): in so few, noise does the same.
 
     block : (R,) block of each row, numbered from 0.
 
@@ -77,7 +82,12 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     signs[1:] = rng.choice((-1.0, 1.0), (SIGN_FLIPS, signs.shape[1]))
     scores = np.empty((SIGN_FLIPS + 1, len(families)))
     for k, family in enumerate(families):
-        scores[:, k] = np.max([_scores(columns, family.y, block, signs) for columns in family.variants], axis=0)
+        by_variant = []
+        for columns, count in zip(family.variants, family.best_of or [1] * len(family.variants), strict=True):
+            score = _scores(columns, family.y, block, signs)
+            score[1:] = _as_best_of(score[1:], count, columns.shape[2], signs.shape[1])
+            by_variant.append(score)
+        scores[:, k] = np.max(by_variant, axis=0)
     by_noise = scores[1:]
     spread = np.maximum(by_noise.std(axis=0), ROUNDING)
     standardized = (scores - by_noise.mean(axis=0)) / spread
@@ -99,6 +109,21 @@ def _scores(columns: FloatArray, y: FloatArray, block: IntArray, signs: FloatArr
     left = (z**2).sum() - 2 * ((signs @ np.einsum("bpq,bp->bq", G, z)) * s).sum(axis=1)
     left += np.einsum("fp,pq,fq->f", s, np.einsum("bpq,bpr->qr", G, G), s)
     return np.asarray(((s**2).sum(axis=1) / np.maximum(left, ROUNDING * max((z**2).sum(), 1e-300))) ** (1 / 3))
+
+
+def _as_best_of(scores: FloatArray, count: int, numbers: int, blocks: int) -> FloatArray:
+    """Scores (F,) that noise gives a variant of P `numbers`, raised to those of the best of `count` like it.
+
+    Of a score with distribution D the best of n independent ones has D^n: t becomes the score at which D is D(t)^(1/n)
+    (Sidak, J. Am. Stat. Assoc. 62 (1967) 626). Beyond the resamples D must be known: with B blocks t^3 nearly has the F
+    distribution with P and P (B - 1) degrees of freedom, being a ratio of squares of as many scores.
+    """
+    if count <= 1:
+        return scores
+    dof = numbers, numbers * max(blocks - 1, 1)
+    beyond = np.minimum(fdtrc(*dof, scores**3), 1.0 - ROUNDING)
+    beyond = np.maximum(-np.expm1(np.log1p(-beyond) / count), ROUNDING)
+    return np.asarray(np.maximum(scores, fdtri(*dof, 1.0 - beyond) ** (1 / 3)))
 
 
 def _sums(by_row: FloatArray, block: IntArray, blocks: int) -> FloatArray:

@@ -7,6 +7,8 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from compd.comparison.statistics import cluster_covariance, least_squares, robust
 from compd.comparison.statistics.cluster_covariance import cluster_covariance as covariance_of
@@ -77,10 +79,24 @@ def test_ridge_is_a_measurement_of_zero() -> None:
     np.testing.assert_allclose(ridge_inverse(A.T @ A, ridge), np.linalg.inv(A.T @ A + np.diag(ridge)), rtol=1e-6)
 
 
-def test_blocks_of_one_row_give_whites_covariance() -> None:
-    residual = RNG.normal(size=40) * (1.0 + 5.0 * np.abs(A[:, 0]))  # heteroscedastic
-    inverse = np.linalg.inv(A.T @ A)
-    white = inverse @ (A.T * residual**2) @ A @ inverse * 40 / 37
-    clustered = covariance_of(A[:, None, :], residual[:, None], np.arange(40))
-    independent = inverse * float(residual @ residual) / 37
-    np.testing.assert_allclose(np.diag(clustered), np.maximum(np.diag(white), np.diag(independent)), rtol=1e-9)
+def test_the_covariance_of_blocks_is_that_of_fits_without_one_of_them() -> None:
+    block = np.arange(40) // 4
+    drift = np.repeat(RNG.normal(size=10), 4)
+    y = A @ THETA + drift * A[:, 0] + 0.1 * RNG.normal(size=40)  # errors that a block shares
+    theta, *_ = np.linalg.lstsq(A, y, rcond=None)
+    without = np.stack([np.linalg.lstsq(A[block != c], y[block != c], rcond=None)[0] for c in range(10)])
+    variance = 9 / 10 * ((without - theta) ** 2).sum(axis=0) * (student.ppf(0.975, 9) / norm.ppf(0.975)) ** 2
+    residual = y - A @ theta
+    independent = np.diag(np.linalg.inv(A.T @ A)) * float(residual @ residual) / 37
+    assert (variance > independent).any()
+    clustered = covariance_of(A[:, None, :], residual[:, None], block)
+    np.testing.assert_allclose(np.diag(clustered), np.maximum(variance, independent), rtol=1e-5)
+
+
+def test_what_one_block_alone_determines_has_the_error_of_independent_rows() -> None:
+    block = np.arange(40) // 10
+    columns = np.column_stack([A[:, 0], np.where(block == 2, A[:, 1], 0.0)])
+    residual = RNG.normal(size=40)
+    clustered = covariance_of(columns[:, None, :], residual[:, None], block)
+    independent = np.linalg.inv(columns.T @ columns) * float(residual @ residual) / 38
+    assert clustered[1, 1] == pytest.approx(independent[1, 1])

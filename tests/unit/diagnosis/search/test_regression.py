@@ -87,3 +87,26 @@ def test_p_values_of_noise_are_uniform_and_of_an_effect_the_smallest() -> None:
     with_effect = p_values([Family([variant], y) for variant in columns], block)
     assert with_effect[2] == pytest.approx(1 / (SIGN_FLIPS + 1))
     assert int(np.argmin(with_effect)) == 2
+
+
+def test_p_values_of_what_the_residual_itself_chose_are_uniform_too() -> None:
+    rng = np.random.default_rng(9)
+    block = np.arange(240) * 24 // 240
+    many = rng.standard_normal((300, 240, 3, 1))
+    smallest: dict[int, list[float]] = {1: [], 300: []}
+    for _ in range(40):
+        y = rng.standard_normal((240, 3))
+        best = many[int(np.argmax(np.einsum("krmp,rm->k", many, y) ** 2))]
+        for count, values in smallest.items():
+            values.append(float(p_values([Family([best], y, [count])], block)[0]))
+    assert np.mean(np.array(smallest[300]) < 0.05) <= 0.15  # 5 % is expected: 2 of 40
+    assert np.mean(smallest[300]) == pytest.approx(0.5, abs=0.14)  # three standard errors of 40 numbers
+    assert np.mean(np.array(smallest[1]) < 0.05) > 0.9  # what it would be without counting
+
+
+def test_what_acts_in_one_block_has_no_evidence_however_many_it_is_the_best_of() -> None:
+    rng = np.random.default_rng(10)
+    block = np.arange(240) * 24 // 240
+    column = np.where((block == 3)[:, None, None], rng.standard_normal((240, 3, 1)), 0.0)
+    y = 9.0 * column[:, :, 0] + rng.standard_normal((240, 3))
+    assert p_values([Family([column], y, [5000])], block).tolist() == [1.0]
