@@ -30,13 +30,16 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
     Where the set is at the floor and the noise known, what may be chance has to be at the floor too.
 
     An effect with more parameters that contains the member as a special case is bound to do about as well; for it the
-    price is no excuse. Effects that on these rows do the same are always rivals, however far above the floor.
+    price is no excuse. It is one for the constant, which names no cause: whatever can make it may have made it.
+
+    Effects that on these rows do the same are always rivals, however far above the floor.
     """
     criteria = losses.criteria
     members = (*members, *_constant_beside(losses, members, member))
     rest = tuple(k for k in members if k != member)
     loss, without = losses.loss(members), losses.loss(rest)
     sets = {tuple(sorted((*rest, k))): k for k in _substitutes(losses, rest, member)}
+    names_cause = losses.candidates[member].kind != "constant"
     rivals: list[Rival] = []
     for subset in sorted(losses.evaluate(sets), key=losses.score):
         key, k = subset.members, sets[subset.members]
@@ -46,7 +49,7 @@ def find_rivals(losses: SubsetLosses, members: tuple[int, ...], member: int) -> 
         missed = subset.cv_loss - min(loss, losses.loss((*key, member)))
         if missed > criteria.rival_share * (without - loss):
             continue
-        more_general = losses.candidates[k].parameter_count > losses.candidates[member].parameter_count
+        more_general = names_cause and losses.candidates[k].parameter_count > losses.candidates[member].parameter_count
         excess, std = losses.gain(members, key)
         near = losses.log_loss(subset.cv_loss) - losses.log_loss(loss) <= criteria.effect_price and not more_general
         below = subset.cv_loss <= criteria.most_at_floor or loss > criteria.most_at_floor or not losses.floor_known

@@ -114,3 +114,13 @@ def test_collinearity_is_that_beside_the_rest_of_the_set() -> None:
     losses = subset_losses(noise(4) + 1.5 * a + 2.0 * b, {"a": A, "b": B, "a and b": A + B})
     assert collinearity(losses, (), 0, 2) == pytest.approx(1 / np.sqrt(2), abs=0.1)
     assert collinearity(losses, (1,), 0, 2) == pytest.approx(1.0)
+
+
+def test_whatever_can_make_the_constant_is_its_rival_however_many_numbers_it_has() -> None:
+    """A frame has six numbers: three of them make the constant, the others cost more than may be chance."""
+    constant = candidate("constant", CONSTANT, np.inf, kind="constant")
+    frame = candidate("frame", np.concatenate([CONSTANT, columns(6, 6)], axis=2), effect=ELASTICITY)
+    strict = replace(Criteria(), least_sigmas=0.0)
+    (rival,) = find_rivals(subset_losses(noise(4) + 20.0, [constant, frame], strict), (0,), 0)
+    assert rival.excess > rival.std
+    assert rival.name == "link_elasticity"
