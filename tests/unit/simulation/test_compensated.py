@@ -11,8 +11,9 @@ from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from compd.machine_builder import build_model
 from compd.simulation.truth.frame import DISTANCES
+from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
 from compd.simulation.truth.world import World
-from tests.unit.simulation.test_world import FULLY_MEASURED, arrangements, machines, run, scale_mm, true_tip
+from tests.unit.simulation.test_world import arrangements, machines, run, scale_mm, true_tip
 
 
 def gauge_values(world: World, wires: Wiring) -> GaugeValues:
@@ -27,7 +28,7 @@ def gauge_values(world: World, wires: Wiring) -> GaugeValues:
 @arrangements
 def test_measuring_where_the_tip_is(geometry: Geometry, wires: Wiring) -> None:
     model = build_model(geometry, wires)
-    world = World(geometry, wires, seed=5, speedup=300.0, strengths=FULLY_MEASURED)
+    world = World(geometry, wires, seed=5, speedup=300.0, strengths=FULLY_MEASURED_WITHOUT_NOISE)
     warm = WarmStart.at_zero(model)
     for _ in range(8):
         run(world, 5.0)
