@@ -11,8 +11,9 @@ from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
 
-# Moments that are tried beside the sessions' starts, evenly over the rows.
-MOMENTS = 8
+# Moments that are tried beside the sessions' starts, evenly over the rows; and of the starts so many at most, evenly
+# chosen: what changed between two of them is found when the moment is refined.
+MOMENTS, MOST_STARTS = 8, 24
 # Moments between neighbours that are tried where a change was found: to about a hundredth of the recording.
 BETWEEN = 9
 
@@ -26,9 +27,10 @@ class ChangeCandidate(Candidate):
 
 
 def moments_s(aligned: AlignedRecording) -> list[float]:
-    """Moments at which something may have changed, s: before each session but the first, and quantiles of the rows."""
+    """Moments at which something may have changed, s: where sessions but the first start, and quantiles of the rows."""
     time_s = aligned.rows.time_s
     starts = time_s[aligned.rows.session_start][1:]
+    starts = starts[:: max(1, -(-len(starts) // MOST_STARTS))]
     quantiles = np.quantile(time_s, np.linspace(0, 1, MOMENTS + 2)[1:-1])
     return sorted({*starts.tolist(), *quantiles.tolist()})
 

@@ -21,6 +21,8 @@ MOST_VALUES = 12
 SAME_PLACE = 0.01
 # With fewer sessions blocks of time are left out in their place: of two, one would have to predict the other.
 FEWEST_SESSIONS = 3
+# Of more sessions neighbours are left out together: memory grows with the folds, and what is learned hardly changes.
+MOST_FOLDS = 24
 # Sectors into which the workspace is divided: a fifth left out leaves four fifths to learn from.
 SECTORS = 5
 
@@ -75,12 +77,14 @@ def _undivided(aligned: AlignedRecording, name: str) -> Problem:
 
 
 def _split_by_time(aligned: AlignedRecording) -> IntArray:
-    """(N,) sessions; with too few of them, blocks of time."""
+    """(N,) sessions; with too few of them blocks of time, with many of them neighbouring sessions together."""
     recording = aligned.recording
     fold = recording.fold
     if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
         fold = recording.first_of_visit(np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
-    return _numbered(fold)
+    number = _numbered(fold)
+    count = int(number.max()) + 1
+    return number * MOST_FOLDS // count if count > MOST_FOLDS else number
 
 
 def _split_by_values(aligned: AlignedRecording, values: FloatArray) -> IntArray:

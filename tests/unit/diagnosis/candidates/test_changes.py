@@ -9,7 +9,7 @@ import pytest
 
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, library_pool
-from compd.diagnosis.candidates.changes import MOMENTS, change_candidates, moments_s
+from compd.diagnosis.candidates.changes import MOMENTS, MOST_STARTS, change_candidates, moments_s
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.external_recordings import along, record_external
@@ -37,6 +37,15 @@ def test_moments_are_starts_of_sessions_and_quantiles_of_the_rows(tmp_path: Path
     assert 1200.0 in times_s
     assert len(times_s) == MOMENTS + 1
     assert 0.0 < times_s[0] < times_s[-1] < aligned.rows.time_s[-1]
+
+
+def test_of_many_sessions_not_every_start_is_tried(tmp_path: Path) -> None:
+    """The starts that are tried lie over the whole recording."""
+    columns = {"session": 1.0 + np.arange(ROWS) // 2}
+    aligned = record_external(tmp_path / "run.csv", columns, {"x": np.zeros(ROWS)})
+    times_s = moments_s(aligned)
+    assert MOMENTS < len(times_s) <= MOMENTS + MOST_STARTS
+    assert np.diff(times_s).max() < aligned.rows.time_s[-1] / MOMENTS
 
 
 def test_a_change_acts_from_its_moment_on_and_may_have_either_sign(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.open import open_recording
-from compd.diagnosis.search.cross_validation import SECTORS, row_splits
+from compd.diagnosis.search.cross_validation import MOST_FOLDS, SECTORS, row_splits
 from compd.errors import RecordingError
 from tests.support.external import Floats, measured_places, write_external
 from tests.support.hidden_effects import record_with_effects
@@ -28,6 +28,15 @@ def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
     assert session is not None
     for labels, fold in ((session, by_session), (point, by_sector)):
         assert all(len(np.unique(fold[labels == label])) == 1 for label in np.unique(labels))
+
+
+def test_of_many_sessions_neighbours_are_left_out_together(tmp_path: Path) -> None:
+    """Memory grows with the folds: a thousand sessions would take gigabytes."""
+    session = np.arange(120) // 2
+    by_time = splits(tmp_path, {**measured_places(), "session": session.astype(float)})[0]
+    assert len(np.unique(by_time)) == MOST_FOLDS
+    assert (np.diff(by_time) >= 0).all()
+    assert all(len(np.unique(by_time[session == label])) == 1 for label in np.unique(session))
 
 
 def test_places_without_points_are_divided_into_sectors(tmp_path: Path) -> None:
