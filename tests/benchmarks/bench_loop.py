@@ -21,8 +21,8 @@ from compd.configuration.operation import LoopSettings
 from compd.gauge import good
 from compd.live.loop.loop import Loop
 from compd.live.loop.timing import Histogram
+from compd.live.memory.latest import Latest
 from compd.live.systemd import Notifier
-from compd.readings import Latest
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 

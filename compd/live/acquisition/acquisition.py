@@ -19,8 +19,8 @@ from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
-from compd.readings import Latest
 
 log = structlog.get_logger()
 

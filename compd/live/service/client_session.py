@@ -6,7 +6,7 @@ import math
 import socket
 from collections.abc import Callable, Iterator
 
-from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.sent_cycle import SentCycle
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
 
 # About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind acts on old setpoints.
@@ -17,6 +17,11 @@ _RECEIVE_BYTES = 4096
 _LONGEST_INTERVAL_S = 1e6
 
 
+def setpoint_line(cycle: SentCycle) -> bytes:
+    """The SETPOINT line of a cycle."""
+    return cycle.setpoint.to_json()
+
+
 class ClientSession:
     """A connected client; used by the publisher's thread alone.
 
@@ -24,7 +29,7 @@ class ClientSession:
     ----------
     open : False once the connection has ended.
     due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
-    encode : makes the message of a setpoint that this client watches.
+    encode : makes the message of a cycle that this client watches; b"" where there is none.
     """
 
     def __init__(self, connection: socket.socket, name: str, local: bool) -> None:
@@ -35,14 +40,14 @@ class ClientSession:
         self.local = local
         self.open = True
         self.due_s = math.inf
-        self.encode: Callable[[Setpoint], bytes] = Setpoint.to_json
+        self.encode: Callable[[SentCycle], bytes] = setpoint_line
         self._interval_s = math.inf
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
         self._skipping_line = False
         self._unsent = bytearray()
 
-    def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes], max_behind_bytes: int) -> None:
+    def watch(self, rate_hz: float, encode: Callable[[SentCycle], bytes], max_behind_bytes: int) -> None:
         """Send `rate_hz` setpoints per second from now on, each made by `encode`: inf for every one, 0 for none.
 
         A client with more than `max_behind_bytes` unsent is dropped.

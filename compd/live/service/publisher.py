@@ -1,7 +1,8 @@
-"""The publisher: one thread between the loop and its clients. The loop never waits for it, and it waits for no client.
+"""The publisher: takes setpoints from the ring and sends them to clients. The loop never waits for it, and it waits
+for no client.
 
-The loop calls `deliver` with every setpoint. The publisher's thread takes them from a bounded queue, encodes each once,
-sends it to the clients that are due, and answers their requests.
+Its thread sleeps until a setpoint is there that a client is due for, encodes each once, sends it to the clients that
+are due, and answers their requests. Where the loop makes no setpoints, it says so in the loop's place.
 """
 
 from __future__ import annotations
@@ -10,107 +11,93 @@ import math
 import os
 import selectors
 import socket
-import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import structlog
 
-from compd.configuration.operation import SocketSettings
-from compd.errors import DaemonError
+from compd.clock import Clock
+from compd.live.loop.sent_cycle import CycleDecoder, SentCycle
 from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.states import State
+from compd.live.memory.setpoint_ring import ENTRIES, SetpointRing
 from compd.live.service.client_session import ClientSession
-from compd.live.service.listeners import listen_tcp, listen_unix
+from compd.live.service.listeners import Listeners
+from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
 
-# Half a second at 1 kHz: longer than any pause of the publisher that is not a fault.
-_QUEUE_LENGTH = 512
 MAX_CLIENTS = 32
+# Entries that the loop may write while one is read.
+_MARGIN = 16
 
 _log = structlog.get_logger()
 
 
 class Publisher:
-    """Listens on the Unix socket and, where configured, on TCP; sends setpoints and answers."""
+    """Serves the clients of the Unix socket and, where configured, of TCP.
 
-    def __init__(self, sockets: SocketSettings, period_s: float, observe: Callable[[Setpoint], None]) -> None:
-        """`period_s`: of the loop; `observe` is called with every setpoint that is queued, on the publisher's thread:
-        the first of a new state is always among them, for the log."""
-        self._sockets = sockets
+    Attributes
+    ----------
+    dropped_setpoints : that the ring no longer had when they were to be read.
+    dropped_clients : that were too far behind.
+    """
+
+    def __init__(
+        self,
+        listeners: Listeners,
+        ring: SetpointRing,
+        watch: LoopWatch,
+        period_s: float,
+        clock: Clock,
+        observers: Sequence[Callable[[Setpoint], None]] = (),
+        every_cycle: bool = False,
+    ) -> None:
+        """`period_s`: of the loop. `observers` are called with every setpoint that is read, on the publisher's thread:
+        the first of a new state is always among them, for the log, and with `every_cycle` all of them are read."""
+        self._listeners = listeners
+        self._ring = ring
+        self._watch = watch
         self._half_period_s = period_s / 2
-        self._observe = observe
-        self._selector = selectors.DefaultSelector()
+        self._clock = clock
+        self._observers = tuple(observers)
+        self._every_cycle = every_cycle
+        self._decoder = CycleDecoder()
         self._sessions: set[ClientSession] = set()
-        self._queue: deque[Setpoint] = deque()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
-        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
-        self._requests: Requests  # from `start` on: it needs the publisher's own figures for STATUS
-        # Read by the loop's thread: when a client is due, and the state of the setpoint that was queued last.
+        self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
+        self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
+        self._next_entry = 0
         self._next_due_s = math.inf
-        self._last_state: State | None = None
+        self._last_state = -1
         self.dropped_setpoints = 0
         self.dropped_clients = 0
-        self.tcp_port: int | None = None
 
-    def start(self, requests: Requests) -> None:
-        """Listen, and serve on a thread of its own. Raises DaemonError where an address cannot be had."""
+    def run(self, requests: Requests, keep_on: Callable[[], bool], each_round: Callable[[], None]) -> None:
+        """Serve on this thread, as long as `keep_on`. `each_round` is called at least every `LoopWatch.limit_s`."""
         self._requests = requests
-        try:
-            if self._sockets.tcp is not None:
-                listener = listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
-                self.tcp_port = listener.getsockname()[1]
-                self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
-            listener = listen_unix(Path(self._sockets.unix.path))
-            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
-        except DaemonError:
-            self._close()
-            raise
-        self._selector.register(self._wake, selectors.EVENT_READ, self._send_queued)
-        self._thread.start()
+        self._selector = selectors.DefaultSelector()
+        if self._listeners.tcp is not None:
+            tcp = self._listeners.tcp
+            self._selector.register(tcp, selectors.EVENT_READ, partial(self._accept, tcp, False))
+        unix = self._listeners.unix
+        self._selector.register(unix, selectors.EVENT_READ, partial(self._accept, unix, True))
+        self._selector.register(self._ring.woken, selectors.EVENT_READ, self._be_woken)
+        self._schedule()
+        while keep_on():
+            for key, events in self._selector.select(self._watch.limit_s):
+                key.data(events)
+            self._forward()
+            each_round()
 
-    def stop(self) -> None:
-        """Close every connection; return when the thread has ended."""
-        self._stop.set()
-        os.eventfd_write(self._wake, 1)
-        self._thread.join()
-        Path(self._sockets.unix.path).unlink(missing_ok=True)
-        self._close()
-
-    def _close(self) -> None:
-        for key in list(self._selector.get_map().values()):
-            if isinstance(key.fileobj, socket.socket):
-                key.fileobj.close()
+    def end(self, reason: str) -> None:
+        """Send a last setpoint, a `stop` with this reason, and close every connection."""
+        self._forward()
+        self._publish(SentCycle(self._watch.stop(self._clock.monotonic(), reason)))
+        for session in self._sessions:
+            session.close()
         self._selector.close()
-        os.close(self._wake)
-
-    @property
-    def alive(self) -> bool:
-        """False once the thread has ended, for whatever reason."""
-        return self._thread.is_alive()
-
-    def deliver(self, setpoint: Setpoint) -> None:
-        """Queue a setpoint when a client is due or the state is new; called by the loop with every setpoint.
-
-        When the queue is full the oldest setpoint is dropped and counted.
-        """
-        if setpoint.time_s < self._next_due_s - self._half_period_s and setpoint.state is self._last_state:
-            return
-        self._last_state = setpoint.state
-        if len(self._queue) >= _QUEUE_LENGTH:
-            try:
-                self._queue.popleft()
-                self.dropped_setpoints += 1
-            except IndexError:
-                pass  # the publisher has just emptied it
-        self._queue.append(setpoint)
-        os.eventfd_write(self._wake, 1)
 
     def summary(self) -> dict[str, Any]:
         """Clients now, and clients and setpoints dropped so far, for STATUS."""
@@ -119,11 +106,6 @@ class Publisher:
             "dropped_clients": self.dropped_clients,
             "dropped_setpoints": self.dropped_setpoints,
         }
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            for key, events in self._selector.select():
-                key.data(events)
 
     def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
         try:
@@ -143,6 +125,7 @@ class Publisher:
         self._send(session, self._requests.version)
 
     def _serve(self, session: ClientSession, events: int) -> None:
+        self._forward()  # what has been computed until now is not for a client that asks only now
         if events & selectors.EVENT_WRITE:
             session.flush()
         if events & selectors.EVENT_READ:
@@ -164,28 +147,54 @@ class Publisher:
     def _answer_later(self, session: ClientSession, answer: bytes) -> None:
         """Hand an answer that took time to the publisher's thread; called from any thread."""
         self._answers.append((session, answer))
-        os.eventfd_write(self._wake, 1)
+        self._ring.wake_reader()
 
-    def _send_queued(self, _events: int) -> None:
-        """Send the late answers and the setpoints that wait. A setpoint is encoded once per kind of message, and only
-        for a client that is due."""
-        os.eventfd_read(self._wake)
+    def _be_woken(self, _events: int) -> None:
+        """Send the late answers; the setpoints follow at the end of the round."""
+        os.eventfd_read(self._ring.woken)
         while self._answers:
             self._send(*self._answers.popleft())
-        while self._queue:
-            setpoint = self._queue.popleft()
-            self._observe(setpoint)
-            encoded: dict[Callable[[Setpoint], bytes], bytes] = {}
-            for session in list(self._sessions):
-                if session.take(setpoint.time_s, self._half_period_s):
-                    if session.encode not in encoded:
-                        encoded[session.encode] = session.encode(setpoint)
-                    self._send(session, encoded[session.encode])
-        self._schedule()
+
+    def _forward(self) -> None:
+        """Publish the setpoints that are due and those of a new state; where there are none from the loop, say so."""
+        ring = self._ring
+        count = ring.count
+        if (behind := count - self._next_entry - ENTRIES + _MARGIN) > 0:
+            self.dropped_setpoints += behind
+            self._next_entry += behind
+        while self._next_entry < count:
+            time_s, state = ring.when(self._next_entry)
+            is_due = self._every_cycle or time_s >= self._next_due_s - self._half_period_s
+            if is_due or state != self._last_state:
+                if (entry := ring.get(self._next_entry)) is None:
+                    self.dropped_setpoints += 1
+                else:
+                    cycle = self._decoder.decode(entry.content)
+                    self._watch.note(cycle.setpoint.seq)
+                    self._publish(cycle)
+                    self._schedule()
+            self._next_entry += 1
+        if (stop := self._watch.missing(self._clock.monotonic())) is not None:
+            self._publish(SentCycle(stop))
+            self._schedule()
+
+    def _publish(self, cycle: SentCycle) -> None:
+        """Send a cycle to the clients that are due. It is encoded once per kind of message."""
+        setpoint = cycle.setpoint
+        self._last_state = setpoint.state.code
+        for observe in self._observers:
+            observe(setpoint)
+        encoded: dict[Callable[[SentCycle], bytes], bytes] = {}
+        for session in list(self._sessions):
+            if session.take(setpoint.time_s, self._half_period_s):
+                if session.encode not in encoded:
+                    encoded[session.encode] = session.encode(cycle)
+                self._send(session, encoded[session.encode])
 
     def _schedule(self) -> None:
-        """Note for `deliver` when the next client is due."""
+        """Note when the next client is due, and ask to be woken then."""
         self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
+        self._ring.wake_from(-math.inf if self._every_cycle else self._next_due_s - self._half_period_s)
 
     def _send(self, session: ClientSession, data: bytes) -> None:
         if data and session.open and not session.send(data):

@@ -1,0 +1,59 @@
+"""Tells when the loop makes no setpoints, and makes the one that says so in its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.states import Mode, State
+from compd.live.memory.setpoint_ring import SetpointRing
+
+# No loop that is alive is late by this much, however short its period.
+_SHORTEST_LIMIT_S = 0.02
+_PERIODS = 2
+_REPEAT_EVERY_S = 0.1
+# The first loop starts with the daemon.
+_FIRST_WITHIN_S = 5.0
+
+
+class LoopWatch:
+    """Looks after the loop on behalf of the clients; used by the publisher's thread.
+
+    A setpoint without a loop has the next number after the last one. The ticks of these numbers have passed, so the
+    loop, when it goes on, has higher ones.
+    """
+
+    def __init__(self, ring: SetpointRing, period_s: float, fault: Callable[[], str | None], start_s: float) -> None:
+        """`fault`: why the loop was started anew last; `start_s`: monotonic time at which the watch begins."""
+        self.limit_s = max(_PERIODS * period_s, _SHORTEST_LIMIT_S)
+        self._ring = ring
+        self._fault = fault
+        self._start_s = start_s
+        self._repeat_every_s = max(_REPEAT_EVERY_S, period_s)
+        self._next_s = -math.inf
+        self._count = 0
+        self._seq = 0
+
+    def note(self, seq: int) -> None:
+        """A setpoint of the loop with this number is published."""
+        self._seq = seq
+
+    def missing(self, now_s: float) -> Setpoint | None:
+        """The `stop` to publish at `now_s`, where the loop has made no setpoint for `limit_s`; None otherwise."""
+        count = self._ring.count
+        if count != self._count:
+            self._count, self._next_s = count, -math.inf
+        last_s, limit_s = (self._ring.when(count - 1)[0], self.limit_s) if count else (self._start_s, _FIRST_WITHIN_S)
+        if now_s - last_s < limit_s or now_s < self._next_s:
+            return None
+        self._next_s = now_s + self._repeat_every_s
+        reason = f"the loop has made no setpoint for {now_s - last_s:.3f} s"
+        if fault := self._fault():
+            reason += f"; {fault}"
+        return self.stop(now_s, reason)
+
+    def stop(self, now_s: float, reason: str) -> Setpoint:
+        """A `stop` that the loop has not made."""
+        self._seq += 1
+        return Setpoint(self._seq, now_s, now_s, math.nan, State.STOP, reason, Mode.CMM, None)

@@ -1,0 +1,31 @@
+"""A whole daemon, supervised in a process of its own, with all its processes below it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from compd.clock import MonotonicClock
+from compd.configuration import Configuration
+from compd.live.child_process import ChildProcess
+from compd.live.daemon import Daemon
+from compd.live.supervisor import Supervisor
+from compd.live.systemd import Notifier
+
+
+@contextmanager
+def supervised(configuration: Configuration, notifier: Notifier | None = None) -> Iterator[Daemon]:
+    """Its processes run until the block ends. What the daemon shares with them can be read and written here."""
+    clock = MonotonicClock()
+    daemon = Daemon(configuration)
+    supervisor = Supervisor(daemon, notifier or Notifier(""), clock)
+    process = ChildProcess("supervisor", lambda: supervisor.run(lambda: False), clock)
+    process.start()
+    try:
+        yield daemon
+    finally:
+        os.kill(process.pid, signal.SIGTERM)
+        process.wait()
+        daemon.close()
