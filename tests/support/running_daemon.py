@@ -20,7 +20,8 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
     """Its processes run until the block ends. What the daemon shares with them can be read and written here."""
     clock = MonotonicClock()
     daemon = Daemon(configuration)
-    supervisor = Supervisor(daemon, notifier or Notifier(""), clock)
+    notifier = notifier or Notifier("")
+    supervisor = Supervisor(daemon, notifier, clock)
     process = ChildProcess("supervisor", lambda: supervisor.run(lambda: False), clock)
     process.start()
     try:
@@ -29,3 +30,4 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
         os.kill(process.pid, signal.SIGTERM)
         process.wait()
         daemon.close()
+        notifier.close()
