@@ -27,9 +27,10 @@ from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop_process import LoopProcess
-from compd.live.memory.setpoint_ring import SetpointRing
+from compd.live.memory.shared_ring import SharedRing
 from compd.live.pipeline import build_pipeline
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
@@ -52,7 +53,7 @@ class Daemon:
 
     Attributes
     ----------
-    configuration, latest, commands, ring, control : as their names say.
+    configuration, latest, commands, setpoints, control : as their names say.
     loop_process, acquisition, service : what each process does.
     period_s : of the loop.
     """
@@ -78,8 +79,9 @@ class Daemon:
         # compiles what the loop calls, so that its processes have it from their first cycle
         try_model(pipeline.settings.model, (), str(configuration.path))
         self.commands = Commands(self._zero_on_disk())
-        self.ring, self.control = SetpointRing(), Control()
+        self.setpoints, cycles, self.control = SharedRing(), SharedRing(), Control()
         adopted = AdoptedModels(models)
+        packet_hash = bytes.fromhex(configuration.config_hash)[:8] if configuration.sockets.udp is not None else None
         timing = LoopTiming(self.period_s)
         self.loop_process = LoopProcess(
             pipeline.settings,
@@ -88,19 +90,23 @@ class Daemon:
             pipeline.loader,
             adopted,
             timing,
-            self.ring,
+            self.setpoints,
+            cycles,
+            packet_hash,
             self.control,
             clock,
         )
         self.acquisition = self._acquisition(gauges, clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
         sockets = configuration.sockets
-        packets = UdpSender(sockets.udp, configuration.config_hash) if sockets.udp is not None else None
-        self.listeners = Listeners(sockets, None if before is None else before.listeners)
-        watch = LoopWatch(self.ring, self.period_s, self.control.loop_fault.read, clock.monotonic())
-        observers = [StateLog(self.control).note] + ([] if packets is None else [packets.deliver])
+        packets = UdpSender(sockets.udp) if sockets.udp is not None else None
+        self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
+        watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
+        observers = [StateLog(self.control).note]
+        if packets is not None:
+            observers.append(partial(_send_packet, packets))
         publisher = Publisher(
-            self.listeners, self.ring, watch, self.period_s, clock, observers, every_cycle=packets is not None
+            self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
         )
         zero_capture = ZeroCapture(
             self._wires,
@@ -163,7 +169,8 @@ class Daemon:
                 os.close(descriptor)
         if self.service.packets is not None:
             self.service.packets.close()
-        self.ring.close()
+        self.setpoints.close()
+        self.loop_process.cycles.close()
         self.control.close()
 
     def _acquisition(self, gauges: dict[str, Any], clock: Clock) -> list[AcquisitionProcess]:
@@ -205,6 +212,10 @@ class Daemon:
             return error
         _log.info("machine zero", taken_at=zero.taken_at)
         return zero
+
+
+def _send_packet(packets: UdpSender, setpoint: SentSetpoint) -> None:
+    packets.send(setpoint.packet)
 
 
 def _polling(lines: dict[str, Any], latest: Any, clock: Clock) -> Acquisition:

@@ -22,12 +22,13 @@ from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
+from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, ModelLoader, Models
-from compd.live.loop.sent_cycle import CycleDecoder, CycleEncoder
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.latest import Latest
-from compd.live.memory.setpoint_ring import LONGEST_CONTENT, SetpointRing
+from compd.live.memory.shared_ring import LONGEST_CONTENT, SharedRing
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20
@@ -48,7 +49,11 @@ class ModelRequest:
 
 @dataclass(frozen=True)
 class LoopProcess:
-    """The parts of the daemon that a loop needs, all made before its process was forked."""
+    """The parts of the daemon that a loop needs, all made before its process was forked.
+
+    setpoints, cycles : the rings, see `compd.live.loop.sent_cycle`. packet_hash : first bytes of the configuration's
+    hash, for UDP packets; None where they are not configured.
+    """
 
     settings: CycleSettings
     latest: Latest
@@ -56,7 +61,9 @@ class LoopProcess:
     loader: ModelLoader
     adopted: AdoptedModels
     timing: LoopTiming
-    ring: SetpointRing
+    setpoints: SharedRing
+    cycles: SharedRing
+    packet_hash: bytes | None
     control: Control
     clock: Clock
 
@@ -95,7 +102,7 @@ class LoopProcess:
     def answer(self, number: int, summary: object, refusal: str) -> None:
         """Answer request `number`, and wake the service, which sends the answer."""
         self.control.model_answer.write((number, summary, refusal))
-        self.ring.wake_reader()
+        self.setpoints.wake_reader()
 
     def _models_wanted(self, before: Models, request: ModelRequest) -> Models:
         """The pair of applied model and shadow with the new one (none: no effects, or no shadow) in its place."""
@@ -108,12 +115,15 @@ class LoopProcess:
         return Models(model or self.loader.without_effects, before.shadow)
 
     def _loop(self) -> Loop:
-        encoder = CycleEncoder(self.latest, Directions(self.settings.wires.scale.wires))
+        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
 
-        def put(setpoint: Setpoint) -> None:
-            self.ring.put(setpoint.time_s, setpoint.state.code, encoder.encode(setpoint))
+        def send(setpoint: Setpoint) -> None:
+            time_s, state = setpoint.time_s, setpoint.state.code
+            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            self.setpoints.put(time_s, state, sent.pack())
+            self.cycles.put(time_s, state, packer.pack(setpoint, sent.line))
 
-        return Loop(self.settings, self.latest, self.commands, [put], self.clock, self.timing)
+        return Loop(self.settings, self.latest, self.commands, [send], self.clock, self.timing)
 
     def _prepare(self, loop: Loop) -> None:
         """Ask the system for what real time needs. What it does not permit is told, and the loop runs without it."""
@@ -127,12 +137,12 @@ class LoopProcess:
 
     def _try_cycles(self, state: CycleState) -> None:
         """Compute cycles that nobody sees. Raises ValueError for models whose state does not fit into the ring."""
-        encoder = CycleEncoder(self.latest, Directions(self.settings.wires.scale.wires))
+        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
         for tick in range(1, _TRIAL_CYCLES + 1):
             setpoint, state = step(state, self._inputs(tick), self.settings)
-            setpoint.to_json()
+            sent = SentSetpoint.of(setpoint, self.packet_hash)
             # what effects remember may grow while the machine moves
-            if len(encoder.encode(setpoint)) > LONGEST_CONTENT // 2:
+            if len(packer.pack(setpoint, sent.line)) > LONGEST_CONTENT // 2:
                 raise ValueError(f"the effects remember more than {LONGEST_CONTENT // 2} bytes from cycle to cycle")
 
     def _inputs(self, tick: int) -> CycleInputs:
@@ -146,20 +156,16 @@ class LoopProcess:
         is the correction that is applied, from which the next one slews.
         """
         start = CycleState.at_start(self.settings.model)
-        entry = self.ring.get(self.ring.count - 1) if self.ring.count else None
+        entry = self.cycles.get(self.cycles.count - 1) if self.cycles.count else None
         if entry is None:
             return start
-        sent = CycleDecoder().decode(entry.content)
-        inputs, state = sent.setpoint.inputs, sent.setpoint.state_before
-        assert inputs is not None, "the loop writes them"
-        assert state is not None, "and the state"
-        values = sent.setpoint.values
-        applied_mm = state.correction_mm if values is None else values.correction_mm
-        bare = start._replace(correction_mm=applied_mm, adopting=True)
+        sent = CycleUnpacker().unpack(entry.content)
+        inputs, state = sent.inputs, sent.state_before
+        bare = start._replace(correction_mm=state.correction_mm, adopting=True)
         if forget or sent.models != models.names:
             return bare
         zero = self.commands.zero
-        if inputs.zero == zero:
+        if isinstance(zero, MachineZero) and inputs.zero == zero:
             # one object: the cycle asks whether it is the same
             state = state._replace(zero=None if state.zero is None else zero)
             inputs = inputs._replace(zero=zero)

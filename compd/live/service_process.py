@@ -11,7 +11,7 @@ import structlog
 from compd.clock import Clock
 from compd.live.control import Control, Phase
 from compd.live.log_relay import LogRelay
-from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.states import State
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
@@ -29,12 +29,12 @@ class StateLog:
         self._control = control
         self._state: State | None = None
 
-    def note(self, setpoint: Setpoint) -> None:
+    def note(self, setpoint: SentSetpoint) -> None:
         """Take a setpoint; called on the publisher's thread."""
         if setpoint.state is self._state:
             return
         self._state = setpoint.state
-        log = _log.info if setpoint.valid else _log.warning
+        log = _log.info if setpoint.state.valid else _log.warning
         log("state", state=setpoint.state.value, reason=setpoint.reason, mode=setpoint.mode.value)
         self._control.headline.write(f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else setpoint.state)
         self._control.wake_supervisor()

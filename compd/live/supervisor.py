@@ -12,6 +12,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum, auto
+from typing import Any
 
 import structlog
 
@@ -152,7 +153,7 @@ class Supervisor:
     def _look(self, now_s: float) -> None:
         """Feed the watchdog from the loop's own beat, and kill what hangs."""
         loop, daemon = self._loops.loop, self._daemon
-        if self._loop_heart.look(daemon.ring.count):
+        if self._loop_heart.look(daemon.setpoints.count):
             self._notifier.beat(now_s)
         elif self._loop_heart.hangs and loop.running:
             loop.kill("it hung, and was killed")
@@ -170,7 +171,7 @@ class Supervisor:
         control = self._control
         with suppress(BlockingIOError):
             os.eventfd_read(control.supervisor_woken)
-        if not self._ready and self._daemon.ring.count:
+        if not self._ready and self._daemon.setpoints.count:
             self._ready = True
             self._notifier.ready()
         if (headline := control.headline.read()) != self._headline:
@@ -190,7 +191,7 @@ class Supervisor:
             **self._acquisition,
             "service": self._service,
         }
-        processes = {"supervisor": {"pid": os.getpid(), "starts": 1}}
+        processes: dict[str, dict[str, Any]] = {"supervisor": {"pid": os.getpid(), "starts": 1}}
         for name, child in children.items():
             processes[name] = {"pid": child.pid, "starts": child.starts}
             if child.last_end:
@@ -204,7 +205,7 @@ class Supervisor:
         hold_s = max(_HOLD_S, 2 * self._daemon.period_s)
         self._wait_for_ends(hold_s)
         self._control.enter(Phase.STOPPING, reason)
-        self._daemon.ring.wake_reader()
+        self._daemon.setpoints.wake_reader()
         self._wait_for_ends(_END_WITHIN_S)
 
     def _wait_for_ends(self, within_s: float) -> None:

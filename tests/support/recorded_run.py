@@ -13,7 +13,7 @@ from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.directions import Directions
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.sent_cycle import CycleDecoder, CycleEncoder
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.service.readings_message import ReadingsMessage
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
@@ -28,8 +28,8 @@ class Run:
     def __init__(self, machine: Machine, seed: int = 1):
         self.machine = machine
         self.random = np.random.default_rng(seed)
-        self.encoder = CycleEncoder(machine.latest, Directions(machine.wires.scale.wires))
-        self.decoder = CycleDecoder()
+        self.packer = CyclePacker(machine.latest, Directions(machine.wires.scale.wires))
+        self.unpacker = CycleUnpacker()
         self.transcript = ReadingsMessage(machine.wires, machine.latest.channels)
         self.version = {
             "class": "VERSION",
@@ -62,7 +62,7 @@ class Run:
             assert machine.tick == recorded[1]["seq"]
 
     def recorded(self, setpoint):
-        line = self.transcript.line(self.decoder.decode(self.encoder.encode(setpoint)))
+        line = self.transcript.line(self.unpacker.unpack(self.packer.pack(setpoint, setpoint.to_json())))
         return line, json.loads(line), setpoint
 
     def any_channel(self):

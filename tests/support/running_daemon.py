@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -14,10 +15,12 @@ from compd.live.daemon import Daemon
 from compd.live.supervisor import Supervisor
 from compd.live.systemd import Notifier
 
+START_WITHIN_S = 30
+
 
 @contextmanager
 def supervised(configuration: Configuration, notifier: Notifier | None = None) -> Iterator[Daemon]:
-    """Its processes run until the block ends. What the daemon shares with them can be read and written here."""
+    """Its processes run, and its gauges are polled, until the block ends. What the daemon shares with them can be read and written here."""
     clock = MonotonicClock()
     daemon = Daemon(configuration)
     notifier = notifier or Notifier("")
@@ -25,6 +28,10 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
     process = ChildProcess("supervisor", lambda: supervisor.run(lambda: False), clock)
     process.start()
     try:
+        polling = clock.monotonic() + START_WITHIN_S
+        while not all(acquisition.beats for acquisition in daemon.acquisition):
+            assert clock.monotonic() < polling, "the gauges are not polled"
+            clock.wait(threading.Event(), 0.005)
         yield daemon
     finally:
         os.kill(process.pid, signal.SIGTERM)

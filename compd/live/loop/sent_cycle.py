@@ -1,23 +1,67 @@
-"""A cycle as it goes through the ring: its setpoint, and all that it was computed from.
+"""What the loop sends through its two rings: each setpoint as it goes to clients, then all that it was computed from.
 
-So each entry of the ring stands on its own: the service makes SETPOINT and READINGS messages of it, and a loop that
-takes over computes its last cycle once more to have the state that this one left.
+The setpoint goes first, since clients wait for it. The cycle follows: READINGS messages are made of it, and a loop that
+takes over computes the last one once more, to have the state that it left.
 """
 
 from __future__ import annotations
 
 import pickle
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from compd.errors import StateError
-from compd.live.loop.cycle_state import CycleInputs
+from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.directions import Directions
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import ModelNames, Models
 from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.states import Mode, State
 from compd.live.memory.latest import Latest, Snapshot, unpack_readings
 
 _PICKLE_PROTOCOL = 5
+NO_MODELS = ModelNames({}, {})
+
+
+class SentSetpoint(NamedTuple):
+    """A setpoint in the forms in which it is sent.
+
+    Attributes
+    ----------
+    seq, time_s, state, reason, mode : of the setpoint.
+    line : its JSON, with the newline. packet : for UDP; b"" where that is not configured.
+    """
+
+    seq: int
+    time_s: float
+    state: State
+    reason: str
+    mode: Mode
+    line: bytes
+    packet: bytes = b""
+
+    @classmethod
+    def of(cls, setpoint: Setpoint, config_hash: bytes | None) -> Self:
+        """config_hash : for the packet; None where UDP is not configured."""
+        packet = b"" if config_hash is None else setpoint.to_packet(config_hash)
+        line = setpoint.to_json()
+        return cls(setpoint.seq, setpoint.time_s, setpoint.state, setpoint.reason, setpoint.mode, line, packet)
+
+    def pack(self) -> bytes:
+        """As the content of an entry."""
+        return pickle.dumps(
+            (self.seq, self.time_s, self.state.code, self.reason, self.mode.code, self.line, self.packet),
+            _PICKLE_PROTOCOL,
+        )
+
+    @classmethod
+    def unpack(cls, content: bytes) -> Self:
+        """From the content of an entry."""
+        seq, time_s, state, reason, mode, line, packet = pickle.loads(content)
+        return cls(seq, time_s, _STATES[state], reason, _MODES[mode], line, packet)
+
+
+_STATES = {state.code: state for state in State}
+_MODES = {mode.code: mode for mode in Mode}
 
 
 class SentCycle(NamedTuple):
@@ -25,19 +69,22 @@ class SentCycle(NamedTuple):
 
     Attributes
     ----------
-    setpoint : with its inputs and the state before it, but without the models in both. A setpoint that the service
-        makes by itself, since the loop makes none, has neither.
+    inputs : without the models.
+    state_before : from which it was computed, without the models.
+    setpoint_line : the SETPOINT line that it made.
     models : which models it was computed with.
     approach : (n) direction in which each link last moved.
     """
 
-    setpoint: Setpoint
-    models: ModelNames = ModelNames({}, {})
+    inputs: CycleInputs
+    state_before: CycleState
+    setpoint_line: bytes
+    models: ModelNames = NO_MODELS
     approach: tuple[int, ...] = ()
 
 
-class CycleEncoder:
-    """Turns setpoints into entries of the ring, in the loop's process."""
+class CyclePacker:
+    """Packs cycles as entries of the ring, in the loop's process."""
 
     def __init__(self, latest: Latest, directions: Directions) -> None:
         """`latest`: of which the cycle took its snapshot; `directions`: follows the links in every cycle."""
@@ -46,10 +93,10 @@ class CycleEncoder:
         self._zero: MachineZero | StateError | None = None
         self._models: Models | None = None
         self._zero_bytes = b""
-        self._names = ModelNames({}, {})
+        self._names = NO_MODELS
 
-    def encode(self, setpoint: Setpoint) -> bytes:
-        """The entry of the newest setpoint; called with each of a run, since the directions follow them."""
+    def pack(self, setpoint: Setpoint, line: bytes) -> bytes:
+        """The newest cycle as the content of an entry; called with each of a run, since the directions follow them."""
         inputs, state = setpoint.inputs, setpoint.state_before
         assert inputs is not None, "every setpoint of a cycle has its inputs"
         assert state is not None, "and its state"
@@ -61,17 +108,13 @@ class CycleEncoder:
             )
         if inputs.models is not self._models:
             self._models = inputs.models
-            self._names = ModelNames({}, {}) if inputs.models is None else inputs.models.names
-        carried = state._replace(zero=None, zero_vectors=None, models=None)
+            self._names = NO_MODELS if inputs.models is None else inputs.models.names
         return pickle.dumps(
             (
-                tuple(setpoint[:9]),
-                self._latest.image,
-                self._zero_bytes,
-                inputs.target,
-                inputs.ending,
-                carried,
-                state.zero is inputs.zero,
+                (inputs.tick, inputs.snapshot.time_s, self._latest.image, self._zero_bytes),
+                (inputs.target, inputs.ending),
+                (state._replace(zero=None, zero_vectors=None, models=None), state.zero is inputs.zero),
+                line,
                 tuple(self._names),
                 tuple(self._directions.now),
             ),
@@ -79,24 +122,23 @@ class CycleEncoder:
         )
 
 
-class CycleDecoder:
-    """Turns entries of the ring into cycles. The same machine zero is the same object as long as it does not change."""
+class CycleUnpacker:
+    """Unpacks cycles. The same machine zero is the same object as long as it does not change."""
 
     def __init__(self) -> None:
         self._zero: MachineZero | StateError | None = None
         self._zero_bytes = b""
 
-    def decode(self, content: bytes) -> SentCycle:
+    def unpack(self, content: bytes) -> SentCycle:
         """The cycle in an entry's content."""
-        fields, image, zero_bytes, target, ending, state, same_zero, names, approach = pickle.loads(content)
-        if zero_bytes != self._zero_bytes:
+        readings, commands, (state, has_zero), line, names, approach = pickle.loads(content)
+        tick, time_s, image, zero_bytes = readings
+        if zero_bytes != self._zero_bytes or self._zero is None:
             zero = pickle.loads(zero_bytes)
             self._zero = MachineZero(**zero) if isinstance(zero, dict) else StateError(zero)
             self._zero_bytes = zero_bytes
-        assert self._zero is not None
-        setpoint = Setpoint(*fields)
-        snapshot = Snapshot(setpoint.time_s, unpack_readings(image))
-        inputs = CycleInputs(setpoint.seq, snapshot, self._zero, target, None, ending)
-        if same_zero and isinstance(self._zero, MachineZero):
+        target, ending = commands
+        inputs = CycleInputs(tick, Snapshot(time_s, unpack_readings(image)), self._zero, target, None, ending)
+        if has_zero and isinstance(self._zero, MachineZero):
             state = state._replace(zero=self._zero)
-        return SentCycle(setpoint._replace(inputs=inputs, state_before=state), ModelNames(*names), approach)
+        return SentCycle(inputs, state, line, ModelNames(*names), approach)

@@ -27,6 +27,7 @@ class Listeners:
         Raises DaemonError where an address cannot be had; what `before` has stays as it is then.
         """
         self._settings = settings
+        self.unix: socket.socket
         old = before._settings if before is not None else None
         same_unix = old is not None and old.unix.path == settings.unix.path
         same_tcp = old is not None and old.tcp == settings.tcp

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import Mode, State
-from compd.live.memory.setpoint_ring import SetpointRing
+from compd.live.memory.shared_ring import SharedRing
 
 # No loop that is alive is late by this much, however short its period.
 _SHORTEST_LIMIT_S = 0.02
@@ -24,7 +24,7 @@ class LoopWatch:
     loop, when it goes on, has higher ones.
     """
 
-    def __init__(self, ring: SetpointRing, period_s: float, fault: Callable[[], str | None], start_s: float) -> None:
+    def __init__(self, ring: SharedRing, period_s: float, fault: Callable[[], str | None], start_s: float) -> None:
         """`fault`: why the loop was started anew last; `start_s`: monotonic time at which the watch begins."""
         self.limit_s = max(_PERIODS * period_s, _SHORTEST_LIMIT_S)
         self._ring = ring

@@ -1,8 +1,8 @@
-"""The publisher: takes setpoints from the ring and sends them to clients. The loop never waits for it, and it waits
-for no client.
+"""The publisher: takes setpoints and cycles from their rings and sends them to clients.
 
-Its thread sleeps until a setpoint is there that a client is due for, encodes each once, sends it to the clients that
-are due, and answers their requests. Where the loop makes no setpoints, it says so in the loop's place.
+The loop never waits for it, and it waits for no client. Its thread sleeps until something is there that a client is due
+for, sends it to the clients that are due, and answers their requests. Where the loop makes no setpoints, it says so in
+the loop's place.
 """
 
 from __future__ import annotations
@@ -19,18 +19,16 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.loop.sent_cycle import CycleDecoder, SentCycle
+from compd.live.loop.sent_cycle import CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
-from compd.live.memory.setpoint_ring import ENTRIES, SetpointRing
-from compd.live.service.client_session import ClientSession
+from compd.live.memory.shared_ring import RingReader, SharedRing
+from compd.live.service.client_session import ClientSession, Stream
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
 
 MAX_CLIENTS = 32
-# Entries that the loop may write while one is read.
-_MARGIN = 16
 
 _log = structlog.get_logger()
 
@@ -40,50 +38,50 @@ class Publisher:
 
     Attributes
     ----------
-    dropped_setpoints : that the ring no longer had when they were to be read.
     dropped_clients : that were too far behind.
     """
 
     def __init__(
         self,
         listeners: Listeners,
-        ring: SetpointRing,
+        setpoints: SharedRing,
+        cycles: SharedRing,
         watch: LoopWatch,
         period_s: float,
         clock: Clock,
-        observers: Sequence[Callable[[Setpoint], None]] = (),
-        every_cycle: bool = False,
+        observers: Sequence[Callable[[SentSetpoint], None]] = (),
+        packet_hash: bytes | None = None,
     ) -> None:
         """`period_s`: of the loop. `observers` are called with every setpoint that is read, on the publisher's thread:
-        the first of a new state is always among them, for the log, and with `every_cycle` all of them are read."""
+        the first of a new state is always among them, for the log. With a `packet_hash` there are UDP packets, and all
+        setpoints are read."""
         self._listeners = listeners
-        self._ring = ring
+        self._setpoints, self._cycles = RingReader(setpoints), RingReader(cycles)
         self._watch = watch
         self._half_period_s = period_s / 2
         self._clock = clock
         self._observers = tuple(observers)
-        self._every_cycle = every_cycle
-        self._decoder = CycleDecoder()
+        self._packet_hash = packet_hash
+        self._unpacker = CycleUnpacker()
         self._sessions: set[ClientSession] = set()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
         self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
         self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
-        self._next_entry = 0
-        self._next_due_s = math.inf
+        self._due_s = dict.fromkeys(Stream, math.inf)
         self._last_state = -1
-        self.dropped_setpoints = 0
         self.dropped_clients = 0
 
     def run(self, requests: Requests, keep_on: Callable[[], bool], each_round: Callable[[], None]) -> None:
         """Serve on this thread, as long as `keep_on`. `each_round` is called at least every `LoopWatch.limit_s`."""
         self._requests = requests
         self._selector = selectors.DefaultSelector()
-        if self._listeners.tcp is not None:
-            tcp = self._listeners.tcp
-            self._selector.register(tcp, selectors.EVENT_READ, partial(self._accept, tcp, False))
-        unix = self._listeners.unix
-        self._selector.register(unix, selectors.EVENT_READ, partial(self._accept, unix, True))
-        self._selector.register(self._ring.woken, selectors.EVENT_READ, self._be_woken)
+        for listener in (self._listeners.tcp, self._listeners.unix):
+            if listener is not None:
+                listener.setblocking(False)
+                accept = partial(self._accept, listener, listener is self._listeners.unix)
+                self._selector.register(listener, selectors.EVENT_READ, accept)
+        for reader in (self._setpoints, self._cycles):
+            self._selector.register(reader.ring.woken, selectors.EVENT_READ, partial(self._be_woken, reader.ring))
         self._schedule()
         while keep_on():
             for key, events in self._selector.select(self._watch.limit_s):
@@ -94,7 +92,7 @@ class Publisher:
     def end(self, reason: str) -> None:
         """Send a last setpoint, a `stop` with this reason, and close every connection."""
         self._forward()
-        self._publish(SentCycle(self._watch.stop(self._clock.monotonic(), reason)))
+        self._publish_in_place_of_loop(self._watch.stop(self._clock.monotonic(), reason))
         for session in self._sessions:
             session.close()
         self._selector.close()
@@ -104,7 +102,7 @@ class Publisher:
         return {
             "clients": len(self._sessions),
             "dropped_clients": self.dropped_clients,
-            "dropped_setpoints": self.dropped_setpoints,
+            "dropped_setpoints": self._setpoints.dropped + self._cycles.dropped,
         }
 
     def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
@@ -147,54 +145,57 @@ class Publisher:
     def _answer_later(self, session: ClientSession, answer: bytes) -> None:
         """Hand an answer that took time to the publisher's thread; called from any thread."""
         self._answers.append((session, answer))
-        self._ring.wake_reader()
+        self._setpoints.ring.wake_reader()
 
-    def _be_woken(self, _events: int) -> None:
-        """Send the late answers; the setpoints follow at the end of the round."""
-        os.eventfd_read(self._ring.woken)
+    def _be_woken(self, ring: SharedRing, _events: int) -> None:
+        """Send the late answers; what is in the rings follows at the end of the round."""
+        os.eventfd_read(ring.woken)
         while self._answers:
             self._send(*self._answers.popleft())
 
     def _forward(self) -> None:
-        """Publish the setpoints that are due and those of a new state; where there are none from the loop, say so."""
-        ring = self._ring
-        count = ring.count
-        if (behind := count - self._next_entry - ENTRIES + _MARGIN) > 0:
-            self.dropped_setpoints += behind
-            self._next_entry += behind
-        while self._next_entry < count:
-            time_s, state = ring.when(self._next_entry)
-            is_due = self._every_cycle or time_s >= self._next_due_s - self._half_period_s
-            if is_due or state != self._last_state:
-                if (entry := ring.get(self._next_entry)) is None:
-                    self.dropped_setpoints += 1
-                else:
-                    cycle = self._decoder.decode(entry.content)
-                    self._watch.note(cycle.setpoint.seq)
-                    self._publish(cycle)
-                    self._schedule()
-            self._next_entry += 1
+        """Publish what is due; where there is nothing from the loop, say so."""
+        for content in self._setpoints.contents(self._is_setpoint_due):
+            setpoint = SentSetpoint.unpack(content)
+            self._watch.note(setpoint.seq)
+            self._publish(setpoint)
+        for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
+            cycle = self._unpacker.unpack(content)
+            readings = self._requests.readings
+            assert readings is not None, "who watches them has been told their columns"
+            self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
         if (stop := self._watch.missing(self._clock.monotonic())) is not None:
-            self._publish(SentCycle(stop))
-            self._schedule()
+            self._publish_in_place_of_loop(stop)
 
-    def _publish(self, cycle: SentCycle) -> None:
-        """Send a cycle to the clients that are due. It is encoded once per kind of message."""
-        setpoint = cycle.setpoint
+    def _is_setpoint_due(self, time_s: float, state: int) -> bool:
+        return self._packet_hash is not None or state != self._last_state or self._is_due(Stream.SETPOINTS, time_s)
+
+    def _is_due(self, stream: Stream, time_s: float) -> bool:
+        return time_s >= self._due_s[stream] - self._half_period_s
+
+    def _publish(self, setpoint: SentSetpoint) -> None:
         self._last_state = setpoint.state.code
         for observe in self._observers:
             observe(setpoint)
-        encoded: dict[Callable[[SentCycle], bytes], bytes] = {}
+        self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
+
+    def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
+        self._publish(SentSetpoint.of(setpoint, self._packet_hash))
+
+    def _send_to_watchers(self, stream: Stream, time_s: float, line: bytes) -> None:
+        """Send a line to the clients of a stream that are due at `time_s`."""
         for session in list(self._sessions):
-            if session.take(setpoint.time_s, self._half_period_s):
-                if session.encode not in encoded:
-                    encoded[session.encode] = session.encode(cycle)
-                self._send(session, encoded[session.encode])
+            if session.stream is stream and session.take(time_s, self._half_period_s):
+                self._send(session, line)
+        self._schedule()
 
     def _schedule(self) -> None:
-        """Note when the next client is due, and ask to be woken then."""
-        self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
-        self._ring.wake_from(-math.inf if self._every_cycle else self._next_due_s - self._half_period_s)
+        """Note when the next client of each stream is due, and ask to be woken then."""
+        for stream, reader in ((Stream.SETPOINTS, self._setpoints), (Stream.READINGS, self._cycles)):
+            due_s = min((session.due_s for session in self._sessions if session.stream is stream), default=math.inf)
+            self._due_s[stream] = due_s
+            every_one = stream is Stream.SETPOINTS and self._packet_hash is not None
+            reader.ring.wake_from(-math.inf if every_one else due_s - self._half_period_s)
 
     def _send(self, session: ClientSession, data: bytes) -> None:
         if data and session.open and not session.send(data):

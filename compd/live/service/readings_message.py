@@ -50,14 +50,11 @@ class ReadingsMessage:
         self._channels = tuple(channels)
 
     def line(self, cycle: SentCycle) -> bytes:
-        """The READINGS line of a cycle, with its newline; b"" for a setpoint that no cycle has made."""
-        setpoint = cycle.setpoint
-        inputs, state = setpoint.inputs, setpoint.state_before
-        if inputs is None or state is None:
-            return b""
+        """The READINGS line of a cycle, with its newline."""
+        inputs = cycle.inputs
         message: dict[str, Any] = {
             "class": "READINGS",
-            "seq": setpoint.seq,
+            "seq": inputs.tick,
             "time_s": inputs.snapshot.time_s,
             "readings": dict(zip(self._channels, map(_reading, inputs.snapshot.readings), strict=True)),
         }
@@ -75,8 +72,8 @@ class ReadingsMessage:
         message |= cycle.models.hashes
         if cycle.models.files:
             message["model_files"] = cycle.models.files
-        message["carried"] = _carried(state, inputs)
-        return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
+        message["carried"] = _carried(cycle.state_before, inputs)
+        return line(message)[:-2] + b',"setpoint":' + cycle.setpoint_line[:-1] + b"}\n"
 
 
 def columns(wires: MachineWires) -> list[dict[str, Any]]:

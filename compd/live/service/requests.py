@@ -18,12 +18,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from compd.live.loop.commands import Commands, Target
-from compd.live.service.client_session import (
-    MAX_BEHIND_BYTES,
-    MAX_READINGS_BEHIND_BYTES,
-    ClientSession,
-    setpoint_line,
-)
+from compd.live.service.client_session import ClientSession, Stream
 from compd.live.service.message_keys import (
     ErrorKeys,
     Keys,
@@ -143,12 +138,12 @@ class WatchRequest(Request):
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
         message = {"class": self.wire_name, **self.model_dump(exclude_unset=True)}
         if self.what == "setpoints":
-            client.watch(self.rate_hz, setpoint_line, MAX_BEHIND_BYTES)
+            client.watch(self.rate_hz, Stream.SETPOINTS)
             return line(message)
         if not client.local or requests.readings is None:
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
-        client.watch(self.rate_hz, requests.readings.line, MAX_READINGS_BEHIND_BYTES)
+        client.watch(self.rate_hz, Stream.READINGS)
         return line(message | {"columns": requests.readings.columns})
 
 

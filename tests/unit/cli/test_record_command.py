@@ -184,7 +184,7 @@ def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, ca
 
 @pytest.mark.usefixtures("drifting")
 def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_nothing(tmp_path):
-    with daemon_at(tmp_path) as (_, daemon, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
+    with daemon_at(tmp_path) as (_, _, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
         lines = slow.readings()
         next(lines)
         seqs = [next(lines)[1]["seq"]]

@@ -20,7 +20,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models
-from compd.live.loop.sent_cycle import CycleDecoder, CycleEncoder
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
@@ -245,7 +245,7 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
     one = live.loader.read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
     two = live.loader.read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
     transcript = ReadingsMessage(live.wires, live.latest.channels)
-    encoder = CycleEncoder(live.latest, Directions(live.wires.scale.wires))
+    packer = CyclePacker(live.latest, Directions(live.wires.scale.wires))
     commands = {
         0: None,
         20: Models(one),
@@ -262,7 +262,7 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
         sent = live.step()
         states.add(sent.state)
         read = parse_readings(
-            json.loads(transcript.line(CycleDecoder().decode(encoder.encode(sent)))), live.latest.channels
+            json.loads(transcript.line(CycleUnpacker().unpack(packer.pack(sent, sent.to_json())))), live.latest.channels
         )
         models = sent.inputs.models or again.settings.without_effects
         replayed, _ = step(read.state._replace(models=models), read.inputs._replace(models=models), again.settings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import pickle
 import socket
 import threading
 from contextlib import closing
@@ -16,9 +15,10 @@ from compd.clock import MonotonicClock
 from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError, Problem, StateError
 from compd.live.loop.commands import Commands
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
-from compd.live.memory.setpoint_ring import ENTRIES, SetpointRing
+from compd.live.memory.shared_ring import ENTRIES, SharedRing
 from compd.live.service.listeners import Listeners
 from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.publisher import Publisher
@@ -94,9 +94,9 @@ class Service:
         self.zeros = []
         self.models = []
         self.listeners = Listeners(sockets)
-        self.ring = SetpointRing()
+        self.ring = SharedRing()
         self.publisher = Publisher(
-            self.listeners, self.ring, LoopIsWell(), PERIOD_S, MonotonicClock(), [self.observed.append]
+            self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, MonotonicClock(), [self.observed.append]
         )
         requests = Requests(
             VERSION,
@@ -116,9 +116,7 @@ class Service:
         self.publisher.end("the test is over")
 
     def deliver(self, setpoint):
-        no_zero = pickle.dumps(NO_ZERO.problems)
-        cycle = (tuple(setpoint[:9]), b"", no_zero, None, "", None, False, ({}, {}), ())
-        self.ring.put(setpoint.time_s, setpoint.state.code, pickle.dumps(cycle))
+        self.ring.put(setpoint.time_s, setpoint.state.code, SentSetpoint.of(setpoint, None).pack())
 
     def unix(self, **options):
         return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))
@@ -353,7 +351,7 @@ def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(servic
         assert seq < 50_000, "the slow client was never dropped"
         service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
         assert good.read()["seq"] == seq
-    assert service.publisher.dropped_setpoints == 0
+    assert service.publisher.summary()["dropped_setpoints"] == 0
     good.ask({"class": "STATUS"})
     assert service.publisher.summary()["clients"] == 1
     while slow.socket.recv(65536):
@@ -379,7 +377,7 @@ def test_a_full_queue_drops_the_oldest_and_counts_them(service):
     assert peer.read()["seq"] == 0
     dropped = peer.read()["seq"] - 1
     assert 600 - ENTRIES <= dropped <= 600 - ENTRIES + 20, "all but what the ring has, less a margin"
-    assert service.publisher.dropped_setpoints == dropped
+    assert service.publisher.summary()["dropped_setpoints"] == dropped
 
 
 def test_beyond_the_last_seat_a_client_is_told_and_closed(service):

@@ -1,4 +1,4 @@
-"""The ring through which setpoints go from the loop to the service, without either waiting for the other.
+"""A ring through which entries go from the loop to the service, without either waiting for the other.
 
 The memory begins with a head of 16 bytes, and has `ENTRIES` places of `PLACE_BYTES` after it:
 
@@ -6,8 +6,8 @@ The memory begins with a head of 16 bytes, and has `ENTRIES` places of `PLACE_BY
     due        8 bytes, float64: monotonic time from which on the reader wants to be woken
 
     version    8 bytes: 2 k + 1 while entry k is being written, 2 k + 2 once it is whole
-    time_s     8 bytes, float64: monotonic time of the setpoint
-    state      8 bytes: number of its state
+    time_s     8 bytes, float64: monotonic time of the cycle
+    state      8 bytes: number of the setpoint's state
     length     4 bytes
     checksum   4 bytes: CRC-32 of the content
     content    `length` bytes
@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 import os
 import zlib
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from compd.live.memory.shared_array import shared_memory
@@ -30,18 +31,20 @@ _HEAD_BYTES = 16
 _HEADER_BYTES = 32
 LONGEST_CONTENT = PLACE_BYTES - _HEADER_BYTES
 _CHECKSUM_BITS = 32
+# Entries that may be written while one is read.
+_MARGIN = 16
 
 
 class Entry(NamedTuple):
-    """One entry of the ring: time (s) and number of the state of a setpoint, and its content."""
+    """One entry: monotonic time (s) of a cycle, number of its setpoint's state, and the content."""
 
     time_s: float
     state: int
     content: bytes
 
 
-class SetpointRing:
-    """The ring. One loop writes it at any time; whoever reads keeps count of what has been read."""
+class SharedRing:
+    """A ring. One loop writes it at any time; whoever reads keeps count of what has been read."""
 
     def __init__(self) -> None:
         memory = memoryview(shared_memory(_HEAD_BYTES + ENTRIES * PLACE_BYTES))
@@ -60,8 +63,8 @@ class SetpointRing:
         return self._count[0]
 
     def wake_from(self, time_s: float) -> None:
-        """Ask to be woken, through `woken`, by the first setpoint that is not older than `time_s` (s), and by each
-        one of a new state."""
+        """Ask to be woken, through `woken`, by the first entry that is not older than `time_s` (s), and by each one
+        of a new state."""
         self._due_s[0] = time_s
 
     def put(self, time_s: float, state: int, content: bytes) -> None:
@@ -108,3 +111,36 @@ class SetpointRing:
     def close(self) -> None:
         """Close `woken`."""
         os.close(self.woken)
+
+
+class RingReader:
+    """Reads a ring from the oldest entry on that it has.
+
+    Attributes
+    ----------
+    dropped : entries that the ring no longer had when they were to be read.
+    """
+
+    def __init__(self, ring: SharedRing) -> None:
+        self.ring = ring
+        self.dropped = 0
+        self._next = 0
+
+    def contents(self, is_due: Callable[[float, int], bool]) -> Iterator[bytes]:
+        """The contents of the entries that are new and due; the others are passed over.
+
+        is_due : asked with time (s) and state's number of each, when all before it have been dealt with.
+        """
+        count = self.ring.count
+        if (behind := count - self._next - ENTRIES + _MARGIN) > 0:
+            self.dropped += behind
+            self._next += behind
+        while self._next < count:
+            number = self._next
+            self._next += 1
+            if is_due(*self.ring.when(number)):
+                entry = self.ring.get(number)
+                if entry is None:
+                    self.dropped += 1
+                else:
+                    yield entry.content
