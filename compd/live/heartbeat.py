@@ -6,6 +6,8 @@ import math
 
 _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 5.0
+# Looks that a process may take until its first beat.
+_STARTS_WITHIN = 100
 # A process that has run for so long has recovered.
 _RECOVERED_S = 10.0
 
@@ -19,25 +21,26 @@ class Heartbeat:
     def __init__(self, hung_after: int) -> None:
         """`hung_after`: looks without a beat after which the process hangs."""
         self._hung_after = hung_after
-        self._beats = -1
+        self._beats = 0
         self._without = 0
+        self._starting = True
 
     @property
     def hangs(self) -> bool:
         """Whether the last looks found no beat."""
-        return self._without >= self._hung_after
+        return self._without >= (_STARTS_WITHIN if self._starting else self._hung_after)
 
     def look(self, beats: int) -> bool:
         """Whether there was a beat since the last look. beats : how many there have ever been."""
         if beats != self._beats:
-            self._beats, self._without = beats, 0
+            self._beats, self._without, self._starting = beats, 0, False
             return True
         self._without += 1
         return False
 
     def reset(self) -> None:
-        """Begin to count anew: the process is another one."""
-        self._without = 0
+        """Begin to count anew: the process is another one, which has yet to start."""
+        self._without, self._starting = 0, True
 
 
 class RestartDelay:

@@ -144,10 +144,12 @@ class Supervisor:
         if self._loop_delay.take(now_s):
             # a state with which the loop has ended twice is not given to it a third time
             self._loops.start(forget=self._loop_delay.failures > 1)
+            self._loop_heart.reset()
             self._tell()
         for name, child in self._acquisition.items():
             if self._acquisition_delays[name].take(now_s):
                 child.start()
+                self._acquisition_hearts[name].reset()
                 self._tell()
 
     def _look(self, now_s: float) -> None:
@@ -157,14 +159,12 @@ class Supervisor:
             self._notifier.beat(now_s)
         elif self._loop_heart.hangs and loop.running:
             loop.kill("it hung, and was killed")
-            self._loop_heart.reset()
         if not self._service_heart.look(self._control.service_beats) and self._service_heart.hangs:
             self._service.kill("it hung, and was killed")
         for process in daemon.acquisition:
             heart, child = self._acquisition_hearts[process.name], self._acquisition[process.name]
             if not heart.look(process.beats) and heart.hangs and child.running:
                 child.kill("it hung, and was killed")
-                heart.reset()
 
     def _pass_on(self) -> None:
         """The first cycle and the machine's state go to the service manager, a wish for another model to a new loop."""
