@@ -20,7 +20,10 @@ START_WITHIN_S = 30
 
 @contextmanager
 def supervised(configuration: Configuration, notifier: Notifier | None = None) -> Iterator[Daemon]:
-    """Its processes run, and its gauges are polled, until the block ends. What the daemon shares with them can be read and written here."""
+    """Its processes run, and its gauges are polled, until the block ends.
+
+    What the daemon shares with them can be read and written here.
+    """
     clock = MonotonicClock()
     daemon = Daemon(configuration)
     notifier = notifier or Notifier("")
