@@ -58,7 +58,8 @@ class Control:
 
     Attributes
     ----------
-    loop_fault : text, why the loop was started anew last; for the reason of a `stop`. Written by the supervisor.
+    loop_fault : (monotonic time in s, text) of the last end of a loop, for the reason of a `stop`. Written by the
+        supervisor.
     realtime : what the system granted to the loop. Written by the loop that has the turn.
     processes : STATUS's part about the processes. Written by the supervisor.
     headline : one line about the machine's state, for the service manager. Written by the service.

@@ -32,6 +32,8 @@ from compd.live.memory.shared_ring import LONGEST_CONTENT, SharedRing
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20
+# Priority for these cycles, below every `loop.priority`.
+_TRIAL_PRIORITY = 1
 # A loop that is alive gives the turn within a period.
 _TURN_WITHIN_S = 2.0
 
@@ -72,10 +74,10 @@ class LoopProcess:
         models = self.adopted.load(self.loader)
         self.commands.models = models
         loop = self._loop()
-        state = self._state_left(models, forget)
-        self._try_cycles(state)
         self._prepare(loop)
-        loop.run(lambda: self.control.keeps_turn(number), self.control.ending, state)
+        self._try_cycles(self._state_left(models, forget))
+        realtime.use_fifo(self.settings.loop.priority)
+        loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
 
     def run_successor(self, number: int, request: ModelRequest) -> None:
         """Read and try the model that is asked for, take the turn and cycle; or answer why not."""
@@ -85,12 +87,13 @@ class LoopProcess:
             models = self._models_wanted(before, request)
             self.commands.models = models
             loop = self._loop()
-            self._try_cycles(self._state_left(before, forget=False))
             self._prepare(loop)
+            self._try_cycles(self._state_left(before, forget=False))
         except (CompdError, ValueError) as error:
             _log.warning("model refused", file=request.file, reason=str(error))
             self.answer(request.number, None, str(error))
             return
+        realtime.use_fifo(self.settings.loop.priority)
         if not control.await_turn(number, _TURN_WITHIN_S):
             self.answer(request.number, None, "the loop does not answer")
             return
@@ -133,6 +136,8 @@ class LoopProcess:
         if settings.lock_memory:
             permissions["locked_memory"] = realtime.lock_memory()
         permissions["sched_fifo"] = realtime.use_fifo(settings.priority)
+        # what follows must not get in the way of the loop that has the turn
+        realtime.use_fifo(_TRIAL_PRIORITY)
         self.control.realtime.write({name: permission._asdict() for name, permission in permissions.items()})
 
     def _try_cycles(self, state: CycleState) -> None:

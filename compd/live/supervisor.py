@@ -130,7 +130,7 @@ class Supervisor:
         if self._loops.collect(self._request):
             self._loop_delay.ended(self._loops.loop.started_s, now_s)
             how = f"{self._loops.loop.last_end}; it starts anew"
-            self._control.loop_fault.write(f"the loop has ended: {how}")
+            self._control.loop_fault.write((now_s, f"the loop has ended: {how}"))
             _log.error("the loop has ended", how=how)
             self._tell()
         for name, child in self._acquisition.items():

@@ -87,17 +87,17 @@ class LoopTiming:
         return float(self._numbers[0])
 
     def begin(self, now_s: float) -> int:
-        """Begin to cycle at `now_s`: the number of the next tick. The first loop to do so sets the grid; ticks that
-        went by since the loop before it are missed cycles."""
+        """Begin to cycle at `now_s`: the number of the next tick, or of the last one where no loop has computed it.
+
+        The first loop to begin sets the grid. For another one, ticks that went by since the loop before it are missed.
+        """
         if not self.origin_s:
             self._numbers[0] = now_s
-        tick = self.tick_after(now_s)
-        self._numbers[2] += max(tick - int(self._numbers[6]) - 1, 0)
+            return 1
+        following = int(self._numbers[6]) + 1
+        tick = max(following, math.floor((now_s - self.origin_s) / self.period_s))
+        self._numbers[2] += tick - following
         return tick
-
-    def tick_after(self, time_s: float) -> int:
-        """Number of the first tick whose time is later than `time_s` (s)."""
-        return math.floor((time_s - self.origin_s) / self.period_s) + 1
 
     def note_start(self, wake_s: float, now_s: float) -> None:
         """A cycle begins at `now_s` that should have begun at `wake_s`."""

@@ -9,9 +9,11 @@ from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import Mode, State
 from compd.live.memory.shared_ring import SharedRing
 
-# No loop that is alive is late by this much, however short its period.
+# Within two periods, and not sooner than 20 ms, clients are told that there is no setpoint. A part of that time is left
+# for the way to them.
 _SHORTEST_LIMIT_S = 0.02
 _PERIODS = 2
+_SHARE = 0.8
 _REPEAT_EVERY_S = 0.1
 # The first loop starts with the daemon.
 _FIRST_WITHIN_S = 5.0
@@ -20,13 +22,15 @@ _FIRST_WITHIN_S = 5.0
 class LoopWatch:
     """Looks after the loop on behalf of the clients; used by the publisher's thread.
 
-    A setpoint without a loop has the next number after the last one. The ticks of these numbers have passed, so the
-    loop, when it goes on, has higher ones.
+    A setpoint without a loop has the next number after the last one. A loop that comes too late with that number has
+    missed it.
     """
 
-    def __init__(self, ring: SharedRing, period_s: float, fault: Callable[[], str | None], start_s: float) -> None:
-        """`fault`: why the loop was started anew last; `start_s`: monotonic time at which the watch begins."""
-        self.limit_s = max(_PERIODS * period_s, _SHORTEST_LIMIT_S)
+    def __init__(
+        self, ring: SharedRing, period_s: float, fault: Callable[[], tuple[float, str] | None], start_s: float
+    ) -> None:
+        """`fault`: monotonic time (s) and reason of the last end of a loop; `start_s`: when the watch begins."""
+        self.limit_s = _SHARE * max(_PERIODS * period_s, _SHORTEST_LIMIT_S)
         self._ring = ring
         self._fault = fault
         self._start_s = start_s
@@ -35,9 +39,19 @@ class LoopWatch:
         self._count = 0
         self._seq = 0
 
-    def note(self, seq: int) -> None:
-        """A setpoint of the loop with this number is published."""
+    def admits(self, seq: int) -> bool:
+        """Whether a setpoint of the loop with this number may still be published."""
+        if seq <= self._seq:
+            return False
         self._seq = seq
+        return True
+
+    def wait_s(self, now_s: float) -> float:
+        """How long to wait, at most, before asking `missing` again, s."""
+        count = self._ring.count
+        last_s = self._ring.when(count - 1)[0] if count else self._start_s
+        left_s = last_s + self.limit_s - now_s
+        return left_s if left_s > 0 else self.limit_s
 
     def missing(self, now_s: float) -> Setpoint | None:
         """The `stop` to publish at `now_s`, where the loop has made no setpoint for `limit_s`; None otherwise."""
@@ -49,8 +63,8 @@ class LoopWatch:
             return None
         self._next_s = now_s + self._repeat_every_s
         reason = f"the loop has made no setpoint for {now_s - last_s:.3f} s"
-        if fault := self._fault():
-            reason += f"; {fault}"
+        if (fault := self._fault()) is not None and fault[0] >= last_s:
+            reason += f"; {fault[1]}"
         return self.stop(now_s, reason)
 
     def stop(self, now_s: float, reason: str) -> Setpoint:

@@ -84,7 +84,7 @@ class Publisher:
             self._selector.register(reader.ring.woken, selectors.EVENT_READ, partial(self._be_woken, reader.ring))
         self._schedule()
         while keep_on():
-            for key, events in self._selector.select(self._watch.limit_s):
+            for key, events in self._selector.select(self._watch.wait_s(self._clock.monotonic())):
                 key.data(events)
             self._forward()
             each_round()
@@ -157,8 +157,8 @@ class Publisher:
         """Publish what is due; where there is nothing from the loop, say so."""
         for content in self._setpoints.contents(self._is_setpoint_due):
             setpoint = SentSetpoint.unpack(content)
-            self._watch.note(setpoint.seq)
-            self._publish(setpoint)
+            if self._watch.admits(setpoint.seq):
+                self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
             cycle = self._unpacker.unpack(content)
             readings = self._requests.readings

@@ -73,8 +73,11 @@ class LoopIsWell:
 
     limit_s = 1.0
 
-    def note(self, seq):
-        pass
+    def admits(self, seq):
+        return True
+
+    def wait_s(self, now_s):
+        return self.limit_s
 
     def missing(self, now_s):
         return None
