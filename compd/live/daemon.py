@@ -154,7 +154,15 @@ class Daemon:
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
         self.service = ServiceProcess(
-            publisher, requests, zero_capture, model_switch, packets, self.control, clock, logs
+            publisher,
+            requests,
+            zero_capture,
+            model_switch,
+            packets,
+            self.control,
+            clock,
+            logs,
+            configuration.loop.priority // 2,
         )
 
     def log_pipe(self, process: str) -> int:

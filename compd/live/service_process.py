@@ -13,6 +13,7 @@ from compd.live.control import Control, Phase
 from compd.live.log_relay import LogRelay
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.states import State
+from compd.live.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.requests import Requests
@@ -45,6 +46,7 @@ class ServiceProcess:
     """The parts of the daemon that serve, all made before the process was forked.
 
     logs : descriptors from which the other processes' output is read, by their name.
+    priority : for the thread that serves, below the loop's; 0 for none.
     """
 
     publisher: Publisher
@@ -55,19 +57,25 @@ class ServiceProcess:
     control: Control
     clock: Clock
     logs: Mapping[str, int]
+    priority: int
 
     def run(self) -> None:
         """Serve until the daemon stops."""
         relay = LogRelay(self.logs, _write, self.clock)
         relay.start()
-        self.publisher.run(self.requests, lambda: self.control.phase != Phase.STOPPING, self._each_round)
+        shorten_switch_interval()
+        sharpen_timers()
+        priority = RationedPriority(self.priority, self.clock)
+
+        def each_round() -> None:
+            self.control.beat_service()
+            self.model_switch.look()
+            priority.look()
+
+        self.publisher.run(self.requests, lambda: self.control.phase != Phase.STOPPING, each_round)
         self.publisher.end(self.control.ending())
         self.zero_capture.stop()
         relay.stop()
-
-    def _each_round(self) -> None:
-        self.control.beat_service()
-        self.model_switch.look()
 
 
 def _write(line: str) -> None:

@@ -6,15 +6,16 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from compd.live.memory.shared_array import shared_floats
 
-_BIN_US = 5.0
-_BINS = 2000  # 10 ms; later ones share the last bin, the largest is kept exactly
+BIN_US = 1.0
+_BINS = 10_000  # 10 ms; later ones share the last bin, the largest is kept exactly
 
 
 class Histogram:
-    """Durations counted in bins of 5 us, for their median and other quantiles. One process adds, others read."""
+    """Durations counted in bins of 1 us, for their median and other quantiles. One process adds, others read."""
 
     def __init__(self) -> None:
         numbers = shared_floats(_BINS + 3)
@@ -27,6 +28,11 @@ class Histogram:
         return int(self._totals[0])
 
     @property
+    def counts(self) -> npt.NDArray[np.float64]:
+        """How many durations were in each bin of `BIN_US`, the last one for all that are longer."""
+        return self._counts.copy()
+
+    @property
     def largest_us(self) -> float:
         """The longest one, us; 0.0 where none was added."""
         return float(self._totals[1])
@@ -34,7 +40,7 @@ class Histogram:
     def add(self, duration_s: float) -> None:
         """Count one duration; a negative one counts as zero."""
         us = max(duration_s * 1e6, 0.0)
-        self._counts[min(int(us / _BIN_US), _BINS)] += 1
+        self._counts[min(int(us / BIN_US), _BINS)] += 1
         totals = self._totals
         totals[0] += 1
         totals[1] = max(totals[1], us)
@@ -44,7 +50,7 @@ class Histogram:
         if not self.count:
             return math.nan
         bin_ = int(np.searchsorted(np.cumsum(self._counts), math.ceil(share * self.count)))
-        return self.largest_us if bin_ >= _BINS else min((bin_ + 1) * _BIN_US, self.largest_us)
+        return self.largest_us if bin_ >= _BINS else min((bin_ + 1) * BIN_US, self.largest_us)
 
     def summary(self) -> dict[str, float]:
         """Median, 99th percentile and largest; {} where none was added."""

@@ -25,11 +25,12 @@ from compd.gauge import Quality, Reading, bad
 from compd.live.memory.shared_array import shared_memory
 
 _SLOT = struct.Struct("=ddBBxxI168s")
+_HEAD = struct.Struct("=ddBBxxI")
 _CHECKED = struct.Struct("=ddBBxx")
-_CHECKSUM = slice(_CHECKED.size, _CHECKED.size + 4)
+_CHECKED_BYTES = _CHECKED.size
 SLOT_BYTES = _SLOT.size
-_LONGEST_DETAIL = 168
-_TRIES = 4
+_LONGEST_DETAIL = SLOT_BYTES - _HEAD.size
+_TRIES = 2
 
 _QUALITIES = tuple(Quality)
 _NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
@@ -69,7 +70,7 @@ class Latest:
         # what this process has read so far
         self._seen = np.zeros(count, dtype=np.uint64)
         self._readings: list[Reading] = [bad(0.0, Quality.NEVER_READ)] * count
-        self._image = bytearray(b"".join(map(packed, self._readings)))
+        self._contents = list(map(packed, self._readings))
 
     def put(self, index: int, reading: Reading) -> None:
         """Replace the reading of the channel at `index`; called by the thread of the channel's line alone."""
@@ -81,28 +82,33 @@ class Latest:
 
     def snapshot(self, time_s: float) -> Snapshot:
         """All readings as they are now, under the time `time_s` (s)."""
-        for index in np.flatnonzero(self._version_array != self._seen).tolist():
-            self._read(index)
+        for _ in range(_TRIES):
+            before = self._version_array.copy()
+            changed = np.flatnonzero(before != self._seen).tolist()
+            if not changed:
+                break
+            slots = bytes(self._slots)
+            self._take(changed, before.tolist(), self._version_array.tolist(), slots)
         return Snapshot(time_s, tuple(self._readings))
 
     @property
     def image(self) -> bytes:
         """The readings of the last snapshot as bytes, for `unpack_readings`."""
-        return bytes(self._image)
+        return b"".join(self._contents)
 
-    def _read(self, index: int) -> None:
-        place = slice(index * SLOT_BYTES, (index + 1) * SLOT_BYTES)
-        for _ in range(_TRIES):
-            version = self._versions[index]
-            content = bytes(self._slots[place])
-            if version & 1 or version != self._versions[index]:
+    def _take(self, changed: list[int], before: list[int], after: list[int], slots: bytes) -> None:
+        """Take the readings from a copy of all slots, where the versions before and after it are the same and even."""
+        for index in changed:
+            version = before[index]
+            if version & 1 or version != after[index]:
                 continue
+            start = index * SLOT_BYTES
+            content = slots[start : start + SLOT_BYTES]
             reading = unpacked(content)
             if reading is not None:
                 self._readings[index] = reading
-                self._image[place] = content
+                self._contents[index] = content
                 self._seen[index] = version
-                return
 
 
 def packed(reading: Reading) -> bytes:
@@ -117,9 +123,11 @@ def packed(reading: Reading) -> bytes:
 
 def unpacked(content: bytes) -> Reading | None:
     """The reading in the content of a slot; None where its checksum does not fit."""
-    value, time_s, number, length, checksum, padded = _SLOT.unpack(content)
-    text = padded[:length]
-    if zlib.crc32(text, zlib.crc32(content[: _CHECKED.size])) != checksum:
+    value, time_s, number, length, checksum = _HEAD.unpack_from(content)
+    if not length:
+        return Reading(value, time_s, _QUALITIES[number]) if zlib.crc32(content[:_CHECKED_BYTES]) == checksum else None
+    text = content[_HEAD.size : _HEAD.size + length]
+    if zlib.crc32(text, zlib.crc32(content[:_CHECKED_BYTES])) != checksum:
         return None
     return Reading(value, time_s, _QUALITIES[number], text.decode())
 

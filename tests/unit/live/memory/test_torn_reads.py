@@ -28,12 +28,13 @@ def test_a_record_is_read_whole_while_it_is_written():
     source = contents()
     seen = set()
     with beside(lambda: record.write(next(source))):
-        for _ in range(READS):
+        for number in itertools.count():
             content = record.read()
             if content:
                 assert content == content[:1] * len(content)
                 seen.add(content[0])
-    assert len(seen) > 50, "the test is void unless it was written all the time"
+            if number > READS and len(seen) > 50:  # it was written all the time
+                break
 
 
 def test_a_record_whose_writer_was_killed_can_be_written_again():
@@ -64,7 +65,9 @@ def test_readings_are_never_mixed_from_two():
 
     newest = 0.0
     with beside(write):
-        for _ in range(READS):
+        for number in itertools.count():
+            if number > READS and newest > 100:
+                break
             first, second = latest.snapshot(1.0).readings
             if first.quality is Quality.TIMEOUT:
                 assert first.detail == str(int(first.value)) * 8
@@ -73,7 +76,6 @@ def test_readings_are_never_mixed_from_two():
             if second.ok:
                 assert second.value == -second.time_s
             assert unpack_readings(latest.image) == (first, second) or math.isnan(first.value) or not second.ok
-    assert newest > 100
 
 
 def test_a_slot_that_stays_half_written_keeps_the_reading_before():
