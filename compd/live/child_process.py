@@ -9,6 +9,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 
 from compd.clock import Clock
 
@@ -52,6 +53,15 @@ class ChildProcess:
     def running(self) -> bool:
         """Whether there is a process."""
         return self.pid != 0
+
+    @property
+    def is_debugged(self) -> bool:
+        """Whether a debugger has stopped the process, or may have: it does not hang then."""
+        try:
+            status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return "TracerPid:\t0\n" not in status
 
     def start(self) -> None:
         """Fork. The caller must have no other thread."""

@@ -27,8 +27,8 @@ from compd.live.systemd import Notifier
 
 # Between two looks at the beats of the processes.
 LOOK_EVERY_S = 0.1
-# Looks without a beat after which a process is killed, since it hangs: half a second, two, and five.
-_LOOP_LOOKS, _SERVICE_LOOKS, _ACQUISITION_LOOKS = 5, 20, 50
+# Looks without a beat after which a process is killed, since it hangs: half a second, and two.
+_LOOP_LOOKS, _SERVICE_LOOKS, _ACQUISITION_LOOKS = 5, 20, 20
 # How long the correction is held for the clients to see, and how long everything may then take to end.
 _HOLD_S = 0.2
 _END_WITHIN_S = 1.0
@@ -75,9 +75,11 @@ class Supervisor:
         reload : called at SIGHUP; whether the daemon is to end for another configuration, which has been found good.
         """
         with _signals() as signals:
-            for child in (self._service, *self._acquisition.values()):
+            for child in self._acquisition.values():
                 child.start()
             self._loops.start()
+            self._tell()  # before anybody can ask
+            self._service.start()
             self._tell()
             try:
                 return self._supervise(signals, reload)
@@ -154,17 +156,19 @@ class Supervisor:
 
     def _look(self, now_s: float) -> None:
         """Feed the watchdog from the loop's own beat, and kill what hangs."""
-        loop, daemon = self._loops.loop, self._daemon
+        daemon = self._daemon
         if self._loop_heart.look(daemon.setpoints.count):
             self._notifier.beat(now_s)
-        elif self._loop_heart.hangs and loop.running:
-            loop.kill("it hung, and was killed")
-        if not self._service_heart.look(self._control.service_beats) and self._service_heart.hangs:
-            self._service.kill("it hung, and was killed")
+        self._service_heart.look(self._control.service_beats)
+        hearts = [(self._loop_heart, self._loops.loop), (self._service_heart, self._service)]
         for process in daemon.acquisition:
-            heart, child = self._acquisition_hearts[process.name], self._acquisition[process.name]
-            if not heart.look(process.beats) and heart.hangs and child.running:
+            heart = self._acquisition_hearts[process.name]
+            heart.look(process.beats)
+            hearts.append((heart, self._acquisition[process.name]))
+        for heart, child in hearts:
+            if heart.hangs and child.running and not child.is_debugged:
                 child.kill("it hung, and was killed")
+        self._tell()
 
     def _pass_on(self) -> None:
         """The first cycle and the machine's state go to the service manager, a wish for another model to a new loop."""

@@ -168,6 +168,8 @@ class LineThread:
             if fault.quality not in NOTHING_UNDER_WAY:
                 line.drain()
             gauge.fail(fault.quality, fault.detail, self._clock.monotonic())
+        except MemoryError:  # it is the whole process that has none left
+            raise
         except Exception as error:  # a driver may raise anything; it must not end the line's thread
             if not gauge.reported:
                 gauge.reported = True

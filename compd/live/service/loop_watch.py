@@ -38,10 +38,11 @@ class LoopWatch:
         self._next_s = -math.inf
         self._count = 0
         self._seq = 0
+        self._stop_s = -math.inf
 
-    def admits(self, seq: int) -> bool:
-        """Whether a setpoint of the loop with this number may still be published."""
-        if seq <= self._seq:
+    def admits(self, seq: int, time_s: float) -> bool:
+        """Whether a setpoint of the loop, with this number and time (s), may still be published."""
+        if seq <= self._seq or time_s <= self._stop_s:
             return False
         self._seq = seq
         return True
@@ -70,4 +71,5 @@ class LoopWatch:
     def stop(self, now_s: float, reason: str) -> Setpoint:
         """A `stop` that the loop has not made."""
         self._seq += 1
+        self._stop_s = now_s
         return Setpoint(self._seq, now_s, now_s, math.nan, State.STOP, reason, Mode.CMM, None)

@@ -238,7 +238,7 @@ class PermissionKeys(Keys):
 class ProcessStatusKeys(Keys):
     """One of the daemon's processes."""
 
-    pid: int = Field(description="its number")
+    pid: int = Field(description="its number; 0 while it is not there")
     starts: int = Field(description="how often it was started")
     last_end: str | None = Field(default=None, description="how the one before it ended")
 

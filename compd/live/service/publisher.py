@@ -157,7 +157,7 @@ class Publisher:
         """Publish what is due; where there is nothing from the loop, say so."""
         for content in self._setpoints.contents(self._is_setpoint_due):
             setpoint = SentSetpoint.unpack(content)
-            if self._watch.admits(setpoint.seq):
+            if self._watch.admits(setpoint.seq, setpoint.time_s):
                 self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
             cycle = self._unpacker.unpack(content)

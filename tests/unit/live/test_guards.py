@@ -29,7 +29,7 @@ def ring():
 def test_the_loop_is_missed_within_two_periods_or_20_ms(ring, period_s, limit_s):
     watch = LoopWatch(ring, period_s, lambda: None, 0.0)
     ring.put(100.0, State.OK.code, b"")
-    assert watch.admits(41)
+    assert watch.admits(41, 100.0)
     assert watch.missing(100.0 + 0.99 * limit_s) is None
     stop = watch.missing(100.0 + 1.01 * limit_s)
     assert stop.state is State.STOP
@@ -40,8 +40,9 @@ def test_the_loop_is_missed_within_two_periods_or_20_ms(ring, period_s, limit_s)
     assert watch.missing(100.0 + 1.02 * limit_s) is None, "it is repeated, but not all the time"
     again = watch.missing(100.0 + limit_s + 1.2 * max(0.1, period_s))
     assert again.seq == 43
-    assert not watch.admits(43), "too late: that number has been sent"
-    assert watch.admits(44)
+    assert not watch.admits(43, 300.0), "too late: that number has been sent"
+    assert not watch.admits(44, again.time_s - 1e-6), "it had been computed, but the stop has been sent"
+    assert watch.admits(44, again.time_s + 1e-6)
     ring.put(200.0, State.OK.code, b"")
     assert watch.missing(200.0 + 0.5 * limit_s) is None
     assert watch.missing(200.0 + 1.5 * limit_s) is not None, "missed again at once"

@@ -73,7 +73,7 @@ class LoopIsWell:
 
     limit_s = 1.0
 
-    def admits(self, seq):
+    def admits(self, seq, time_s):
         return True
 
     def wait_s(self, now_s):
