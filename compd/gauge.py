@@ -37,10 +37,11 @@ Rules for every driver:
 - `read` does not sleep or log, nor repeat a poll that failed: the line's thread decides when to ask again.
 
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
-``driver: /etc/compd/my_gauge.py:MyGauge``. ``drivers/template`` is a complete package to copy, with a simulated device;
-``compd driver test`` tries a driver on wires that go wrong. A gauge whose protocol the drivers `serial_ascii`,
-`serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a folder of the entry-point group
-``compd.gauge_presets``.
+``driver: /etc/compd/my_gauge.py:MyGauge``. One that calls a library which may keep the interpreter or crash belongs on
+a line with a process of its own, ``acquisition: {own_process: [LINE]}``. ``drivers/template`` is a complete package to
+copy, with a simulated device; ``compd driver test`` tries a driver on wires that go wrong. A gauge whose protocol the
+drivers `serial_ascii`, `serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a folder
+of the entry-point group ``compd.gauge_presets``.
 """
 
 from __future__ import annotations

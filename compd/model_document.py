@@ -134,14 +134,14 @@ def read_stored(path: Path) -> StoredModel:
     return stored
 
 
-def read_document(path: Path) -> tuple[ModelDocument, StoredModel]:
+def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocument, StoredModel]:
     """Read a model file: the checked document, and the same with its effects as they were written.
 
-    Raises StateError as `read_stored` does.
+    content : of the file, where it has been read already. Raises StateError as `read_stored` does.
     """
     where = str(path)
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        data = yaml.safe_load((path.read_bytes() if content is None else content).decode())
     except OSError as error:
         raise StateError(
             Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")

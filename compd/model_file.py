@@ -183,15 +183,18 @@ class ModelFile:
         return {name: [getattr(number, name) for number in numbers] for name in EffectNumber.__dataclass_fields__}
 
 
-def read_model_file(path: Path, machine: str, links: int | None, geometry: str = "") -> ModelFile:
+def read_model_file(
+    path: Path, machine: str, links: int | None, geometry: str = "", content: bytes | None = None
+) -> ModelFile:
     """Read a model file for the machine of this name with so many links.
 
     links : 0 for an external model of a tip; None for an external model, of as many links as the file has numbers of.
     geometry : hash of the machine's geometry, where numbers that were fitted on another one are of no use.
+    content : of the file, where it has been read already.
     Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
     installed, numbers that are missing.
     """
-    document, stored = read_document(path)
+    document, stored = read_document(path, content)
     if stored.machine != machine:
         raise StateError(
             Problem(

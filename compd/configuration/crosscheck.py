@@ -10,9 +10,12 @@ from typing import Any, Literal
 from compd.configuration.document import Document, Location
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
-from compd.configuration.operation import FRAME_DISTANCES, JointWire, Wiring
+from compd.configuration.operation import FRAME_DISTANCES, AcquisitionSettings, JointWire, Wiring
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
+
+# Packages whose drivers are tried with compd's own tests, wire by wire.
+_OWN_PACKAGES = ("compd", "compd_drivers")
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,12 @@ class Sections:
     gauges: Mapping[str, GaugeOptions]
     drivers: Mapping[str, type[Gauge[Any]]]
     wiring: Wiring | None
+    acquisition: AcquisitionSettings | None = None
 
 
 def problems(sections: Sections) -> list[Problem]:
     """Every contradiction between sections that could be read."""
-    contradictions = [*_port_problems(sections), *_line_problems(sections)]
+    contradictions = [*_port_problems(sections), *_line_problems(sections), *_process_problems(sections)]
     if sections.wiring is not None:
         contradictions += [
             *_channel_problems(sections, sections.wiring),
@@ -42,7 +46,8 @@ def problems(sections: Sections) -> list[Problem]:
 
 
 def warnings(sections: Sections) -> list[Problem]:
-    """What can be used but is probably a mistake: lines without gauges, gauges without wires."""
+    """What can be used but is probably a mistake or a risk: lines without gauges, gauges without wires, drivers from
+    elsewhere in the process of the other lines."""
     used_lines = {options.line for options in sections.gauges.values()}
     unused = [
         Problem(
@@ -64,7 +69,7 @@ def warnings(sections: Sections) -> list[Problem]:
             for name in sections.gauges
             if name not in wired_gauges
         ]
-    return unused
+    return [*unused, *_shared_process_warnings(sections)]
 
 
 def resolve_channel(
@@ -128,6 +133,49 @@ def _line_problems(sections: Sections) -> Iterator[Problem]:
                 value=f"{options.line} (kind {line.kind})",
                 allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
+
+
+def _process_problems(sections: Sections) -> Iterator[Problem]:
+    """A line that is to have a process of its own and does not exist, or is named twice."""
+    lines = sections.document.data.get("lines")
+    if sections.acquisition is None or not isinstance(lines, dict):
+        return
+    named: set[str] = set()
+    for i, name in enumerate(sections.acquisition.own_process):
+        where = sections.document.where(("acquisition", "own_process", i))
+        if name not in lines:
+            yield Problem(
+                where=where,
+                what="no such line",
+                value=name,
+                allowed=", ".join(map(str, lines)),
+                next_step="write the name of a line under `lines:`",
+            )
+        elif name in named:
+            yield Problem(where=where, what="named twice", value=name, allowed="each line once", next_step="remove it")
+        named.add(name)
+
+
+def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
+    """A driver that is not part of compd, on a line that shares its process with others."""
+    if sections.acquisition is None:
+        return
+    own_process = sections.acquisition.own_process
+    for name, options in sections.gauges.items():
+        shared = set(sections.lines or ()).difference(own_process)
+        if options.line in shared and len(shared) > 1 and _from_elsewhere(options.driver, sections.drivers[name]):
+            yield Problem(
+                where=sections.document.where(("gauges", name, "driver")),
+                what="this driver is not part of compd and shares a process with other lines: if it keeps the "
+                "interpreter or crashes, their readings are late or lost too",
+                value=options.driver,
+                next_step=f"write `{options.line}` under `acquisition: own_process:`",
+            )
+
+
+def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:
+    """Whether a driver is a person's own file, or of another package than compd's. driver : as the file names it."""
+    return driver.startswith("/") or kind.__module__.partition(".")[0] not in _OWN_PACKAGES
 
 
 def _wires(wiring: Wiring) -> Iterator[tuple[Location, str, str]]:

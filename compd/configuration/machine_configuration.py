@@ -16,7 +16,14 @@ from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
 from compd.configuration.geometry import Geometry
 from compd.configuration.lines import LineSettings
-from compd.configuration.operation import LimitSettings, LoopSettings, SocketSettings, StateSettings, Wiring
+from compd.configuration.operation import (
+    AcquisitionSettings,
+    LimitSettings,
+    LoopSettings,
+    SocketSettings,
+    StateSettings,
+    Wiring,
+)
 from compd.configuration.section import unknown_key, validate, validation_problems
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
@@ -35,10 +42,13 @@ SECTIONS: Mapping[str, Any] = {
     ],
     "wiring": Wiring,
     "loop": LoopSettings,
+    "acquisition": AcquisitionSettings,
     "limits": LimitSettings,
     "sockets": SocketSettings,
     "state": StateSettings,
 }
+# What stands for a section that the file does not have.
+OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,8 +79,10 @@ class Configuration:
         Where clients connect.
     state : StateSettings
         What the daemon keeps across restarts.
+    acquisition : AcquisitionSettings
+        Which lines are polled in processes of their own.
     warnings : tuple of Problem
-        What can be used but is probably a mistake.
+        What can be used but is probably a mistake or a risk.
     """
 
     path: Path
@@ -84,6 +96,7 @@ class Configuration:
     limits: LimitSettings
     sockets: SocketSettings
     state: StateSettings
+    acquisition: AcquisitionSettings = OPTIONAL_SECTIONS["acquisition"]
     warnings: tuple[Problem, ...] = ()
 
     def gauge_objects(self) -> dict[str, Gauge[Any]]:
@@ -145,7 +158,10 @@ class Configuration:
     @property
     def config_hash(self) -> str:
         """Hash of everything in the file, equal for two daemons with the same configuration."""
-        return _hash(self, ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"))
+        fields = ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state")
+        # an optional section that says nothing changes no hash: recordings and controllers know those of older releases
+        said = tuple(name for name, default in OPTIONAL_SECTIONS.items() if getattr(self, name) != default)
+        return _hash(self, (*fields, *said))
 
     @property
     def geometry_hash(self) -> str:
@@ -171,12 +187,20 @@ def load(path: Path) -> Configuration:
     for name, kind in SECTIONS.items():
         if name in document.data:
             sections[name] = validate(kind, document, (name,), problems)
+        elif name in OPTIONAL_SECTIONS:
+            sections[name] = OPTIONAL_SECTIONS[name]
         else:
             sections[name] = None
             problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
     gauges, drivers = _gauges(document, problems)
     readable = crosscheck.Sections(
-        document, sections["geometry"], sections["lines"], gauges, drivers, sections["wiring"]
+        document,
+        sections["geometry"],
+        sections["lines"],
+        gauges,
+        drivers,
+        sections["wiring"],
+        sections["acquisition"],
     )
     problems += crosscheck.problems(readable)
     if problems:

@@ -1,4 +1,4 @@
-"""Sections on how the daemon runs: wiring, loop, limits, sockets, state."""
+"""Sections on how the daemon runs: wiring, loop, acquisition, limits, sockets, state."""
 
 from __future__ import annotations
 
@@ -87,6 +87,20 @@ class LoopSettings(Section):
         default=40, description="real-time priority of the loop (SCHED_FIFO), where permitted"
     )
     lock_memory: bool = Field(default=True, description="keep the daemon in memory (mlockall), where permitted")
+
+
+class AcquisitionSettings(Section):
+    """The processes in which the gauges are polled; the section may be left out."""
+
+    own_process: tuple[str, ...] = Field(
+        default=(),
+        description="names of lines that are each polled in a process of their own, so that what a driver there does "
+        "to the interpreter or to memory hits nothing else; all other lines share one process",
+    )
+    memory_mb: Annotated[int, Field(ge=32)] = Field(
+        default=512,
+        description="each of these processes may grow by this much (MB) before it is ended and started anew",
+    )
 
 
 class LimitSettings(Section):

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from compd.configuration.machine_configuration import SECTIONS
+from compd.configuration.machine_configuration import OPTIONAL_SECTIONS, SECTIONS
 from compd.plugins import GAUGES, load, names
 
 
@@ -36,7 +36,7 @@ def json_schema() -> dict[str, Any]:
         "title": "compd machine configuration",
         "type": "object",
         "additionalProperties": False,
-        "required": [*SECTIONS, "gauges"],
+        "required": [*(name for name in SECTIONS if name not in OPTIONAL_SECTIONS), "gauges"],
         "properties": properties,
         "$defs": definitions,
     }

@@ -1,9 +1,17 @@
-"""The daemon: acquisition, loop and services of one machine, started in order and stopped in reverse."""
+"""The daemon of one configuration: its parts, put together before its processes are forked.
+
+    supervisor     the main process: forks the others, watches them, heeds signals
+    loop           snapshot of the readings, one cycle, setpoint; nothing else, and in real time
+    acquisition    polls the gauges, a thread for each line; "line NAME" is one of a line of its own
+    service        sockets, machine zero, logs
+
+Readings, setpoints and commands pass through shared memory, and nobody waits for anybody.
+"""
 
 from __future__ import annotations
 
-import signal
-import sys
+import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +21,19 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition_process import AcquisitionProcess
+from compd.live.control import Control
+from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
-from compd.live.loop.directions import Directions
-from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero, load_zero
-from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.states import State
+from compd.live.loop.model_loader import ModelLoader, Models, try_model
+from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.timing import LoopTiming
+from compd.live.loop_process import LoopProcess
+from compd.live.memory.shared_ring import SharedRing
 from compd.live.pipeline import build_pipeline
+from compd.live.service.listeners import Listeners
+from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
@@ -29,45 +42,81 @@ from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
-from compd.live.systemd import Notifier
+from compd.live.service_process import ServiceProcess, StateLog
 from compd.release import __version__
-
-# How often the daemon looks whether one of its threads has ended.
-_CHECK_EVERY_S = 0.5
 
 _log = structlog.get_logger()
 
 
 class Daemon:
-    """The compensation of one machine. `start` raises CompdError where a line or socket cannot be opened."""
+    """The parts of one configuration.
+
+    Attributes
+    ----------
+    configuration, latest, commands, setpoints, control : as their names say.
+    loop_process, acquisition, service : what each process does.
+    period_s : of the loop.
+    """
 
     def __init__(
-        self, configuration: Configuration, clock: Clock | None = None, notifier: Notifier | None = None
+        self,
+        configuration: Configuration,
+        before: Daemon | None = None,
+        clock: Clock | None = None,
     ) -> None:
+        """`before`: the daemon whose place this one takes, and whose sockets it goes on with.
+
+        Raises CompdError for whatever cannot be had: a socket, the model file, a geometry that is impossible. Nothing
+        of `before` has changed then.
+        """
         clock = clock or MonotonicClock()
         self.configuration = configuration
-        self._notifier = notifier or Notifier.from_environment()
         gauges = configuration.gauge_objects()
         pipeline = build_pipeline(configuration, gauges)
+        self.period_s = pipeline.settings.period_s
         self.latest, self._wires = pipeline.latest, pipeline.wires
-        self.commands = Commands(self._zero_on_disk(), models=_first_models(configuration, pipeline.loader))
-        self._model_switch = ModelSwitch(pipeline.loader, self.commands)
-        by_line = {
-            line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
-            for line, settings in configuration.lines.items()
-        }
-        self.acquisition = Acquisition(by_line, self.latest, clock)
-        period_s = 1.0 / configuration.loop.rate_hz
-        self.publisher = Publisher(configuration.sockets, period_s, self._note_state)
-        udp = configuration.sockets.udp
-        self._packets = UdpSender(udp, configuration.config_hash) if udp is not None else None
-        directions = Directions(self._wires.scale.wires)
-        packets = [] if self._packets is None else [self._packets.deliver]
-        sinks = [*packets, directions.update, self.publisher.deliver]
-        self.loop = Loop(pipeline.settings, self.latest, self.commands, sinks, self._notifier, clock)
-        self._zero_capture = ZeroCapture(
-            self._wires, self.latest, self.commands, _directory(configuration), configuration.zero_hash, clock
+        models = _first_models(configuration, pipeline.loader)
+        # compiles what the loop calls, so that its processes have it from their first cycle
+        try_model(pipeline.settings.model, (), str(configuration.path))
+        self.commands = Commands(self._zero_on_disk())
+        self.setpoints, cycles, self.control = SharedRing(), SharedRing(), Control()
+        adopted = AdoptedModels(models)
+        packet_hash = bytes.fromhex(configuration.config_hash)[:8] if configuration.sockets.udp is not None else None
+        timing = LoopTiming(self.period_s)
+        self.loop_process = LoopProcess(
+            pipeline.settings,
+            self.latest,
+            self.commands,
+            pipeline.loader,
+            adopted,
+            timing,
+            self.setpoints,
+            cycles,
+            packet_hash,
+            self.control,
+            clock,
         )
+        self.acquisition = self._acquisition(gauges, clock)
+        self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
+        sockets = configuration.sockets
+        packets = UdpSender(sockets.udp) if sockets.udp is not None else None
+        self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
+        watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
+        observers = [StateLog(self.control).note]
+        if packets is not None:
+            observers.append(partial(_send_packet, packets))
+        publisher = Publisher(
+            self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
+        )
+        zero_capture = ZeroCapture(
+            self._wires,
+            self.latest,
+            self.commands,
+            Path(configuration.state.directory),
+            configuration.zero_hash,
+            clock,
+        )
+        model_switch = ModelSwitch(self.control)
         version: dict[str, Any] = {
             "class": "VERSION",
             "protocol": PROTOCOL,
@@ -81,106 +130,105 @@ class Daemon:
             self.latest,
             self._wires,
             self.commands,
-            self.loop,
-            self.publisher,
-            self._packets,
-            self.acquisition.status,
+            adopted,
+            timing,
+            self.control,
+            publisher,
+            packets,
+            self._lines_status,
             clock,
         )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
             rotation=configuration.geometry.kinematics == "hexapod_6ups",
         )
-        self._requests = Requests(
+        requests = Requests(
             version,
             keys,
             self.commands,
             report.message,
-            self._zero_capture.start,
-            ReadingsMessage(self._wires, self.latest.channels, directions),
-            self._model_switch.start,
+            zero_capture.start,
+            ReadingsMessage(self._wires, self.latest.channels),
+            model_switch.start,
+            lambda: adopted.summary,
         )
-        self._state: State | None = None
+        logs = {name: reading for name, (reading, _) in self._pipes.items()}
+        self.service = ServiceProcess(
+            publisher,
+            requests,
+            zero_capture,
+            model_switch,
+            packets,
+            self.control,
+            clock,
+            logs,
+            configuration.loop.priority // 2,
+        )
 
-    def start(self) -> None:
-        """Start the acquisition, then the sockets, then the loop."""
-        self.acquisition.start()
-        try:
-            self.publisher.start(self._requests)
-        except BaseException:
-            self.acquisition.stop()
-            raise
-        self.loop.start()
+    def log_pipe(self, process: str) -> int:
+        """The descriptor to which the process of this name prints."""
+        return self._pipes[process][1]
 
-    def stop(self) -> None:
-        """Stop everything; returns when every thread has ended."""
-        self._notifier.stopping()
-        self.loop.stop()
-        self._zero_capture.stop()
-        self._model_switch.stop()
-        self.publisher.stop()
-        self.acquisition.stop()
-        if self._packets is not None:
-            self._packets.close()
-        self._notifier.close()
+    def close(self, after: Daemon | None = None) -> None:
+        """Close every descriptor, but for the sockets that `after` goes on with; the processes have ended."""
+        self.listeners.close(None if after is None else after.listeners)
+        for pipe in self._pipes.values():
+            for descriptor in pipe:
+                os.close(descriptor)
+        if self.service.packets is not None:
+            self.service.packets.close()
+        self.setpoints.close()
+        self.loop_process.cycles.close()
+        self.control.close()
 
-    @property
-    def healthy(self) -> bool:
-        """Whether the threads of loop and publisher, without which there are no setpoints, are alive."""
-        return self.loop.alive and self.publisher.alive
+    def _acquisition(self, gauges: dict[str, Any], clock: Clock) -> list[AcquisitionProcess]:
+        """One process for all lines but those that have one of their own."""
+        configuration = self.configuration
+        own = configuration.acquisition.own_process
+        lines = {
+            line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
+            for line, settings in configuration.lines.items()
+        }
+        groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
+        return [
+            AcquisitionProcess(
+                name,
+                partial(_polling, {line: lines[line] for line in group}, self.latest, clock),
+                self.control,
+                clock,
+                configuration.acquisition.memory_mb,
+            )
+            for name, group in groups.items()
+            if group
+        ]
+
+    def _lines_status(self) -> dict[str, Any]:
+        """Every line's part of STATUS, by its name."""
+        lines: dict[str, Any] = {}
+        for process in self.acquisition:
+            lines |= process.status()
+        return lines
 
     def _zero_on_disk(self) -> MachineZero | StateError:
         """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken."""
         configuration = self.configuration
+        directory = Path(configuration.state.directory)
         try:
-            zero = load_zero(_directory(configuration), configuration.zero_hash, self._wires.length_channels)
+            zero = load_zero(directory, configuration.zero_hash, self._wires.length_channels)
         except StateError as error:
             _log.warning("no machine zero", reason=str(error))
             return error
         _log.info("machine zero", taken_at=zero.taken_at)
         return zero
 
-    def _note_state(self, setpoint: Setpoint) -> None:
-        """Report a change of state to the log and the service manager; called on the publisher's thread."""
-        if setpoint.state is self._state:
-            return
-        self._state = setpoint.state
-        log = _log.info if setpoint.valid else _log.warning
-        log("state", state=setpoint.state.value, reason=setpoint.reason, mode=setpoint.mode.value)
-        self._notifier.status(f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else setpoint.state)
+
+def _send_packet(packets: UdpSender, setpoint: SentSetpoint) -> None:
+    packets.send(setpoint.packet)
 
 
-def run(configuration: Configuration) -> bool:
-    """Run the daemon until SIGTERM or Ctrl-C; True where a thread ended by itself. SIGHUP is ignored."""
-    _log_to_stderr()
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    # blocked before any thread exists, so that these signals interrupt none of them
-    signals = {signal.SIGTERM, signal.SIGINT}
-    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
-    for warning in configuration.warnings:
-        _log.warning("configuration", where=warning.where, what=warning.what)
-    daemon = Daemon(configuration)
-    daemon.start()
-    _log.info(
-        "running",
-        machine=configuration.machine,
-        config_hash=configuration.config_hash,
-        rate_hz=configuration.loop.rate_hz,
-        unix=configuration.sockets.unix.path,
-        tcp_port=daemon.publisher.tcp_port,
-    )
-    received = None
-    while received is None and daemon.healthy:
-        received = signal.sigtimedwait(signals, _CHECK_EVERY_S)
-    healthy = daemon.healthy
-    if received is not None:
-        _log.info("stopping", signal=signal.Signals(received.si_signo).name)
-    else:
-        _log.error(
-            "a thread has ended; its traceback is above", loop=daemon.loop.alive, publisher=daemon.publisher.alive
-        )
-    daemon.stop()
-    return not healthy
+def _polling(lines: dict[str, Any], latest: Any, clock: Clock) -> Acquisition:
+    """The acquisition of some lines; made in its own process."""
+    return Acquisition(lines, latest, clock)
 
 
 def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
@@ -191,22 +239,3 @@ def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
     model = loader.read(Path(file))
     _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.live_effects])
     return Models(model)
-
-
-def _directory(configuration: Configuration) -> Path:
-    """Where machine zero is kept."""
-    return Path(configuration.state.directory)
-
-
-def _log_to_stderr() -> None:
-    """Log one line per event to stderr, with colours on a terminal."""
-    structlog.configure(
-        processors=[
-            structlog.processors.add_log_level,
-            structlog.processors.TimeStamper(fmt="iso"),
-            structlog.dev.ConsoleRenderer()
-            if sys.stderr.isatty()
-            else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "event"]),
-        ],
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
-    )

@@ -1,12 +1,16 @@
-"""What the loop asks of the system: priority, locked memory, precise timers, garbage collection between cycles."""
+"""What loop and service ask of the system: priority, locked memory, precise timers; garbage collection on demand."""
 
 from __future__ import annotations
 
 import ctypes
 import gc
+import math
 import os
 import sys
+import time
 from typing import NamedTuple
+
+from compd.clock import Clock
 
 # /usr/include/x86_64-linux-gnu/bits/mman-linux.h; ONFAULT: pages stay once they are there, but thread
 # stacks are not filled in advance.
@@ -15,10 +19,12 @@ _CLOCK_MONOTONIC, _TIMER_ABSTIME = 1, 1  # linux/time.h
 _EINTR = 4
 _PR_SET_TIMERSLACK = 29  # linux/prctl.h
 
-# How long another thread may keep the interpreter once the loop asks for it. Python's default of 5 ms is a whole
-# period at 200 Hz.
+# How long another thread of a process may keep the interpreter once one asks for it; Python's default is 5 ms.
 SWITCH_INTERVAL_S = 50e-6
-_PYTHON_SWITCH_INTERVAL_S = 5e-3
+# A thread with priority that takes more of a processor than this would keep others from theirs: from the gauges, and
+# with the kernel's limit for all real-time threads (95 %) even the loop.
+_LARGEST_SHARE = 0.5
+_RATION_EVERY_S = 0.1
 # Exceptions in drivers leave reference cycles of a few kB each; collected at this interval they stay within a few MB.
 _COLLECT_EVERY_S = 5.0
 
@@ -75,15 +81,42 @@ def lock_memory() -> Permission:
     return Permission(True, "all pages, as they are touched")
 
 
-def shorten_switch_interval() -> Permission:
+def shorten_switch_interval() -> None:
     """Let a thread have the interpreter soon after it asks for it."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    return Permission(True, f"{SWITCH_INTERVAL_S * 1e6:g} us")
 
 
-def restore_switch_interval() -> None:
-    """Set Python's default again."""
-    sys.setswitchinterval(_PYTHON_SWITCH_INTERVAL_S)
+class RationedPriority:
+    """SCHED_FIFO for a thread that serves others, as long as it takes no more than half a processor.
+
+    A client that asks without end then slows down itself and the other clients, and nothing else.
+    """
+
+    def __init__(self, priority: int, clock: Clock) -> None:
+        """`priority`: below the loop's; 0 for none."""
+        self._priority = priority
+        self._clock = clock
+        self._next_s = -math.inf
+        self._last_s = self._used_s = 0.0
+        self.has_priority = False
+
+    def look(self) -> None:
+        """Take or give up the priority; called by the thread itself, often."""
+        now_s = self._clock.monotonic()
+        if now_s < self._next_s or not self._priority:
+            return
+        used_s = time.thread_time()
+        wanted = used_s - self._used_s <= _LARGEST_SHARE * (now_s - self._last_s)
+        self._next_s, self._last_s, self._used_s = now_s + _RATION_EVERY_S, now_s, used_s
+        if wanted != self.has_priority:
+            # threads that this one starts have no priority
+            policy = (os.SCHED_FIFO if wanted else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
+            try:
+                os.sched_setscheduler(0, policy, os.sched_param(self._priority if wanted else 0))
+            except OSError:
+                self._priority = 0  # not permitted, now or later
+            else:
+                self.has_priority = wanted
 
 
 class QuietCollector:

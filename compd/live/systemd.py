@@ -1,4 +1,4 @@
-"""Notifications to systemd, sd_notify(3), sent by the loop itself."""
+"""Notifications to systemd, sd_notify(3), sent by the supervisor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BEATS_PER_WATCHDOG = 4
 class Notifier:
     """Sends notifications to the socket of the service manager; does nothing where there is none.
 
-    A message that the manager cannot take at once is dropped, so that the loop never waits.
+    A message that the manager cannot take at once is dropped, so that nobody waits.
     """
 
     def __init__(self, address: str, watchdog_s: float = math.inf) -> None:
@@ -36,6 +36,10 @@ class Notifier:
         """Report that the first cycle has run."""
         self._send("READY=1")
 
+    def reloading(self, now_s: float) -> None:
+        """Report that the daemon starts anew with another configuration, at the monotonic time `now_s`."""
+        self._send(f"RELOADING=1\nMONOTONIC_USEC={now_s * 1e6:.0f}")
+
     def stopping(self) -> None:
         """Report that the daemon stops."""
         self._send("STOPPING=1")
@@ -45,7 +49,7 @@ class Notifier:
         self._send("STATUS=" + text.replace("\n", " "))
 
     def beat(self, now_s: float) -> None:
-        """Reset the watchdog, if a quarter of its interval has passed; called once per cycle."""
+        """Reset the watchdog, if a quarter of its interval has passed; called while the loop beats."""
         if now_s >= self._next_beat_s:
             self._next_beat_s = now_s + self._beat_every_s
             self._send("WATCHDOG=1")

@@ -75,7 +75,7 @@ def _with_effects(measured: Machine, count: int) -> Models:
         for effect in effects
     )
     names = tuple(dict.fromkeys(name for effect in effects for name in needed_quantities(effect, links)))
-    applied = LiveModel(replace(measured.model, effects=fitted), "", "", names, measured.wires.quantity_wires(names))
+    applied = LiveModel(replace(measured.model, effects=fitted), names, measured.wires.quantity_wires(names))
     return Models(applied)
 
 

@@ -13,6 +13,7 @@ from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.directions import Directions
 from compd.live.loop.machine_zero import MachineZero
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.service.readings_message import ReadingsMessage
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
@@ -27,8 +28,9 @@ class Run:
     def __init__(self, machine: Machine, seed: int = 1):
         self.machine = machine
         self.random = np.random.default_rng(seed)
-        self.directions = Directions(machine.wires.scale.wires)
-        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels, self.directions)
+        self.packer = CyclePacker(machine.latest, Directions(machine.wires.scale.wires))
+        self.unpacker = CycleUnpacker()
+        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels)
         self.version = {
             "class": "VERSION",
             "protocol": 1,
@@ -60,8 +62,7 @@ class Run:
             assert machine.tick == recorded[1]["seq"]
 
     def recorded(self, setpoint):
-        self.directions.update(setpoint)
-        line = self.transcript.line(setpoint)
+        line = self.transcript.line(self.unpacker.unpack(self.packer.pack(setpoint, setpoint.to_json())))
         return line, json.loads(line), setpoint
 
     def any_channel(self):

@@ -15,8 +15,8 @@ from compd.clock import MonotonicClock
 from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
+from compd.live.memory.latest import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
-from compd.readings import Latest
 from compd.simulation.wires.simulated_line import SimulatedLine
 
 # A bound for waiting, never a measure: a test that needs it has failed.

@@ -11,7 +11,7 @@ import typer
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
     """Run the daemon: read the gauges, compute, publish, until SIGTERM or Ctrl-C."""
     from compd.configuration import load
-    from compd.live.daemon import run as run_daemon
+    from compd.live.run import run as run_daemon
 
     failed = run_daemon(load(config))
     if failed:

@@ -38,10 +38,13 @@ def check(
     for warning in (*configuration.warnings, *print_line_budgets(configuration)):
         typer.echo(f"warning: {warning}")
     wiring = configuration.wiring
+    own_process = configuration.acquisition.own_process
+    processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
     typer.echo(
         f"{config}: {configuration.machine} is complete: {configuration.geometry.links} links, "
         f"{len(wiring.joint)} joint and {len(wiring.frame)} frame comparators, {len(wiring.quantities)} quantities, "
-        f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines; hash {configuration.config_hash}"
+        f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
+        f"hash {configuration.config_hash}"
     )
 
 

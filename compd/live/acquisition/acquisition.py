@@ -19,8 +19,8 @@ from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
-from compd.readings import Latest
 
 log = structlog.get_logger()
 
@@ -168,6 +168,8 @@ class LineThread:
             if fault.quality not in NOTHING_UNDER_WAY:
                 line.drain()
             gauge.fail(fault.quality, fault.detail, self._clock.monotonic())
+        except MemoryError:  # it is the whole process that has none left
+            raise
         except Exception as error:  # a driver may raise anything; it must not end the line's thread
             if not gauge.reported:
                 gauge.reported = True

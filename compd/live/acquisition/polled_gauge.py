@@ -9,7 +9,7 @@ from typing import Any
 import structlog
 
 from compd.gauge import Gauge, Quality, Reading, bad
-from compd.readings import Latest
+from compd.live.memory.latest import Latest
 
 log = structlog.get_logger()
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass
 
 from compd.errors import StateError
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
+from compd.live.memory.shared_record import SharedRecord
+
+# Machine zero has some 60 bytes for each length gauge.
+_ZERO_BYTES = 256 * 1024
+_TARGET_BYTES = 1024
 
 
 @dataclass(frozen=True)
@@ -22,15 +28,48 @@ class Target:
     rotation_B0_rad: tuple[float, ...] | None = None
 
 
-@dataclass
 class Commands:
-    """What the loop reads at the start of every cycle. Each field has one writer, which replaces an immutable value.
+    """What the loop reads at the start of every cycle. Each has one writer, which replaces an immutable value.
 
-    zero : written where machine zero is taken; StateError says why there is none.
-    target : written by the publisher for the controller; None is CMM mode.
-    models : written where models are read; None is the machine without effects.
+    Machine zero and target are in shared memory: the service writes them, and the loop reads them in its process.
+
+    Attributes
+    ----------
+    models : those of this process; None is the machine without effects. Other ones come with another loop process.
     """
 
-    zero: MachineZero | StateError
-    target: Target | None = None
-    models: Models | None = None
+    def __init__(self, zero: MachineZero | StateError, models: Models | None = None) -> None:
+        self.models = models
+        self._zero_record = SharedRecord(_ZERO_BYTES)
+        self._target_record = SharedRecord(_TARGET_BYTES)
+        self._zero, self._zero_version = zero, 0
+        self._target: Target | None = None
+        self._target_version = 0
+        self.zero = zero
+
+    @property
+    def zero(self) -> MachineZero | StateError:
+        """Machine zero, or why there is none. It is the same object until another one has been written."""
+        if (version := self._zero_record.version) != self._zero_version and (content := self._zero_record.read()):
+            fields = pickle.loads(content)
+            self._zero = MachineZero(**fields) if isinstance(fields, dict) else StateError(fields)
+            self._zero_version = version
+        return self._zero
+
+    @zero.setter
+    def zero(self, zero: MachineZero | StateError) -> None:
+        fields = zero.to_json() if isinstance(zero, MachineZero) else zero.problems
+        self._zero_record.write(pickle.dumps(fields))
+        self._zero, self._zero_version = zero, self._zero_record.version
+
+    @property
+    def target(self) -> Target | None:
+        """The controller's target; None is CMM mode."""
+        if (version := self._target_record.version) != self._target_version and (content := self._target_record.read()):
+            self._target, self._target_version = pickle.loads(content), version
+        return self._target
+
+    @target.setter
+    def target(self, target: Target | None) -> None:
+        self._target_record.write(pickle.dumps(target))
+        self._target, self._target_version = target, self._target_record.version

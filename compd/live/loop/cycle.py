@@ -27,8 +27,8 @@ from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_uncertainty import uncertainty_um
 from compd.live.loop.wiring import MachineWires
+from compd.live.memory.latest import Snapshot
 from compd.model.solve_status import MEANING, Reason
-from compd.readings import Snapshot
 
 
 class _Outcome(NamedTuple):
@@ -88,7 +88,7 @@ def _compute(
     state: CycleState, inputs: CycleInputs, models: Models, settings: CycleSettings
 ) -> tuple[_Outcome, CycleState]:
     """The outcome of a cycle, and the next state; every step that fails returns what the steps before it have left."""
-    tick, snapshot, zero, target, _ = inputs
+    tick, snapshot, zero, target, _, ending = inputs
     applied, wires = models.applied, settings.wires
 
     if not isinstance(zero, MachineZero):
@@ -98,7 +98,7 @@ def _compute(
         zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
         state = _with_zero(state, zero, zero_vectors, settings)
 
-    live, lost = _live_comparators(snapshot, zero_vectors.comparators_mm, applied, wires)
+    live, lost = (None, ending) if ending else _live_comparators(snapshot, zero_vectors.comparators_mm, applied, wires)
     usable = usable_comparators(live, state.last_good, lost, snapshot.time_s, settings.loop)
     comparators = usable.comparators
     if comparators is None:

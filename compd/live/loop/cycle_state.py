@@ -18,10 +18,10 @@ from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.wiring import MachineWires
+from compd.live.memory.latest import Snapshot
 from compd.model.apply_effects import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.uncertainty import GaugeNoise
-from compd.readings import Snapshot
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
 _UNCERTAINTY_EVERY_S = 1.0
@@ -75,7 +75,8 @@ class CycleInputs(NamedTuple):
     """What is new in one cycle: its number, the gauges, and the commands as they are at its start.
 
     tick : number of the cycle. zero : StateError says why there is none. target : None in CMM mode.
-    models : None is the machine without effects.
+    models : None is the machine without effects. ending : why the correction is to be held, which is done for a moment
+    before the daemon ends; "" otherwise.
     """
 
     tick: int
@@ -83,6 +84,7 @@ class CycleInputs(NamedTuple):
     zero: MachineZero | StateError
     target: Target | None = None
     models: Models | None = None
+    ending: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,9 @@
-"""The compute loop: a thread that wakes at absolute times, runs one cycle and hands the setpoint to its sinks."""
+"""The compute loop: it wakes at absolute times, runs one cycle and hands the setpoint to its sinks."""
 
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Mapping, Sequence
-
-import structlog
+from collections.abc import Callable, Sequence
 
 from compd.clock import Clock
 from compd.live import realtime
@@ -15,14 +12,11 @@ from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
-from compd.live.systemd import Notifier
-from compd.readings import Latest
-
-_log = structlog.get_logger()
+from compd.live.memory.latest import Latest
 
 
 class Loop:
-    """The loop thread. It alone counts ticks, holds the state of the cycle and makes setpoints."""
+    """The loop of one machine. It alone counts ticks, holds the state of the cycle and makes setpoints."""
 
     def __init__(
         self,
@@ -30,85 +24,53 @@ class Loop:
         latest: Latest,
         commands: Commands,
         sinks: Sequence[Callable[[Setpoint], None]],
-        notifier: Notifier,
         clock: Clock,
+        timing: LoopTiming | None = None,
         sleep_until: Callable[[float], None] = realtime.sleep_until,
     ) -> None:
-        """`sinks` take every setpoint, and must not wait."""
-        self.timing = LoopTiming(cycle.period_s)
-        self.permissions: Mapping[str, realtime.Permission] = {}
+        """`sinks` take every setpoint, and must not wait. `timing`: where the loops of other processes go on."""
+        self.timing = timing or LoopTiming(cycle.period_s)
+        self.collector = realtime.QuietCollector()
         self._cycle = cycle
-        self._state = CycleState.at_start(cycle.model)
         self._latest = latest
         self._commands = commands
         self._sinks = tuple(sinks)
-        self._notifier = notifier
         self._clock = clock
         self._sleep_until = sleep_until
-        self._collector = realtime.QuietCollector()
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run_thread, name="loop", daemon=True)
 
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
+    def run(
+        self, keep_on: Callable[[], bool], ending: Callable[[], str] = lambda: "", state: CycleState | None = None
+    ) -> None:
+        """Run cycles as long as `keep_on`, which is asked after each of them.
 
-    def stop(self) -> None:
-        """Stop after the cycle that is running; returns when the thread has ended."""
-        self._stop.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        Tick k belongs to the origin of the timing's grid + k periods; a tick whose time has passed is skipped.
 
-    @property
-    def alive(self) -> bool:
-        """Whether the thread runs."""
-        return self._thread.is_alive()
-
-    def _run_thread(self) -> None:
-        self._prepare()
-        try:
-            self.run()
-        finally:
-            self._collector.stop()
-            realtime.restore_switch_interval()
-
-    def _prepare(self) -> None:
-        """Ask the system for what real time needs. What it does not permit is logged, and the loop runs without it."""
-        settings = self._cycle.loop
-        permissions = {"sched_fifo": realtime.use_fifo(settings.priority)}
-        if settings.lock_memory:
-            permissions["locked_memory"] = realtime.lock_memory()
-        permissions["switch_interval"] = realtime.shorten_switch_interval()
-        permissions["quiet_collector"] = self._collector.start(self._clock.monotonic())
-        for name, permission in permissions.items():
-            if permission.granted:
-                _log.info("granted", what=name, detail=permission.detail)
-            else:
-                _log.warning("not permitted", what=name, detail=permission.detail)
-        self.permissions = permissions
-
-    def run(self) -> None:
-        """Run cycles until stopped. Tick k belongs to start + k periods; a tick whose time has passed is skipped."""
+        Parameters
+        ----------
+        ending : why the correction is to be held, or "".
+        state : what the last cycle left; None before the first one.
+        """
         cycle, commands, clock, timing = self._cycle, self._commands, self._clock, self.timing
         period_s = timing.period_s
-        origin_s = clock.monotonic()
-        tick = 1
-        while not self._stop.is_set():
+        state = state or CycleState.at_start(cycle.model)
+        tick = timing.begin(clock.monotonic())
+        origin_s = timing.origin_s
+        while keep_on():
             wake_s = origin_s + tick * period_s
             self._sleep_until(wake_s)
             start_s = clock.monotonic()
+            if late := int((start_s - wake_s) / period_s):  # this process was stopped, or the machine was
+                timing.note_missed(late)
+                tick += late
             timing.note_start(wake_s, start_s)
             # the commands are read once: whoever writes them does not wait for the cycle
             snapshot = self._latest.snapshot(start_s)
-            inputs = CycleInputs(tick, snapshot, commands.zero, commands.target, commands.models)
-            setpoint, self._state = step(self._state, inputs, cycle)
+            inputs = CycleInputs(tick, snapshot, commands.zero, commands.target, commands.models, ending())
+            setpoint, state = step(state, inputs, cycle)
             for sink in self._sinks:
                 sink(setpoint)
-            if timing.cycles == 0:
-                self._notifier.ready()
-            self._notifier.beat(start_s)
             end_s = clock.monotonic()
             next_tick = max(tick + 1, math.ceil((end_s - origin_s) / period_s))
-            timing.note_end(start_s, end_s, missed=next_tick - tick - 1)
+            timing.note_end(tick, start_s, end_s, missed=next_tick - tick - 1)
             tick = next_tick
-            self._collector.collect_if_due(end_s)
+            self.collector.collect_if_due(end_s)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -15,16 +15,45 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
+from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
 from compd.model_file import read_model_file
-from compd.readings import Snapshot
 
 _HASH_DIGITS = 16
 # Exceptions by which an effect of a user's own code may fail.
 _FAULTS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
+
+class ModelText(NamedTuple):
+    """A model file as it was read. A loop that takes over uses the same, whatever has become of the file.
+
+    file : its path. content : its bytes.
+    """
+
+    file: str
+    content: bytes
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a file. Raises StateError where it cannot be read."""
+        try:
+            return cls(str(path), path.read_bytes())
+        except OSError as error:
+            raise StateError(
+                Problem(
+                    where=str(path),
+                    what=f"cannot be read: {error.strerror}",
+                    next_step="give the absolute path of a model file that the daemon's user may read",
+                )
+            ) from error
+
+    @property
+    def hash(self) -> str:
+        """First digits of the SHA-256 of its content."""
+        return hashlib.sha256(self.content).hexdigest()[:_HASH_DIGITS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,16 +63,22 @@ class LiveModel:
     Attributes
     ----------
     machine : with its effects.
-    file, hash : path and first digits of the SHA-256 of its model file; "" without effects.
     quantities : names of the temperatures, forces and so on that its effects need.
     wires : of these quantities, in the same order.
+    text : its model file; None without effects.
+    file, hash : path and hash of the model file; "" without effects.
     """
 
     machine: MachineModel
-    file: str
-    hash: str
     quantities: tuple[str, ...]
     wires: Wires
+    text: ModelText | None = None
+    file: str = field(init=False)
+    hash: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", self.text.file if self.text else "")
+        object.__setattr__(self, "hash", self.text.hash if self.text else "")
 
     def read(self, snapshot: Snapshot) -> WiredValues:
         """The quantities in a snapshot, in their own units."""
@@ -64,6 +99,17 @@ class LiveModel:
         return summary
 
 
+class ModelNames(NamedTuple):
+    """Which models a cycle had, for READINGS.
+
+    hashes : of the model files, by "model" and "shadow"; a key is absent where there is no file.
+    files : path of each model file by its hash, for whoever keeps a copy.
+    """
+
+    hashes: Mapping[str, str]
+    files: Mapping[str, str]
+
+
 class Models(NamedTuple):
     """The models of one cycle: the corrections of `applied` are used, those of `shadow` only published."""
 
@@ -71,15 +117,12 @@ class Models(NamedTuple):
     shadow: LiveModel | None = None
 
     @property
-    def hashes(self) -> dict[str, str]:
-        """For READINGS: hashes of the model files; a key is absent where there is no file."""
+    def names(self) -> ModelNames:
+        """Hashes and files of the two."""
         hashes = {"model": self.applied.hash} if self.applied.hash else {}
-        return hashes if self.shadow is None else hashes | {"shadow": self.shadow.hash}
-
-    @property
-    def files(self) -> dict[str, str]:
-        """For READINGS: path of each model file by its hash, for whoever keeps a copy."""
-        return {model.hash: model.file for model in self if model is not None and model.hash}
+        if self.shadow is not None:
+            hashes["shadow"] = self.shadow.hash
+        return ModelNames(hashes, {model.hash: model.file for model in self if model is not None and model.hash})
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -93,7 +136,7 @@ class ModelLoader:
 
     def __init__(self, model: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
         """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
-        self.without_effects = LiveModel(model, "", "", (), wires.quantity_wires(()))
+        self.without_effects = LiveModel(model, (), wires.quantity_wires(()))
         self._machine = machine
         self._geometry = geometry
         self._wires = wires
@@ -101,21 +144,24 @@ class ModelLoader:
     def read(self, path: Path) -> LiveModel:
         """The model in a file.
 
-        Raises CompdError with every problem: what `read_model_file` refuses, gauges that the effects need and the
-        machine does not have, an effect that fails.
+        Raises CompdError with every problem: a file that cannot be read, what `read_model_file` refuses, gauges that
+        the effects need and the machine does not have, an effect that fails.
         """
-        file_hash = _hash(path)
+        return self.load(ModelText.read(path))
+
+    def load(self, text: ModelText | None) -> LiveModel:
+        """The model in a file that has been read; None is the machine without effects. Raises as `read` does."""
+        if text is None:
+            return self.without_effects
         model = self.without_effects.machine
-        file = read_model_file(path, self._machine, model.links, self._geometry)
+        file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content)
         if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
         needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
         names = tuple(dict.fromkeys(chain.from_iterable(needed)))
-        try_model(machine, names, str(path))
-        if _hash(path) != file_hash:
-            raise StateError(Problem(where=str(path), what="has changed while it was read", next_step="ask again"))
-        return LiveModel(machine, str(path), file_hash, names, self._wires.quantity_wires(names))
+        try_model(machine, names, text.file)
+        return LiveModel(machine, names, self._wires.quantity_wires(names), text)
 
     def _unmet_needs(self, effects: tuple[FittedEffect, ...]) -> list[Problem]:
         """Live effects that need a gauge or a setting which is not there, or the time since a recording's start."""
@@ -187,18 +233,5 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
         raise StateError(
             Problem(
                 where=where, what=f"an effect fails: {type(error).__name__}: {error}", next_step="mend it, or remove it"
-            )
-        ) from error
-
-
-def _hash(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
-    except OSError as error:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what=f"cannot be read: {error.strerror}",
-                next_step="give the absolute path of a model file that the daemon's user may read",
             )
         ) from error

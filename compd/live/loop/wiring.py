@@ -14,7 +14,7 @@ from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
-from compd.readings import Latest, Snapshot
+from compd.live.memory.latest import Latest, Snapshot
 
 
 class WiredValues(NamedTuple):

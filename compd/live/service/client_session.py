@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from enum import Enum, auto
 
-from compd.live.loop.setpoint import Setpoint
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
 
 # About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind acts on old setpoints.
@@ -17,6 +17,13 @@ _RECEIVE_BYTES = 4096
 _LONGEST_INTERVAL_S = 1e6
 
 
+class Stream(Enum):
+    """What a client may watch."""
+
+    SETPOINTS = auto()
+    READINGS = auto()
+
+
 class ClientSession:
     """A connected client; used by the publisher's thread alone.
 
@@ -24,7 +31,7 @@ class ClientSession:
     ----------
     open : False once the connection has ended.
     due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
-    encode : makes the message of a setpoint that this client watches.
+    stream : what this client watches.
     """
 
     def __init__(self, connection: socket.socket, name: str, local: bool) -> None:
@@ -35,20 +42,17 @@ class ClientSession:
         self.local = local
         self.open = True
         self.due_s = math.inf
-        self.encode: Callable[[Setpoint], bytes] = Setpoint.to_json
+        self.stream = Stream.SETPOINTS
         self._interval_s = math.inf
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
         self._skipping_line = False
         self._unsent = bytearray()
 
-    def watch(self, rate_hz: float, encode: Callable[[Setpoint], bytes], max_behind_bytes: int) -> None:
-        """Send `rate_hz` setpoints per second from now on, each made by `encode`: inf for every one, 0 for none.
-
-        A client with more than `max_behind_bytes` unsent is dropped.
-        """
-        self.encode = encode
-        self._max_behind_bytes = max_behind_bytes
+    def watch(self, rate_hz: float, stream: Stream) -> None:
+        """Send `rate_hz` messages of the stream per second from now on: inf for every one, 0 for none."""
+        self.stream = stream
+        self._max_behind_bytes = MAX_READINGS_BEHIND_BYTES if stream is Stream.READINGS else MAX_BEHIND_BYTES
         self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
 

@@ -5,10 +5,55 @@ from __future__ import annotations
 import socket
 from pathlib import Path
 
+from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError, Problem
 
 _UNIX_SOCKET_MODE = 0o660  # the daemon's user and group
 _BACKLOG = 16
+
+
+class Listeners:
+    """The sockets on which one configuration asks to listen; they stay open while the processes behind them change.
+
+    Attributes
+    ----------
+    tcp : None where TCP is not configured.
+    unix : for clients of this computer.
+    """
+
+    def __init__(self, settings: SocketSettings, before: Listeners | None = None) -> None:
+        """`before`: those of the configuration until now, of which sockets at the same address are taken over.
+
+        Raises DaemonError where an address cannot be had; what `before` has stays as it is then.
+        """
+        self._settings = settings
+        self.unix: socket.socket
+        old = before._settings if before is not None else None
+        same_unix = old is not None and old.unix.path == settings.unix.path
+        same_tcp = old is not None and old.tcp == settings.tcp
+        self.tcp: socket.socket | None = None
+        if settings.tcp is not None:
+            kept = before.tcp if before is not None and same_tcp else None
+            self.tcp = kept or listen_tcp(settings.tcp.host, settings.tcp.port)
+        try:
+            self.unix = before.unix if before is not None and same_unix else listen_unix(Path(settings.unix.path))
+        except DaemonError:
+            if self.tcp is not None and not same_tcp:
+                self.tcp.close()
+            raise
+
+    @property
+    def tcp_port(self) -> int | None:
+        """The TCP port; None where TCP is not configured."""
+        return None if self.tcp is None else self.tcp.getsockname()[1]
+
+    def close(self, after: Listeners | None = None) -> None:
+        """Close the sockets, and remove that of the Unix socket from the disk, but for those that `after` has."""
+        if self.tcp is not None and (after is None or after.tcp is not self.tcp):
+            self.tcp.close()
+        if after is None or after.unix is not self.unix:
+            self.unix.close()
+            Path(self._settings.unix.path).unlink(missing_ok=True)
 
 
 def listen_tcp(host: str, port: int) -> socket.socket:

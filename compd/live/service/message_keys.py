@@ -193,6 +193,7 @@ class ReadingsKeys(SentMessage):
     zero: ZeroFileKeys | None = Field(default=None, description="the machine zero that was subtracted")
     no_zero: NoZeroKeys | None = Field(default=None, description="instead of `zero` where there is none")
     target: RecordedTargetKeys | None = Field(default=None, description="in mode machine_tool")
+    ending: str | None = Field(default=None, description="why the correction was held, before the daemon ended")
     model: str | None = Field(default=None, description="hash of the model file that was applied")
     shadow: str | None = Field(default=None, description="hash of the model file that ran as a shadow")
     model_files: dict[str, str] | None = Field(default=None, description="paths of these files, by hash")
@@ -232,6 +233,14 @@ class PermissionKeys(Keys):
 
     granted: bool = Field(description="whether the daemon has it")
     detail: str = Field(description="what the system said")
+
+
+class ProcessStatusKeys(Keys):
+    """One of the daemon's processes."""
+
+    pid: int = Field(description="its number; 0 while it is not there")
+    starts: int = Field(description="how often it was started")
+    last_end: str | None = Field(default=None, description="how the one before it ended")
 
 
 class PublisherStatusKeys(Keys):
@@ -289,6 +298,10 @@ class StatusKeys(VersionKeys):
     loop: LoopStatusKeys = Field(description="how well the loop keeps time")
     realtime: dict[str, PermissionKeys] = Field(
         description="what the loop asked the system for, by name: `sched_fifo`, `locked_memory` ..."
+    )
+    processes: dict[str, ProcessStatusKeys] = Field(
+        description="the daemon's processes: `supervisor`, `loop`, `acquisition`, `service`, and `line` with its name "
+        "for each line of `acquisition.own_process`"
     )
     publisher: PublisherStatusKeys = Field(description="the clients")
     lines: dict[str, LineStatusKeys] = Field(description="every line, by name")

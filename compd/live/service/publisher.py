@@ -1,7 +1,8 @@
-"""The publisher: one thread between the loop and its clients. The loop never waits for it, and it waits for no client.
+"""The publisher: takes setpoints and cycles from their rings and sends them to clients.
 
-The loop calls `deliver` with every setpoint. The publisher's thread takes them from a bounded queue, encodes each once,
-sends it to the clients that are due, and answers their requests.
+The loop never waits for it, and it waits for no client. Its thread sleeps until something is there that a client is due
+for, sends it to the clients that are due, and answers their requests. Where the loop makes no setpoints, it says so in
+the loop's place.
 """
 
 from __future__ import annotations
@@ -10,120 +11,99 @@ import math
 import os
 import selectors
 import socket
-import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import structlog
 
-from compd.configuration.operation import SocketSettings
-from compd.errors import DaemonError
+from compd.clock import Clock
+from compd.live.loop.sent_cycle import CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.states import State
-from compd.live.service.client_session import ClientSession
-from compd.live.service.listeners import listen_tcp, listen_unix
+from compd.live.memory.shared_ring import RingReader, SharedRing
+from compd.live.service.client_session import ClientSession, Stream
+from compd.live.service.listeners import Listeners
+from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
 
-# Half a second at 1 kHz: longer than any pause of the publisher that is not a fault.
-_QUEUE_LENGTH = 512
 MAX_CLIENTS = 32
 
 _log = structlog.get_logger()
 
 
 class Publisher:
-    """Listens on the Unix socket and, where configured, on TCP; sends setpoints and answers."""
+    """Serves the clients of the Unix socket and, where configured, of TCP.
 
-    def __init__(self, sockets: SocketSettings, period_s: float, observe: Callable[[Setpoint], None]) -> None:
-        """`period_s`: of the loop; `observe` is called with every setpoint that is queued, on the publisher's thread:
-        the first of a new state is always among them, for the log."""
-        self._sockets = sockets
+    Attributes
+    ----------
+    dropped_clients : that were too far behind.
+    """
+
+    def __init__(
+        self,
+        listeners: Listeners,
+        setpoints: SharedRing,
+        cycles: SharedRing,
+        watch: LoopWatch,
+        period_s: float,
+        clock: Clock,
+        observers: Sequence[Callable[[SentSetpoint], None]] = (),
+        packet_hash: bytes | None = None,
+    ) -> None:
+        """`period_s`: of the loop. `observers` are called with every setpoint that is read, on the publisher's thread:
+        the first of a new state is always among them, for the log. With a `packet_hash` there are UDP packets, and all
+        setpoints are read."""
+        self._listeners = listeners
+        self._setpoints, self._cycles = RingReader(setpoints), RingReader(cycles)
+        self._watch = watch
         self._half_period_s = period_s / 2
-        self._observe = observe
-        self._selector = selectors.DefaultSelector()
+        self._clock = clock
+        self._observers = tuple(observers)
+        self._packet_hash = packet_hash
+        self._unpacker = CycleUnpacker()
         self._sessions: set[ClientSession] = set()
-        self._queue: deque[Setpoint] = deque()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
-        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
-        self._requests: Requests  # from `start` on: it needs the publisher's own figures for STATUS
-        # Read by the loop's thread: when a client is due, and the state of the setpoint that was queued last.
-        self._next_due_s = math.inf
-        self._last_state: State | None = None
-        self.dropped_setpoints = 0
+        self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
+        self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
+        self._due_s = dict.fromkeys(Stream, math.inf)
+        self._last_state = -1
         self.dropped_clients = 0
-        self.tcp_port: int | None = None
 
-    def start(self, requests: Requests) -> None:
-        """Listen, and serve on a thread of its own. Raises DaemonError where an address cannot be had."""
+    def run(self, requests: Requests, keep_on: Callable[[], bool], each_round: Callable[[], None]) -> None:
+        """Serve on this thread, as long as `keep_on`. `each_round` is called at least every `LoopWatch.limit_s`."""
         self._requests = requests
-        try:
-            if self._sockets.tcp is not None:
-                listener = listen_tcp(self._sockets.tcp.host, self._sockets.tcp.port)
-                self.tcp_port = listener.getsockname()[1]
-                self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, False))
-            listener = listen_unix(Path(self._sockets.unix.path))
-            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, True))
-        except DaemonError:
-            self._close()
-            raise
-        self._selector.register(self._wake, selectors.EVENT_READ, self._send_queued)
-        self._thread.start()
+        self._selector = selectors.DefaultSelector()
+        for listener in (self._listeners.tcp, self._listeners.unix):
+            if listener is not None:
+                listener.setblocking(False)
+                accept = partial(self._accept, listener, listener is self._listeners.unix)
+                self._selector.register(listener, selectors.EVENT_READ, accept)
+        for reader in (self._setpoints, self._cycles):
+            self._selector.register(reader.ring.woken, selectors.EVENT_READ, partial(self._be_woken, reader.ring))
+        self._schedule()
+        while keep_on():
+            for key, events in self._selector.select(self._watch.wait_s(self._clock.monotonic())):
+                key.data(events)
+            self._forward()
+            each_round()
 
-    def stop(self) -> None:
-        """Close every connection; return when the thread has ended."""
-        self._stop.set()
-        os.eventfd_write(self._wake, 1)
-        self._thread.join()
-        Path(self._sockets.unix.path).unlink(missing_ok=True)
-        self._close()
-
-    def _close(self) -> None:
-        for key in list(self._selector.get_map().values()):
-            if isinstance(key.fileobj, socket.socket):
-                key.fileobj.close()
+    def end(self, reason: str) -> None:
+        """Send a last setpoint, a `stop` with this reason, and close every connection."""
+        self._forward()
+        self._publish_in_place_of_loop(self._watch.stop(self._clock.monotonic(), reason))
+        for session in self._sessions:
+            session.close()
         self._selector.close()
-        os.close(self._wake)
-
-    @property
-    def alive(self) -> bool:
-        """False once the thread has ended, for whatever reason."""
-        return self._thread.is_alive()
-
-    def deliver(self, setpoint: Setpoint) -> None:
-        """Queue a setpoint when a client is due or the state is new; called by the loop with every setpoint.
-
-        When the queue is full the oldest setpoint is dropped and counted.
-        """
-        if setpoint.time_s < self._next_due_s - self._half_period_s and setpoint.state is self._last_state:
-            return
-        self._last_state = setpoint.state
-        if len(self._queue) >= _QUEUE_LENGTH:
-            try:
-                self._queue.popleft()
-                self.dropped_setpoints += 1
-            except IndexError:
-                pass  # the publisher has just emptied it
-        self._queue.append(setpoint)
-        os.eventfd_write(self._wake, 1)
 
     def summary(self) -> dict[str, Any]:
         """Clients now, and clients and setpoints dropped so far, for STATUS."""
         return {
             "clients": len(self._sessions),
             "dropped_clients": self.dropped_clients,
-            "dropped_setpoints": self.dropped_setpoints,
+            "dropped_setpoints": self._setpoints.dropped + self._cycles.dropped,
         }
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            for key, events in self._selector.select():
-                key.data(events)
 
     def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
         try:
@@ -143,6 +123,7 @@ class Publisher:
         self._send(session, self._requests.version)
 
     def _serve(self, session: ClientSession, events: int) -> None:
+        self._forward()  # what has been computed until now is not for a client that asks only now
         if events & selectors.EVENT_WRITE:
             session.flush()
         if events & selectors.EVENT_READ:
@@ -164,28 +145,57 @@ class Publisher:
     def _answer_later(self, session: ClientSession, answer: bytes) -> None:
         """Hand an answer that took time to the publisher's thread; called from any thread."""
         self._answers.append((session, answer))
-        os.eventfd_write(self._wake, 1)
+        self._setpoints.ring.wake_reader()
 
-    def _send_queued(self, _events: int) -> None:
-        """Send the late answers and the setpoints that wait. A setpoint is encoded once per kind of message, and only
-        for a client that is due."""
-        os.eventfd_read(self._wake)
+    def _be_woken(self, ring: SharedRing, _events: int) -> None:
+        """Send the late answers; what is in the rings follows at the end of the round."""
+        os.eventfd_read(ring.woken)
         while self._answers:
             self._send(*self._answers.popleft())
-        while self._queue:
-            setpoint = self._queue.popleft()
-            self._observe(setpoint)
-            encoded: dict[Callable[[Setpoint], bytes], bytes] = {}
-            for session in list(self._sessions):
-                if session.take(setpoint.time_s, self._half_period_s):
-                    if session.encode not in encoded:
-                        encoded[session.encode] = session.encode(setpoint)
-                    self._send(session, encoded[session.encode])
+
+    def _forward(self) -> None:
+        """Publish what is due; where there is nothing from the loop, say so."""
+        for content in self._setpoints.contents(self._is_setpoint_due):
+            setpoint = SentSetpoint.unpack(content)
+            if self._watch.admits(setpoint.seq, setpoint.time_s):
+                self._publish(setpoint)
+        for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
+            cycle = self._unpacker.unpack(content)
+            readings = self._requests.readings
+            assert readings is not None, "who watches them has been told their columns"
+            self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
+        if (stop := self._watch.missing(self._clock.monotonic())) is not None:
+            self._publish_in_place_of_loop(stop)
+
+    def _is_setpoint_due(self, time_s: float, state: int) -> bool:
+        return self._packet_hash is not None or state != self._last_state or self._is_due(Stream.SETPOINTS, time_s)
+
+    def _is_due(self, stream: Stream, time_s: float) -> bool:
+        return time_s >= self._due_s[stream] - self._half_period_s
+
+    def _publish(self, setpoint: SentSetpoint) -> None:
+        self._last_state = setpoint.state.code
+        for observe in self._observers:
+            observe(setpoint)
+        self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
+
+    def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
+        self._publish(SentSetpoint.of(setpoint, self._packet_hash))
+
+    def _send_to_watchers(self, stream: Stream, time_s: float, line: bytes) -> None:
+        """Send a line to the clients of a stream that are due at `time_s`."""
+        for session in list(self._sessions):
+            if session.stream is stream and session.take(time_s, self._half_period_s):
+                self._send(session, line)
         self._schedule()
 
     def _schedule(self) -> None:
-        """Note for `deliver` when the next client is due."""
-        self._next_due_s = min((session.due_s for session in self._sessions), default=math.inf)
+        """Note when the next client of each stream is due, and ask to be woken then."""
+        for stream, reader in ((Stream.SETPOINTS, self._setpoints), (Stream.READINGS, self._cycles)):
+            due_s = min((session.due_s for session in self._sessions if session.stream is stream), default=math.inf)
+            self._due_s[stream] = due_s
+            every_one = stream is Stream.SETPOINTS and self._packet_hash is not None
+            reader.ring.wake_from(-math.inf if every_one else due_s - self._half_period_s)
 
     def _send(self, session: ClientSession, data: bytes) -> None:
         if data and session.open and not session.send(data):

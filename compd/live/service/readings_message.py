@@ -15,13 +15,12 @@ from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.directions import Directions
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.sent_cycle import SentCycle
 from compd.live.loop.wiring import MachineWires
+from compd.live.memory.latest import Snapshot
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
-from compd.readings import Snapshot
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
 
 
@@ -45,28 +44,22 @@ class RecordedCycle(NamedTuple):
 class ReadingsMessage:
     """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str], directions: Directions) -> None:
-        """`channels`: names of a snapshot's readings, in order; `directions`: follows the links in every cycle."""
+    def __init__(self, wires: MachineWires, channels: Sequence[str]) -> None:
+        """`channels`: names of a snapshot's readings, in order."""
         self.columns = columns(wires)
         self._channels = tuple(channels)
-        self._directions = directions
 
-    def line(self, setpoint: Setpoint) -> bytes:
-        """The READINGS line of the cycle that made `setpoint`, with its newline.
-
-        Called with the setpoints of a run in order, since the direction of travel is that of the newest cycle.
-        """
-        inputs, state = setpoint.inputs, setpoint.state_before
-        assert inputs is not None, "every setpoint of a cycle has its inputs"
-        assert state is not None, "and its state"
+    def line(self, cycle: SentCycle) -> bytes:
+        """The READINGS line of a cycle, with its newline."""
+        inputs = cycle.inputs
         message: dict[str, Any] = {
             "class": "READINGS",
-            "seq": setpoint.seq,
+            "seq": inputs.tick,
             "time_s": inputs.snapshot.time_s,
             "readings": dict(zip(self._channels, map(_reading, inputs.snapshot.readings), strict=True)),
         }
-        if approach := self._directions.now:
-            message["approach"] = approach
+        if cycle.approach:
+            message["approach"] = cycle.approach
         if isinstance(inputs.zero, MachineZero):
             message["zero"] = inputs.zero.to_json()
         else:
@@ -74,12 +67,13 @@ class ReadingsMessage:
             message["no_zero"] = {"where": problem.where, "what": problem.what, "next_step": problem.next_step}
         if inputs.target is not None:
             message["target"] = _target(inputs.target)
-        if inputs.models is not None:
-            message |= inputs.models.hashes
-            if files := inputs.models.files:
-                message["model_files"] = files
-        message["carried"] = _carried(state, inputs)
-        return line(message)[:-2] + b',"setpoint":' + setpoint.to_json()[:-1] + b"}\n"
+        if inputs.ending:
+            message["ending"] = inputs.ending
+        message |= cycle.models.hashes
+        if cycle.models.files:
+            message["model_files"] = cycle.models.files
+        message["carried"] = _carried(cycle.state_before, inputs)
+        return line(message)[:-2] + b',"setpoint":' + cycle.setpoint_line[:-1] + b"}\n"
 
 
 def columns(wires: MachineWires) -> list[dict[str, Any]]:
@@ -112,6 +106,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         Snapshot(message["time_s"], readings),
         zero,
         None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
+        ending=message.get("ending", ""),
     )
     return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
 

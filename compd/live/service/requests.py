@@ -18,8 +18,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from compd.live.loop.commands import Commands, Target
-from compd.live.loop.setpoint import Setpoint
-from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES, ClientSession
+from compd.live.service.client_session import ClientSession, Stream
 from compd.live.service.message_keys import (
     ErrorKeys,
     Keys,
@@ -139,12 +138,12 @@ class WatchRequest(Request):
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
         message = {"class": self.wire_name, **self.model_dump(exclude_unset=True)}
         if self.what == "setpoints":
-            client.watch(self.rate_hz, Setpoint.to_json, MAX_BEHIND_BYTES)
+            client.watch(self.rate_hz, Stream.SETPOINTS)
             return line(message)
         if not client.local or requests.readings is None:
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
-        client.watch(self.rate_hz, requests.readings.line, MAX_READINGS_BEHIND_BYTES)
+        client.watch(self.rate_hz, Stream.READINGS)
         return line(message | {"columns": requests.readings.columns})
 
 
@@ -290,8 +289,7 @@ class ModelRequest(Request):
         if self.model_fields_set:
             requests.switch_model(self.file, self.shadow, send_later)
             return b""
-        models = requests.commands.models
-        return line({"class": self.wire_name, **({} if models is None else models.summary)})
+        return line({"class": self.wire_name, **requests.models()})
 
 
 REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in Request.__subclasses__()}
@@ -319,8 +317,10 @@ class Requests:
         take_zero: Callable[[SendLater], None],
         readings: ReadingsMessage | None = None,
         switch_model: Callable[[str, bool, SendLater], None] | None = None,
+        models: Callable[[], Mapping[str, Any]] = dict,
     ) -> None:
-        """`version`: the VERSION message; `status`: makes the STATUS message; `readings`: makes READINGS messages.
+        """`version`: the VERSION message; `status`: makes the STATUS message; `readings`: makes READINGS messages;
+        `models`: summary of the models.
 
         `take_zero` starts to take machine zero, `switch_model` (file, shadow) to adopt a model; both answer later,
         and raise ProtocolError (busy) while another such request is being worked on.
@@ -332,6 +332,7 @@ class Requests:
         self.take_zero = take_zero
         self.readings = readings
         self.switch_model = switch_model
+        self.models = models
         self.controller: ClientSession | None = None
 
     def answer(self, client: ClientSession, data: bytes, send_later: SendLater) -> bytes:

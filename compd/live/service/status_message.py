@@ -11,12 +11,14 @@ from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.json_text import omit_unknown
+from compd.live.control import Control
+from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
-from compd.live.loop.loop import Loop
+from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
+from compd.live.memory.latest import Latest
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
-from compd.readings import Latest
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class StatusReport:
     Attributes
     ----------
     version : the VERSION message, whose keys STATUS repeats.
-    commands, latest, wires, loop, publisher : the daemon's own.
+    latest, wires, commands, adopted, timing, control, publisher : the daemon's own.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
     """
@@ -35,7 +37,9 @@ class StatusReport:
     latest: Latest
     wires: MachineWires
     commands: Commands
-    loop: Loop
+    adopted: AdoptedModels
+    timing: LoopTiming
+    control: Control
     publisher: Publisher
     packets: UdpSender | None
     lines: Callable[[], Mapping[str, Any]]
@@ -54,8 +58,9 @@ class StatusReport:
             "mode": "cmm" if self.commands.target is None else "machine_tool",
             "zero": self._zero(),
             "model": self._model(),
-            "loop": self.loop.timing.summary(),
-            "realtime": {name: permission._asdict() for name, permission in self.loop.permissions.items()},
+            "loop": self.timing.summary(),
+            "realtime": self.control.realtime.read() or {},
+            "processes": self.control.processes.read() or {},
             "publisher": published,
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
@@ -71,8 +76,10 @@ class StatusReport:
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
-        summary = {} if self.commands.models is None else self.commands.models.summary
-        return {name: {key: part for key, part in model.items() if key != "file"} for name, model in summary.items()}
+        return {
+            name: {key: part for key, part in model.items() if key != "file"}
+            for name, model in self.adopted.summary.items()
+        }
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
         """Every channel: its raw value, before sign and machine zero, and its age (s); or why there is no value."""

@@ -7,17 +7,16 @@ from typing import Any
 
 from compd.configuration.operation import UdpTarget
 from compd.errors import DaemonError, Problem
-from compd.live.loop.setpoint import Setpoint
 
 
 class UdpSender:
-    """Sends every setpoint to one address, on the loop's own thread: a thread between would add its wake-up time.
+    """Sends the packet of every setpoint to one address, on the publisher's thread.
 
     A packet that the system does not take at once is dropped and counted.
     """
 
-    def __init__(self, target: UdpTarget, config_hash: str) -> None:
-        """`config_hash`: hexadecimal; its first 8 bytes go into each packet. Raises DaemonError for an unknown host."""
+    def __init__(self, target: UdpTarget) -> None:
+        """Raises DaemonError for an unknown host."""
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
@@ -32,14 +31,13 @@ class UdpSender:
         self._address: Any = address
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
-        self._config_hash = bytes.fromhex(config_hash)[:8]
         self.sent = 0
         self.dropped = 0
 
-    def deliver(self, setpoint: Setpoint) -> None:
+    def send(self, packet: bytes) -> None:
         """Send one packet, without waiting."""
         try:
-            self._socket.sendto(setpoint.to_packet(self._config_hash), self._address)
+            self._socket.sendto(packet, self._address)
         except OSError:
             self.dropped += 1
         else:

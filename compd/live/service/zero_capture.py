@@ -15,9 +15,9 @@ from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.wiring import MachineWires
+from compd.live.memory.latest import Latest
 from compd.live.service.background_job import BackgroundJob
 from compd.live.service.messages import ErrorCode, ProtocolError, line
-from compd.readings import Latest
 
 # Several polls of a comparator, to average its noise, and short enough for a person to wait.
 _WINDOW_S = 1.0

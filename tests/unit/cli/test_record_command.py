@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -18,10 +19,10 @@ from compd.configuration.operation import SocketSettings, StateSettings
 from compd.errors import DaemonError
 from compd.gauge import good
 from compd.live import daemon as daemon_module
-from compd.live.daemon import Daemon
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.recording.reader import read_recording
 from tests.support.live_machine import CONFIG
+from tests.support.running_daemon import supervised
 
 TIMEOUT_S = 60
 NEVER_STALE_S = 1e6
@@ -49,7 +50,7 @@ class DriftingGauges:
             step += 1
             self.put(step)
 
-    def stop(self):
+    def stop(self, timeout_s=5.0):
         self.stopping.set()
         self.thread.join()
         return True
@@ -65,15 +66,10 @@ def daemon_at(directory):
     sockets = SocketSettings(tcp={"port": 0}, unix={"path": str(directory / "s")}, valid_for_s=0.1)
     loop = loaded.loop.model_copy(update={"stale_after_s": NEVER_STALE_S, "lock_memory": False, "rate_hz": 100})
     configuration = replace(loaded, loop=loop, sockets=sockets, state=StateSettings(directory=str(directory / "state")))
-    daemon = Daemon(configuration)
-    daemon.start()
-    try:
-        with connect(directory / "s", TIMEOUT_S) as client:
-            next(setpoint for setpoint in client.watch() if setpoint["state"] == "no_zero")
-            client.zero()
-            yield configuration, daemon, client
-    finally:
-        daemon.stop()
+    with supervised(configuration) as daemon, connect(directory / "s", TIMEOUT_S) as client:
+        next(setpoint for setpoint in client.watch() if setpoint["state"] == "no_zero")
+        client.zero()
+        yield configuration, daemon, client
 
 
 @pytest.fixture
@@ -149,13 +145,12 @@ def test_it_ends_at_a_signal_with_everything_written(tmp_path, end):
 
 @pytest.mark.usefixtures("drifting")
 def test_a_daemon_that_goes_leaves_a_whole_recording_and_an_error(tmp_path):
-    with daemon_at(tmp_path) as (_, daemon, client):
+    with daemon_at(tmp_path) as (_, _, client):
         with record_command(tmp_path) as process:
             until_rows(client, tmp_path / "run-0001.csv", 3)
-            daemon.stop()
+            os.kill(client.status()["processes"]["supervisor"]["pid"], signal.SIGTERM)
             _, said = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 2
-        daemon.stop = lambda: None  # it has
     assert "the daemon is gone" in said
     assert f"{rows_in(tmp_path / 'run-0001.csv')} rows in 1 part" in said
 
@@ -189,7 +184,7 @@ def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, ca
 
 @pytest.mark.usefixtures("drifting")
 def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_nothing(tmp_path):
-    with daemon_at(tmp_path) as (_, daemon, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
+    with daemon_at(tmp_path) as (_, _, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
         lines = slow.readings()
         next(lines)
         seqs = [next(lines)[1]["seq"]]
@@ -197,14 +192,14 @@ def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_not
         while seqs[-1] < newest:
             seqs.append(next(lines)[1]["seq"])
         assert newest - seqs[0] + 1 - len(seqs) <= client.status()["loop"]["missed_cycles"]
-        assert daemon.publisher.dropped_clients == 0
+        assert client.status()["publisher"]["dropped_clients"] == 0
 
 
 @pytest.mark.usefixtures("drifting")
 def test_readings_are_for_the_unix_socket_and_say_what_went_into_the_setpoint(tmp_path):
     with daemon_at(tmp_path) as (_, daemon, client):
         with (
-            connect(f"127.0.0.1:{daemon.publisher.tcp_port}", TIMEOUT_S) as remote,
+            connect(f"127.0.0.1:{daemon.listeners.tcp_port}", TIMEOUT_S) as remote,
             pytest.raises(DaemonError, match="Unix socket only"),
         ):
             next(remote.readings())

@@ -12,6 +12,8 @@ import yaml
 from compd.configuration import load
 from compd.configuration.schema import json_schema
 from compd.errors import ConfigurationError
+from compd.plugins import load as load_plugin
+from compd_drivers.heidenhain_nd28x import HeidenhainNd28x
 from tests.support.paths import ROOT
 
 TRIPOD = ROOT / "config" / "tripod-cmm.yaml"
@@ -68,6 +70,10 @@ CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("  rate_hz: 200", "  rate_hz: 200\n  rate_hz: 100"), "said twice", "keep one"),
     (lambda t: t + "\nlooop: {}\n", "looop: unknown key", "did you mean `loop`?"),
     (lambda t: t.replace("state:\n", "stat:\n"), "section `state` is missing", "add `state:`"),
+    (lambda t: t + "acquisition: {own_process: [joint]}\n", "acquisition.own_process[1]: no such line", "frame_u"),
+    (lambda t: t + "acquisition: {own_process: [joints, joints]}\n", "own_process[2]: named twice", "each line once"),
+    (lambda t: t + "acquisition: {own_proces: [joints]}\n", "unknown key", "did you mean `own_process`?"),
+    (lambda t: t + "acquisition: {memory_mb: 0}\n", "acquisition.memory_mb", "32 or more"),
 ]
 
 
@@ -131,9 +137,76 @@ def test_hashes_follow_what_they_stand_for(tmp_path: Path) -> None:
     assert load(path).zero_hash != first.zero_hash
 
 
+def test_lines_get_processes_of_their_own_only_where_the_file_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    first = load(TRIPOD)
+    assert first.acquisition.own_process == ()
+    path.write_text(TRIPOD.read_text() + "acquisition: {own_process: [joints], memory_mb: 256}\n")
+    changed = load(path)
+    assert (changed.acquisition.own_process, changed.acquisition.memory_mb) == (("joints",), 256)
+    assert changed.config_hash != first.config_hash
+    assert (changed.zero_hash, changed.geometry_hash) == (first.zero_hash, first.geometry_hash)
+    path.write_text(TRIPOD.read_text() + "acquisition: {memory_mb: 512}\n")
+    assert load(path).config_hash == first.config_hash, "what is written is the default"
+
+
+def test_the_hash_of_a_file_without_optional_sections_is_that_of_older_releases() -> None:
+    assert load(TRIPOD).config_hash == "3ec53557c9b90938", "recordings and controllers have it"
+
+
+def test_lines_with_a_mistake_of_their_own_are_still_lines_to_name(tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        return text.replace("baud: 115200", "baud: fast") + "acquisition: {own_process: [frame_u, dial]}\n"
+
+    baud, dial = problems_of(tmp_path, edit)
+    assert "lines.frame_u.baud" in baud
+    assert "own_process[2]: no such line" in dial
+
+
+OWN_DRIVER = "from compd_drivers.heidenhain_nd28x import HeidenhainNd28x as Mine\n"
+
+
+@pytest.mark.parametrize(
+    ("acquisition", "warned"),
+    [
+        ("", True),
+        ("acquisition: {own_process: [scale_2]}\n", True),
+        ("acquisition: {own_process: [scale_1]}\n", False),
+        ("acquisition: {own_process: [scale_2, scale_3, joints, frame_u, cabinet]}\n", False),
+    ],
+    ids=["none", "another's", "its own", "alone in the shared one"],
+)
+def test_a_driver_from_elsewhere_that_shares_a_process_is_warned_of(
+    tmp_path: Path, acquisition: str, warned: bool
+) -> None:
+    driver = tmp_path / "mine.py"
+    driver.write_text(OWN_DRIVER)
+    driver.chmod(0o644)
+    path = tmp_path / "machine.yaml"
+    text = TRIPOD.read_text().replace("scale_1: {driver: heidenhain_nd28x", f"scale_1: {{driver: '{driver}:Mine'")
+    path.write_text(text + acquisition)
+    warnings = [str(warning) for warning in load(path).warnings]
+    assert bool(warnings) == warned
+    for warning in warnings:
+        assert "gauges.scale_1.driver: this driver is not part of compd" in warning
+        assert "write `scale_1` under `acquisition: own_process:`" in warning
+
+
+def test_a_driver_of_another_package_is_warned_of_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Theirs(HeidenhainNd28x):
+        """What an entry point of another distribution would bring."""
+
+    def theirs(group: str, name: str, where: str) -> type:
+        return Theirs if where.endswith("gauges.scale_2.driver") else load_plugin(group, name, where)
+
+    monkeypatch.setattr("compd.configuration.machine_configuration.load_plugin", theirs)
+    (warning,) = load(TRIPOD).warnings
+    assert "gauges.scale_2.driver" in str(warning)
+
+
 def test_a_driver_in_a_file_must_not_be_writable_by_others(tmp_path: Path) -> None:
     driver = tmp_path / "mine.py"
-    driver.write_text("from compd_drivers.heidenhain_nd28x import HeidenhainNd28x as Mine\n")
+    driver.write_text(OWN_DRIVER)
     path = tmp_path / "machine.yaml"
     path.write_text(
         TRIPOD.read_text().replace("scale_1: {driver: heidenhain_nd28x", f"scale_1: {{driver: '{driver}:Mine'")
@@ -151,6 +224,8 @@ def test_the_schema_names_every_key_that_the_shipped_files_use() -> None:
     data = yaml.safe_load(TRIPOD.read_text())
     assert set(data) <= set(document["properties"])
     assert document["additionalProperties"] is False
+    assert set(document["required"]) == set(data), "what the shipped files leave out is optional"
+    assert "own_process" in document["properties"]["acquisition"]["properties"]
     drivers = [
         option["properties"]["driver"].get("const")
         for option in document["properties"]["gauges"]["additionalProperties"]["oneOf"]

@@ -20,6 +20,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
@@ -243,7 +244,8 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
     live, again = (with_noise(machine(on_stale="fade"), 0.1) for _ in range(2))
     one = live.loader.read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
     two = live.loader.read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
-    transcript = ReadingsMessage(live.wires, live.latest.channels, Directions(live.wires.scale.wires))
+    transcript = ReadingsMessage(live.wires, live.latest.channels)
+    packer = CyclePacker(live.latest, Directions(live.wires.scale.wires))
     commands = {
         0: None,
         20: Models(one),
@@ -259,7 +261,9 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
         live.change_mm["scale_1.position"] = 0.01 * min(tick % 40, 40 - tick % 40)
         sent = live.step()
         states.add(sent.state)
-        read = parse_readings(json.loads(transcript.line(sent)), live.latest.channels)
+        read = parse_readings(
+            json.loads(transcript.line(CycleUnpacker().unpack(packer.pack(sent, sent.to_json())))), live.latest.channels
+        )
         models = sent.inputs.models or again.settings.without_effects
         replayed, _ = step(read.state._replace(models=models), read.inputs._replace(models=models), again.settings)
         assert replayed.to_json() == sent.to_json(), tick
@@ -292,7 +296,7 @@ def test_a_running_daemon_is_asked_told_and_refuses(tmp_path, capsys):
         with pytest.raises(DaemonError, match="an absolute path"):
             client.model("m.yaml")
         with (
-            connect(f"127.0.0.1:{daemon.publisher.tcp_port}") as other,
+            connect(f"127.0.0.1:{daemon.listeners.tcp_port}") as other,
             pytest.raises(DaemonError, match="Unix socket"),
         ):
             other.model()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import signal
-import threading
 import time
 from dataclasses import replace
 
@@ -18,7 +17,6 @@ from compd.live.loop.loop import Loop
 from compd.live.loop.states import State
 from compd.live.loop.timing import Histogram, LoopTiming
 from compd.live.realtime import sleep_until
-from compd.live.systemd import Notifier
 from tests.support.live_machine import machine
 
 PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==
@@ -50,26 +48,26 @@ class TurnedByHand:
 def loop_with(sink, clock, sleep_until=sleep_until):
     """A loop whose machine has no zero, so that its cycles cost next to nothing."""
     cycle = replace(TRIPOD.settings, loop=LOOP)
-    return Loop(cycle, TRIPOD.latest, NO_ZERO, [sink], Notifier(""), clock, sleep_until)
+    return Loop(cycle, TRIPOD.latest, NO_ZERO, [sink], clock, sleep_until=sleep_until)
 
 
 def run_cycles(costs_s, late_s=0.0):
     """Run one loop for as many cycles as there are costs; the loop, the setpoints' ticks and the clock."""
     clock = TurnedByHand(costs_s)
-    ticks = []
+    ticks, done = [], []
 
     def sink(setpoint):
         assert setpoint.state is State.NO_ZERO
         ticks.append(setpoint.seq)
         clock.now_s = setpoint.time_s + next(clock.costs_s)
         if len(ticks) == len(costs_s):
-            loop._stop.set()
+            done.append(True)
 
     def sleep_until_late(time_s):
         clock.sleep_until(time_s + late_s)
 
     loop = loop_with(sink, clock, sleep_until_late)
-    loop.run()
+    loop.run(lambda: not done)
     return loop, ticks, clock
 
 
@@ -97,26 +95,35 @@ def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
     assert summary["period_deviation_ms"] == pytest.approx(0, abs=1e-6)
 
 
-def test_a_stop_ends_a_real_loop_and_its_thread_says_what_was_permitted():
-    called = threading.Event()
+def test_a_loop_that_was_stopped_for_a_while_goes_on_at_the_tick_of_now():
+    """SIGSTOP, or a computer that slept: the ticks that went by are missed, and none of them is computed late."""
+    clock = TurnedByHand([0.0] * 3)
+    ticks = []
 
-    loop = loop_with(lambda setpoint: called.set(), RealClock())
-    loop.start()
-    assert called.wait(10)
-    assert loop.alive
-    loop.stop()
-    assert not loop.alive
-    assert set(loop.permissions) == {"sched_fifo", "switch_interval", "quiet_collector"}
-    for permission in loop.permissions.values():
-        assert permission.detail
+    def stopped_once(time_s):
+        clock.sleep_until(time_s + (10.5 * PERIOD_S if len(ticks) == 1 else 0.0))
+
+    def sink(setpoint):
+        ticks.append(setpoint.seq)
+
+    loop = loop_with(sink, clock, stopped_once)
+    loop.run(lambda: len(ticks) < 3)
+    assert ticks == [1, 12, 13]
+    assert (loop.timing.cycles, loop.timing.missed) == (3, 10)
 
 
-class RealClock:
-    def monotonic(self):
-        return time.monotonic()
-
-    def wait(self, event, timeout_s):
-        return event.wait(timeout_s)
+def test_a_loop_that_takes_over_stays_on_the_grid_and_counts_the_ticks_between():
+    clock = TurnedByHand([])
+    cycle = replace(TRIPOD.settings, loop=LOOP)
+    timing = LoopTiming(PERIOD_S)
+    ticks = []
+    for rounds in (2, 4):
+        loop = Loop(cycle, TRIPOD.latest, NO_ZERO, [lambda s: ticks.append(s.seq)], clock, timing, clock.sleep_until)
+        loop.run(lambda rounds=rounds: len(ticks) < rounds)
+        clock.now_s += 5.5 * PERIOD_S
+    assert ticks == [1, 2, 7, 8]
+    assert clock.woken_s == [10.0 + k * PERIOD_S for k in ticks]
+    assert (timing.cycles, timing.missed) == (4, 4)
 
 
 def test_the_sleeper_does_not_wake_early_even_through_signals():
@@ -153,9 +160,9 @@ def test_period_statistics_are_those_of_the_periods():
 def test_a_histogram_says_nothing_of_nothing_and_keeps_the_largest():
     histogram = Histogram()
     assert histogram.summary() == {}
-    for us in (*[12] * 98, 402, 1e6):
+    for us in (*[12.5] * 98, 402.5, 1e6):
         histogram.add(us * 1e-6)
-    assert histogram.quantile_us(0.5) == 15
-    assert histogram.quantile_us(0.99) == 405
+    assert histogram.quantile_us(0.5) == 13
+    assert histogram.quantile_us(0.99) == 403
     assert histogram.largest_us == pytest.approx(1e6)
     assert histogram.quantile_us(1.0) == pytest.approx(1e6), "beyond the bins the largest itself is the answer"

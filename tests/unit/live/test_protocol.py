@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import socket
 import threading
 from contextlib import closing
@@ -14,8 +15,11 @@ from compd.clock import MonotonicClock
 from compd.configuration.operation import SocketSettings
 from compd.errors import DaemonError, Problem, StateError
 from compd.live.loop.commands import Commands
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
+from compd.live.memory.shared_ring import ENTRIES, SharedRing
+from compd.live.service.listeners import Listeners
 from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.publisher import Publisher
 from compd.live.service.requests import REQUESTS, Asker, Requests, TargetKeys
@@ -64,6 +68,24 @@ class Peer:
         self.socket.close()
 
 
+class LoopIsWell:
+    """In the place of the watch: the setpoints of these tests have times of their own."""
+
+    limit_s = 1.0
+
+    def admits(self, seq, time_s):
+        return True
+
+    def wait_s(self, now_s):
+        return self.limit_s
+
+    def missing(self, now_s):
+        return None
+
+    def stop(self, now_s, reason):
+        return Setpoint(10**6, now_s, now_s, math.nan, State.STOP, reason, Mode.CMM, None)
+
+
 class Service:
     """A publisher on real sockets, with the loop's side in the test's hands."""
 
@@ -74,7 +96,11 @@ class Service:
         self.observed = []
         self.zeros = []
         self.models = []
-        self.publisher = Publisher(sockets, PERIOD_S, self.observed.append)
+        self.listeners = Listeners(sockets)
+        self.ring = SharedRing()
+        self.publisher = Publisher(
+            self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, MonotonicClock(), [self.observed.append]
+        )
         requests = Requests(
             VERSION,
             target_keys,
@@ -83,14 +109,23 @@ class Service:
             self.zeros.append,
             switch_model=lambda *arguments: self.models.append(arguments),
         )
-        self.publisher.start(requests)
+        self.stopping = threading.Event()
+        self.thread = threading.Thread(target=self.run, args=(requests,))
+        self.thread.start()
         self.peers = []
+
+    def run(self, requests):
+        self.publisher.run(requests, lambda: not self.stopping.is_set(), lambda: None)
+        self.publisher.end("the test is over")
+
+    def deliver(self, setpoint):
+        self.ring.put(setpoint.time_s, setpoint.state.code, SentSetpoint.of(setpoint, None).pack())
 
     def unix(self, **options):
         return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))
 
     def tcp(self, **options):
-        return self._peer(Peer(socket.AF_INET, ("127.0.0.1", self.publisher.tcp_port), **options))
+        return self._peer(Peer(socket.AF_INET, ("127.0.0.1", self.listeners.tcp_port), **options))
 
     def _peer(self, peer):
         self.peers.append(peer)
@@ -99,7 +134,10 @@ class Service:
     def close(self):
         for peer in self.peers:
             peer.close()
-        self.publisher.stop()
+        self.stopping.set()
+        self.ring.wake_reader()
+        self.thread.join()
+        self.listeners.close()
 
 
 @pytest.fixture
@@ -115,7 +153,7 @@ def test_version_greets_and_every_setpoint_comes_once_in_order(service, kind):
     assert peer.ask({"class": "WATCH"}) == {"class": "WATCH"}
     now_s = MonotonicClock().monotonic()
     for seq in range(1, 101):
-        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     received = [peer.read() for _ in range(100)]
     assert [message["seq"] for message in received] == list(range(1, 101))
     assert {message["class"] for message in received} == {"SETPOINT"}
@@ -126,19 +164,19 @@ def test_a_rate_thins_the_setpoints_evenly_and_zero_stops_them(service):
     assert peer.ask({"class": "WATCH", "rate_hz": 20}) == {"class": "WATCH", "rate_hz": 20}
     now_s = MonotonicClock().monotonic()
     for seq in range(1, 201):
-        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     seqs = [peer.read()["seq"] for _ in range(20)]
     assert set(np.diff(seqs)) == {10}, "200 Hz thinned to 20 Hz"
     peer.ask({"class": "WATCH", "rate_hz": 0})
-    service.publisher.deliver(setpoint(999, now_s + 9))
+    service.deliver(setpoint(999, now_s + 9))
     assert peer.ask({"class": "STATUS"}) == {"class": "STATUS"}, "and no setpoint in between"
 
 
 def test_who_does_not_watch_gets_nothing_and_state_changes_are_still_observed(service):
     peer = service.unix()
-    service.publisher.deliver(setpoint(1))
-    service.publisher.deliver(setpoint(2))
-    service.publisher.deliver(setpoint(3)._replace(state=State.HOLD))
+    service.deliver(setpoint(1))
+    service.deliver(setpoint(2))
+    service.deliver(setpoint(3)._replace(state=State.HOLD))
     assert peer.ask({"class": "STATUS"})["class"] == "STATUS"
     assert [s.seq for s in service.observed] == [1, 3]
 
@@ -187,7 +225,7 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(service, message, code):
     assert answer["code"] == code
     assert answer["text"]
     assert peer.ask({"class": "VERSION"}) == VERSION, "the connection stays"
-    service.publisher.deliver(setpoint(1, MonotonicClock().monotonic()))
+    service.deliver(setpoint(1, MonotonicClock().monotonic()))
     assert other.read()["seq"] == 1
     assert service.commands.target is None
 
@@ -314,9 +352,9 @@ def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(servic
     while not service.publisher.dropped_clients:
         seq += 1
         assert seq < 50_000, "the slow client was never dropped"
-        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
         assert good.read()["seq"] == seq
-    assert service.publisher.dropped_setpoints == 0
+    assert service.publisher.summary()["dropped_setpoints"] == 0
     good.ask({"class": "STATUS"})
     assert service.publisher.summary()["clients"] == 1
     while slow.socket.recv(65536):
@@ -331,17 +369,18 @@ def test_a_full_queue_drops_the_oldest_and_counts_them(service):
         entered.set()
         assert leave.wait(TIMEOUT_S)
 
-    service.publisher._observe = hold_up
+    service.publisher._observers = (hold_up,)
     peer.ask({"class": "WATCH"})
     now_s = MonotonicClock().monotonic()
-    service.publisher.deliver(setpoint(0, now_s))
+    service.deliver(setpoint(0, now_s))
     assert entered.wait(TIMEOUT_S)
     for seq in range(1, 601):
-        service.publisher.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     leave.set()
     assert peer.read()["seq"] == 0
-    assert peer.read()["seq"] == 600 - 512 + 1
-    assert service.publisher.dropped_setpoints == 600 - 512
+    dropped = peer.read()["seq"] - 1
+    assert 600 - ENTRIES <= dropped <= 600 - ENTRIES + 20, "all but what the ring has, less a margin"
+    assert service.publisher.summary()["dropped_setpoints"] == dropped
 
 
 def test_beyond_the_last_seat_a_client_is_told_and_closed(service):
@@ -376,7 +415,5 @@ def test_a_port_that_is_taken_is_named(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         sockets = SocketSettings(tcp={"port": port}, unix={"path": str(tmp_path / "s")}, valid_for_s=0.1)
-        publisher = Publisher(sockets, PERIOD_S, lambda _: None)
-        requests = Requests(VERSION, TargetKeys("tip_B0_mm", False), Commands(NO_ZERO), dict, lambda _: None)
         with pytest.raises(DaemonError, match=str(port)):
-            publisher.start(requests)
+            Listeners(sockets)

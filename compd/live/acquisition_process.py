@@ -1,0 +1,81 @@
+"""What a process of the acquisition does: poll its lines, and tell how they are doing."""
+
+from __future__ import annotations
+
+import os
+import resource
+import threading
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from compd.clock import Clock
+from compd.live.acquisition.acquisition import Acquisition
+from compd.live.child_process import OUT_OF_MEMORY
+from compd.live.control import Control, Phase, SharedMessage
+
+_TELL_EVERY_S = 0.1
+# A driver in the middle of a poll may take so long to let go of its line.
+_STOP_WITHIN_S = 0.5
+_STATUS_BYTES = 1024 * 1024
+_BYTES_PER_MB = 1_000_000
+
+
+class AcquisitionProcess:
+    """One process that polls some of the machine's lines.
+
+    Attributes
+    ----------
+    name : "acquisition", or "line" with the name of a line that has a process of its own.
+    """
+
+    def __init__(
+        self, name: str, make: Callable[[], Acquisition], control: Control, clock: Clock, memory_mb: float
+    ) -> None:
+        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB."""
+        self.name = name
+        self._make = make
+        self._control = control
+        self._clock = clock
+        self._memory_mb = memory_mb
+        self._status = SharedMessage(_STATUS_BYTES)
+
+    @property
+    def beats(self) -> int:
+        """Grows as long as the process lives."""
+        return self._status.version
+
+    def status(self) -> Mapping[str, Any]:
+        """How the lines are doing, a tenth of a second ago."""
+        status: Mapping[str, Any] = self._status.read() or {}
+        return status
+
+    def run(self) -> None:
+        """Poll until the daemon stops."""
+        threading.excepthook = _end_with_thread
+        acquisition = self._make()
+        acquisition.start()
+        _limit_memory(self._memory_mb)
+        never = threading.Event()
+        while self._control.phase != Phase.STOPPING:
+            self._status.write(dict(acquisition.status()))
+            self._clock.wait(never, _TELL_EVERY_S)
+        acquisition.stop(_STOP_WITHIN_S)
+
+
+def _limit_memory(memory_mb: float) -> None:
+    """Let the process grow by so much (MB) from what it has now; beyond, it ends."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    now_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmData"))
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    limit = now_kb * 1024 + int(memory_mb * _BYTES_PER_MB)
+    resource.setrlimit(resource.RLIMIT_DATA, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
+
+
+def _end_with_thread(arguments: threading.ExceptHookArgs) -> None:
+    """End the process with a thread of it: a line without its thread would be stale for ever."""
+    if isinstance(arguments.exc_value, MemoryError):
+        os._exit(OUT_OF_MEMORY)
+    traceback.print_exception(arguments.exc_value)
+    os._exit(1)

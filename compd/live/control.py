@@ -1,0 +1,154 @@
+"""What the daemon's processes tell each other besides readings, setpoints and commands."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+from enum import IntEnum
+from typing import Any
+
+from compd.live.memory.shared_array import shared_counters
+from compd.live.memory.shared_record import SharedRecord
+
+_TEXT_BYTES = 4096
+# A request names a file; an answer may hold a summary, or a list of problems.
+_MESSAGE_BYTES = 256 * 1024
+
+_PHASE, _TURN, _SUCCESSOR, _SERVICE_BEAT = range(4)
+
+
+class Phase(IntEnum):
+    """Of the daemon's life. RUNNING, then HOLDING the correction for the clients to see, then STOPPING."""
+
+    RUNNING = 0
+    HOLDING = 1
+    STOPPING = 2
+
+
+class SharedMessage:
+    """Plain data that one process replaces and others read."""
+
+    def __init__(self, capacity: int = _MESSAGE_BYTES) -> None:
+        self._record = SharedRecord(capacity)
+        self._version = 0
+        self._data: Any = None
+
+    @property
+    def version(self) -> int:
+        """Another number after every write."""
+        return self._record.version
+
+    def write(self, data: Any) -> None:
+        """Replace the data. Raises ValueError where they are too long."""
+        self._record.write(pickle.dumps(data))
+
+    def read(self) -> Any:
+        """The data; None before the first write."""
+        if (version := self._record.version) != self._version and (content := self._record.read()):
+            self._data, self._version = pickle.loads(content), version
+        return self._data
+
+
+class Control:
+    """The phase of the daemon, whose turn the loop is, beats, and the switch of models.
+
+    Loops are numbered. The one whose number is `turn` cycles. Another one that is ready to take over is `successor`:
+    the loop that has the turn gives it between two ticks.
+
+    Attributes
+    ----------
+    loop_fault : (monotonic time in s, text) of the last end of a loop, for the reason of a `stop`. Written by the
+        supervisor.
+    realtime : what the system granted to the loop. Written by the loop that has the turn.
+    processes : STATUS's part about the processes. Written by the supervisor.
+    headline : one line about the machine's state, for the service manager. Written by the service.
+    model_request : (number, file, whether as the shadow). Written by the service.
+    model_answer : (number, summary of the models, "") or (number, None, why not). Written by the successor; by the
+        supervisor where that has ended.
+    supervisor_woken, turn_given : event descriptors.
+    """
+
+    def __init__(self) -> None:
+        self._words = shared_counters(4)
+        self._ending = SharedMessage(_TEXT_BYTES)
+        self.loop_fault = SharedMessage(_TEXT_BYTES)
+        self.realtime = SharedMessage()
+        self.processes = SharedMessage()
+        self.headline = SharedMessage(_TEXT_BYTES)
+        self.model_request = SharedMessage()
+        self.model_answer = SharedMessage()
+        self.supervisor_woken = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self.turn_given = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+
+    @property
+    def phase(self) -> int:
+        """See `Phase`; written by the supervisor alone."""
+        return self._words[_PHASE]
+
+    def enter(self, phase: Phase, reason: str) -> None:
+        """Enter a phase, for the reason that clients are told."""
+        self._ending.write(reason)
+        self._words[_PHASE] = phase
+
+    def ending(self) -> str:
+        """Why the daemon is about to end; "" as long as it is not."""
+        return self._ending.read() if self._words[_PHASE] else ""
+
+    @property
+    def turn(self) -> int:
+        """Number of the loop that cycles."""
+        return self._words[_TURN]
+
+    def give_turn(self, loop: int) -> None:
+        """Let this loop cycle; called by the loop that had the turn, or by the supervisor where that has ended."""
+        self._words[_TURN] = loop
+        self._words[_SUCCESSOR] = 0
+        os.eventfd_write(self.turn_given, 1)
+
+    @property
+    def successor(self) -> int:
+        """Number of the loop that is ready to take over; 0 where there is none."""
+        return self._words[_SUCCESSOR]
+
+    def await_turn(self, loop: int, timeout_s: float) -> bool:
+        """Offer to take over as this loop, and wait for the turn; False where it has not come."""
+        self._words[_SUCCESSOR] = loop
+        poll = select.poll()
+        poll.register(self.turn_given, select.POLLIN)
+        while self.turn != loop:
+            if not poll.poll(timeout_s * 1e3):
+                self.withdraw(loop)
+                return self.turn == loop
+            os.eventfd_read(self.turn_given)
+        return True
+
+    def withdraw(self, loop: int) -> None:
+        """Offer this loop no longer."""
+        if self._words[_SUCCESSOR] == loop:
+            self._words[_SUCCESSOR] = 0
+
+    def keeps_turn(self, loop: int) -> bool:
+        """Whether this loop is to go on; it gives the turn to its successor where there is one."""
+        words = self._words
+        if successor := words[_SUCCESSOR]:
+            self.give_turn(successor)
+        return words[_TURN] == loop and words[_PHASE] != Phase.STOPPING
+
+    @property
+    def service_beats(self) -> int:
+        """How often the service's thread has gone round."""
+        return self._words[_SERVICE_BEAT]
+
+    def beat_service(self) -> None:
+        """Count a round of the service's thread."""
+        self._words[_SERVICE_BEAT] += 1
+
+    def wake_supervisor(self) -> None:
+        """Let the supervisor look at once."""
+        os.eventfd_write(self.supervisor_woken, 1)
+
+    def close(self) -> None:
+        """Close the event descriptors."""
+        os.close(self.supervisor_woken)
+        os.close(self.turn_given)

@@ -1,0 +1,182 @@
+"""What the process of a loop does: prepare for real time, take up the state of the loop before it, and cycle.
+
+A loop never changes its models. Other ones come with a successor: a process that reads and tries them, computes some
+cycles that nobody sees, so that nothing of it has yet to be compiled or fetched into memory, and then takes the turn
+between two ticks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import structlog
+
+from compd.clock import Clock
+from compd.errors import CompdError
+from compd.live import realtime
+from compd.live.control import Control
+from compd.live.loop.adopted_models import AdoptedModels
+from compd.live.loop.commands import Commands
+from compd.live.loop.cycle import step
+from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
+from compd.live.loop.directions import Directions
+from compd.live.loop.loop import Loop
+from compd.live.loop.machine_zero import MachineZero
+from compd.live.loop.model_loader import LiveModel, ModelLoader, Models
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.timing import LoopTiming
+from compd.live.memory.latest import Latest
+from compd.live.memory.shared_ring import LONGEST_CONTENT, SharedRing
+
+# Cycles that a loop computes before the first that counts.
+_TRIAL_CYCLES = 20
+# Priority for these cycles, below every `loop.priority`.
+_TRIAL_PRIORITY = 1
+# A loop that is alive gives the turn within a period.
+_TURN_WITHIN_S = 2.0
+
+_log = structlog.get_logger()
+
+
+@dataclass(frozen=True)
+class ModelRequest:
+    """A request to run with another model. number : of the request. file : "" for none. shadow : compute beside."""
+
+    number: int
+    file: str
+    shadow: bool
+
+
+@dataclass(frozen=True)
+class LoopProcess:
+    """The parts of the daemon that a loop needs, all made before its process was forked.
+
+    setpoints, cycles : the rings, see `compd.live.loop.sent_cycle`. packet_hash : first bytes of the configuration's
+    hash, for UDP packets; None where they are not configured.
+    """
+
+    settings: CycleSettings
+    latest: Latest
+    commands: Commands
+    loader: ModelLoader
+    adopted: AdoptedModels
+    timing: LoopTiming
+    setpoints: SharedRing
+    cycles: SharedRing
+    packet_hash: bytes | None
+    control: Control
+    clock: Clock
+
+    def run(self, number: int, forget: bool = False) -> None:
+        """Cycle as loop `number`, which has the turn. forget : begin anew but for the correction that is applied."""
+        models = self.adopted.load(self.loader)
+        self.commands.models = models
+        loop = self._loop()
+        self._prepare(loop)
+        self._try_cycles(self._state_left(models, forget))
+        realtime.use_fifo(self.settings.loop.priority)
+        loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
+
+    def run_successor(self, number: int, request: ModelRequest) -> None:
+        """Read and try the model that is asked for, take the turn and cycle; or answer why not."""
+        control = self.control
+        try:
+            before = self.adopted.load(self.loader)
+            models = self._models_wanted(before, request)
+            self.commands.models = models
+            loop = self._loop()
+            self._prepare(loop)
+            self._try_cycles(self._state_left(before, forget=False))
+        except (CompdError, ValueError) as error:
+            _log.warning("model refused", file=request.file, reason=str(error))
+            self.answer(request.number, None, str(error))
+            return
+        realtime.use_fifo(self.settings.loop.priority)
+        if not control.await_turn(number, _TURN_WITHIN_S):
+            self.answer(request.number, None, "the loop does not answer")
+            return
+        state = self._state_left(before, forget=False)
+        self.adopted.write(models)
+        self.answer(request.number, models.summary, "")
+        loop.run(lambda: control.keeps_turn(number), control.ending, state)
+
+    def answer(self, number: int, summary: object, refusal: str) -> None:
+        """Answer request `number`, and wake the service, which sends the answer."""
+        self.control.model_answer.write((number, summary, refusal))
+        self.setpoints.wake_reader()
+
+    def _models_wanted(self, before: Models, request: ModelRequest) -> Models:
+        """The pair of applied model and shadow with the new one (none: no effects, or no shadow) in its place."""
+        model: LiveModel | None = self.loader.read(Path(request.file)) if request.file else None
+        if request.shadow:
+            return Models(before.applied, model)
+        if model is not None and before.shadow is not None and model.hash == before.shadow.hash:
+            # the same object that ran as a shadow: its effects keep their memory
+            return Models(before.shadow)
+        return Models(model or self.loader.without_effects, before.shadow)
+
+    def _loop(self) -> Loop:
+        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
+
+        def send(setpoint: Setpoint) -> None:
+            time_s, state = setpoint.time_s, setpoint.state.code
+            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            self.setpoints.put(time_s, state, sent.pack())
+            self.cycles.put(time_s, state, packer.pack(setpoint, sent.line))
+
+        return Loop(self.settings, self.latest, self.commands, [send], self.clock, self.timing)
+
+    def _prepare(self, loop: Loop) -> None:
+        """Ask the system for what real time needs. What it does not permit is told, and the loop runs without it."""
+        settings = self.settings.loop
+        realtime.sharpen_timers()
+        permissions = {"quiet_collector": loop.collector.start(self.clock.monotonic())}
+        if settings.lock_memory:
+            permissions["locked_memory"] = realtime.lock_memory()
+        permissions["sched_fifo"] = realtime.use_fifo(settings.priority)
+        # what follows must not get in the way of the loop that has the turn
+        realtime.use_fifo(_TRIAL_PRIORITY)
+        self.control.realtime.write({name: permission._asdict() for name, permission in permissions.items()})
+
+    def _try_cycles(self, state: CycleState) -> None:
+        """Compute cycles that nobody sees. Raises ValueError for models whose state does not fit into the ring."""
+        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
+        for tick in range(1, _TRIAL_CYCLES + 1):
+            setpoint, state = step(state, self._inputs(tick), self.settings)
+            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            # what effects remember may grow while the machine moves
+            if len(packer.pack(setpoint, sent.line)) > LONGEST_CONTENT // 2:
+                raise ValueError(f"the effects remember more than {LONGEST_CONTENT // 2} bytes from cycle to cycle")
+
+    def _inputs(self, tick: int) -> CycleInputs:
+        snapshot = self.latest.snapshot(self.clock.monotonic())
+        return CycleInputs(tick, snapshot, self.commands.zero, self.commands.target, self.commands.models)
+
+    def _state_left(self, models: Models, forget: bool) -> CycleState:
+        """The state that the last cycle left: that cycle is computed once more.
+
+        models : with which it was computed. Where it cannot be computed again, or is to be forgotten, all that is kept
+        is the correction that is applied, from which the next one slews.
+        """
+        start = CycleState.at_start(self.settings.model)
+        entry = self.cycles.get(self.cycles.count - 1) if self.cycles.count else None
+        if entry is None:
+            return start
+        sent = CycleUnpacker().unpack(entry.content)
+        inputs, state = sent.inputs, sent.state_before
+        bare = start._replace(correction_mm=state.correction_mm, adopting=True)
+        if forget or sent.models != models.names:
+            return bare
+        zero = self.commands.zero
+        if isinstance(zero, MachineZero) and inputs.zero == zero:
+            # one object: the cycle asks whether it is the same
+            state = state._replace(zero=None if state.zero is None else zero)
+            inputs = inputs._replace(zero=zero)
+        try:
+            _, left = step(state._replace(models=models), inputs._replace(models=models), self.settings)
+        except Exception as error:  # noqa: BLE001  an effect of a user's own may have ended the loop in this very cycle
+            _log.warning("the last cycle cannot be computed again", error=f"{type(error).__name__}: {error}")
+            return bare
+        return left

@@ -1,0 +1,83 @@
+"""`compd run`: the daemon under its supervisor, from the first configuration through every one that SIGHUP brings."""
+
+from __future__ import annotations
+
+import sys
+
+import structlog
+
+from compd.clock import MonotonicClock
+from compd.configuration import Configuration, load
+from compd.errors import CompdError
+from compd.live.daemon import Daemon
+from compd.live.supervisor import Ending, Supervisor
+from compd.live.systemd import Notifier
+
+_log = structlog.get_logger()
+
+
+def run(configuration: Configuration) -> bool:
+    """Run the daemon until SIGTERM or Ctrl-C; True where it ended by itself.
+
+    Raises CompdError where it cannot start: a socket that cannot be had, a model file that cannot be used.
+    """
+    _log_to_stderr()
+    notifier, clock = Notifier.from_environment(), MonotonicClock()
+    daemon = Daemon(configuration)
+    while True:
+        _report(daemon)
+        following: list[Daemon] = []
+
+        def reload(now: Daemon = daemon, following: list[Daemon] = following) -> bool:
+            if (found := _reconfigured(now)) is not None:
+                following.append(found)
+            return bool(following)
+
+        ending = Supervisor(daemon, notifier, clock).run(reload)
+        if ending is not Ending.RELOADED:
+            daemon.close()
+            notifier.close()
+            return ending is Ending.FAILED
+        daemon.close(after=following[0])
+        daemon = following[0]
+
+
+def _reconfigured(daemon: Daemon) -> Daemon | None:
+    """The daemon of the configuration as its file is now; None, with the problems in the log, where it cannot run."""
+    path = daemon.configuration.path
+    try:
+        return Daemon(load(path), daemon)
+    except CompdError as error:
+        for problem in error.problems:
+            _log.error("configuration refused", problem=str(problem))
+        _log.warning("the daemon goes on with the configuration that it has", file=str(path))
+        return None
+
+
+def _report(daemon: Daemon) -> None:
+    """Log what is about to run."""
+    configuration = daemon.configuration
+    for warning in configuration.warnings:
+        _log.warning("configuration", where=warning.where, what=warning.what)
+    _log.info(
+        "running",
+        machine=configuration.machine,
+        config_hash=configuration.config_hash,
+        rate_hz=configuration.loop.rate_hz,
+        unix=configuration.sockets.unix.path,
+        tcp_port=daemon.listeners.tcp_port,
+    )
+
+
+def _log_to_stderr() -> None:
+    """Log one line per event to stderr, with colours on a terminal."""
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso"),
+            structlog.dev.ConsoleRenderer()
+            if sys.stderr.isatty()
+            else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "event"]),
+        ],
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+    )

@@ -1,0 +1,83 @@
+"""What the process of the service does: serve the clients, take machine zero, pass the processes' logs on."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import structlog
+
+from compd.clock import Clock
+from compd.live.control import Control, Phase
+from compd.live.log_relay import LogRelay
+from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.states import State
+from compd.live.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
+from compd.live.service.model_switch import ModelSwitch
+from compd.live.service.publisher import Publisher
+from compd.live.service.requests import Requests
+from compd.live.service.udp_sender import UdpSender
+from compd.live.service.zero_capture import ZeroCapture
+
+_log = structlog.get_logger()
+
+
+class StateLog:
+    """Reports every change of the machine's state to the log and the service manager."""
+
+    def __init__(self, control: Control) -> None:
+        self._control = control
+        self._state: State | None = None
+
+    def note(self, setpoint: SentSetpoint) -> None:
+        """Take a setpoint; called on the publisher's thread."""
+        if setpoint.state is self._state:
+            return
+        self._state = setpoint.state
+        log = _log.info if setpoint.state.valid else _log.warning
+        log("state", state=setpoint.state.value, reason=setpoint.reason, mode=setpoint.mode.value)
+        self._control.headline.write(f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else setpoint.state)
+        self._control.wake_supervisor()
+
+
+@dataclass(frozen=True)
+class ServiceProcess:
+    """The parts of the daemon that serve, all made before the process was forked.
+
+    logs : descriptors from which the other processes' output is read, by their name.
+    priority : for the thread that serves, below the loop's; 0 for none.
+    """
+
+    publisher: Publisher
+    requests: Requests
+    zero_capture: ZeroCapture
+    model_switch: ModelSwitch
+    packets: UdpSender | None
+    control: Control
+    clock: Clock
+    logs: Mapping[str, int]
+    priority: int
+
+    def run(self) -> None:
+        """Serve until the daemon stops."""
+        relay = LogRelay(self.logs, _write, self.clock)
+        relay.start()
+        shorten_switch_interval()
+        sharpen_timers()
+        priority = RationedPriority(self.priority, self.clock)
+
+        def each_round() -> None:
+            self.control.beat_service()
+            self.model_switch.look()
+            priority.look()
+
+        self.publisher.run(self.requests, lambda: self.control.phase != Phase.STOPPING, each_round)
+        self.publisher.end(self.control.ending())
+        self.zero_capture.stop()
+        relay.stop()
+
+
+def _write(line: str) -> None:
+    sys.stderr.write(line)
+    sys.stderr.flush()
