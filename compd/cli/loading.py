@@ -21,10 +21,10 @@ def loading() -> Iterator[None]:
     try:
         yield
     finally:
-        gc.set_threshold(*thresholds)
         if _collections() > collections:
             gc.collect()
         gc.freeze()
+        gc.set_threshold(*thresholds)
 
 
 def _collections() -> int:
