@@ -21,17 +21,18 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import StateError
 from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition_process import AcquisitionProcess
-from compd.live.control import Control
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
-from compd.live.loop_process import LoopProcess
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.pipeline import build_pipeline
+from compd.live.processes.acquisition_process import AcquisitionProcess
+from compd.live.processes.control import Control
+from compd.live.processes.loop_process import LoopProcess
+from compd.live.processes.service_process import ServiceProcess, StateLog
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import PROTOCOL
@@ -42,7 +43,6 @@ from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
-from compd.live.service_process import ServiceProcess, StateLog
 from compd.release import __version__
 
 _log = structlog.get_logger()

@@ -10,7 +10,7 @@ from compd.clock import MonotonicClock
 from compd.configuration import Configuration, load
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
-from compd.live.supervisor import Ending, Supervisor
+from compd.live.processes.supervisor import Ending, Supervisor
 from compd.live.systemd import Notifier
 
 _log = structlog.get_logger()

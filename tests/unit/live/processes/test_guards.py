@@ -10,11 +10,11 @@ import signal
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.child_process import OUT_OF_MEMORY, ChildProcess
-from compd.live.control import Control, Phase
-from compd.live.heartbeat import Heartbeat, RestartDelay
 from compd.live.loop.states import State
 from compd.live.memory.shared_ring import SharedRing
+from compd.live.processes.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.processes.control import Control, Phase
+from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.service.loop_watch import LoopWatch
 
 

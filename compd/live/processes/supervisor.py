@@ -17,12 +17,12 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.child_process import ChildProcess
-from compd.live.control import Phase
 from compd.live.daemon import Daemon
-from compd.live.heartbeat import Heartbeat, RestartDelay
-from compd.live.loop_process import ModelRequest
-from compd.live.loop_succession import LoopSuccession
+from compd.live.processes.child_process import ChildProcess
+from compd.live.processes.control import Phase
+from compd.live.processes.heartbeat import Heartbeat, RestartDelay
+from compd.live.processes.loop_process import ModelRequest
+from compd.live.processes.loop_succession import LoopSuccession
 from compd.live.systemd import Notifier
 
 # Between two looks at the beats of the processes.
