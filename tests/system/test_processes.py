@@ -516,6 +516,8 @@ def may_use_fifo() -> bool:
 def test_the_loop_is_one_thread_with_priority_in_locked_memory(apart: Daemon) -> None:
     status, pid = apart.status(), apart.pids()["loop"]
     assert len(list(Path(f"/proc/{pid}/task").iterdir())) == 1
+    links = [path.readlink() for path in Path(f"/proc/{pid}/fd").iterdir()]
+    assert not [link for link in links if str(link).startswith("socket:")]
     realtime = status["realtime"]
     assert realtime["sched_fifo"]["granted"] == may_use_fifo()
     assert os.sched_getscheduler(pid) == (os.SCHED_FIFO if realtime["sched_fifo"]["granted"] else os.SCHED_OTHER)

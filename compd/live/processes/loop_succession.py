@@ -106,4 +106,4 @@ class LoopSuccession:
         return self._number
 
     def _child(self, name: str, run: Callable[[], None]) -> ChildProcess:
-        return ChildProcess(name, run, self._clock, self._output)
+        return ChildProcess(name, run, self._clock, self._output, keeps_sockets=False)

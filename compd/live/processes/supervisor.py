@@ -55,7 +55,9 @@ class Supervisor:
         self._clock = clock
         self._loops = LoopSuccession(daemon.loop_process, clock, daemon.log_pipe("loop"))
         self._acquisition = {
-            process.name: ChildProcess(process.name, process.run, clock, daemon.log_pipe(process.name))
+            process.name: ChildProcess(
+                process.name, process.run, clock, daemon.log_pipe(process.name), keeps_sockets=False
+            )
             for process in daemon.acquisition
         }
         self._service = ChildProcess("service", daemon.service.run, clock)
