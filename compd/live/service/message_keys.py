@@ -241,8 +241,8 @@ class ProcessStatusKeys(Keys):
     """One of the daemon's processes."""
 
     pid: int = Field(description="its number; 0 while it is not there")
-    starts: int = Field(description="how often it was started")
-    last_end: str | None = Field(default=None, description="how the one before it ended")
+    starts: int = Field(description="how often it was started; the loop also for every model that was adopted")
+    last_end: str | None = Field(default=None, description="how the last one ended; absent where none has")
 
 
 class PublisherStatusKeys(Keys):
