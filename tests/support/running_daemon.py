@@ -28,7 +28,7 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
     daemon = Daemon(configuration)
     notifier = notifier or Notifier("")
     supervisor = Supervisor(daemon, notifier, clock)
-    process = ChildProcess("supervisor", lambda: supervisor.run(lambda: False), clock)
+    process = ChildProcess("supervisor", lambda: supervisor.run(lambda: None, lambda: False), clock)
     process.start()
     try:
         polling = clock.monotonic() + START_WITHIN_S
