@@ -64,7 +64,7 @@ while True:
         line.sendall(reply)
 """
 
-# Notes when each setpoint came, and prints how long after its tick, in us, at the end: reading JSON is the client's own.
+# Notes when each setpoint came, and prints at the end how long after its tick, us. To read JSON takes time of its own.
 CLIENT = """
 import json, os, socket, sys, time
 try:
