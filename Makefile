@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard sensitivity nightly clean
+.PHONY: help docs demo test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -15,6 +15,7 @@ help:
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
 	@echo "make pages   every command and piece of Python of README and docs, run (3 min)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (3 min)"
+	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make scoreboard  the diagnosis on 1300 simulated machines (hours; continues where it stopped)"
@@ -46,7 +47,14 @@ test: $(STAMP)
 	$(BIN)/pytest -n 2 $(HIDDEN)
 
 long: $(STAMP)
-	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%)
+	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
+
+# The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
+# packages debootstrap and systemd-container.
+SERVICE := tests/system/test_service_in_container.py
+
+service: $(STAMP)
+	$(BIN)/pytest -m long -rsP $(SERVICE)
 
 # Every command and every piece of Python of README and docs/.
 pages: $(STAMP)
@@ -127,7 +135,7 @@ docs: $(STAMP) $(GALLERY) $(EXAMPLE)
 	  --doctree-dir docs/_build/doctrees docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
-nightly: lint wheel demo test pages walks long hidden bench scoreboard
+nightly: lint wheel demo test pages walks long service hidden bench scoreboard
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

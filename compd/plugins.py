@@ -10,7 +10,8 @@ import importlib.util
 import re
 import stat
 import sys
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
@@ -43,7 +44,7 @@ class PresetFolder(Protocol):
 
 def names(group: str) -> list[str]:
     """Names that installed packages offer in `group`, presets among them, sorted."""
-    return sorted({point.name for point in entry_points(group=group)} | _preset_folders(group).keys())
+    return sorted({point.name for point in _entry_points(group)} | _preset_folders(group).keys())
 
 
 def load(group: str, name: str, where: str) -> Any:
@@ -53,7 +54,7 @@ def load(group: str, name: str, where: str) -> Any:
     """
     if match := _PATH.match(name):
         return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group))
-    points: dict[str, EntryPoint] = {point.name: point for point in entry_points(group=group)}
+    points: dict[str, EntryPoint] = {point.name: point for point in _entry_points(group)}
     if name in points:
         return _load_point(points[name], where)
     folders = _preset_folders(group)
@@ -70,12 +71,22 @@ def load(group: str, name: str, where: str) -> Any:
     )
 
 
+def _entry_points(group: str) -> EntryPoints:
+    return _entry_points_on(tuple(sys.path), group)
+
+
+@cache
+def _entry_points_on(path: tuple[str, ...], group: str) -> EntryPoints:
+    """What packages on `path` offer in `group`. It takes 5 ms to look, and a configuration asks for every gauge."""
+    return entry_points(group=group)
+
+
 def _preset_folders(group: str) -> dict[str, PresetFolder]:
     """Every preset's name with the folder that holds it; of two with one name, the first package's counts."""
     if group not in (GAUGES, SIMULATED_GAUGES):
         return {}
     folders: dict[str, PresetFolder] = {}
-    for point in entry_points(group=GAUGE_PRESETS):
+    for point in _entry_points(GAUGE_PRESETS):
         folder: PresetFolder = _load_point(point, GAUGE_PRESETS)
         for name in folder.names():
             folders.setdefault(name, folder)

@@ -11,9 +11,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 def main() -> None:
     """Entry point of `compd`: a person's mistakes are printed, all of them, with exit code 2."""
-    from compd.cli.main import app
-    from compd.errors import CompdError
+    from compd.cli.loading import loading
 
+    with loading():
+        from compd.cli.commands import make_app
+        from compd.errors import CompdError
+
+        app = make_app(*sys.argv[1:2])
     try:
         app()
     except CompdError as error:

@@ -19,19 +19,20 @@ import structlog
 
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
-from compd.errors import StateError
+from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition_process import AcquisitionProcess
-from compd.live.control import Control
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
-from compd.live.loop_process import LoopProcess
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.pipeline import build_pipeline
+from compd.live.processes.acquisition_process import AcquisitionProcess
+from compd.live.processes.control import Control
+from compd.live.processes.loop_process import LoopProcess
+from compd.live.processes.service_process import ServiceProcess, StateLog
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import PROTOCOL
@@ -42,7 +43,6 @@ from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
-from compd.live.service_process import ServiceProcess, StateLog
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -78,6 +78,15 @@ class Daemon:
         models = _first_models(configuration, pipeline.loader)
         # compiles what the loop calls, so that its processes have it from their first cycle
         try_model(pipeline.settings.model, (), str(configuration.path))
+        sockets = configuration.sockets
+        packets = UdpSender(sockets.udp) if sockets.udp is not None else None
+        try:
+            self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
+        except DaemonError:
+            if packets is not None:
+                packets.close()
+            raise
+        # what follows opens descriptors, and cannot fail
         self.commands = Commands(self._zero_on_disk())
         self.setpoints, cycles, self.control = SharedRing(), SharedRing(), Control()
         adopted = AdoptedModels(models)
@@ -98,9 +107,6 @@ class Daemon:
         )
         self.acquisition = self._acquisition(gauges, clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
-        sockets = configuration.sockets
-        packets = UdpSender(sockets.udp) if sockets.udp is not None else None
-        self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
         observers = [StateLog(self.control).note]
         if packets is not None:

@@ -138,8 +138,3 @@ class QuietCollector:
         if now_s >= self._next_s:
             self._next_s = now_s + _COLLECT_EVERY_S
             gc.collect()
-
-    def stop(self) -> None:
-        """Switch automatic collection on again."""
-        gc.enable()
-        gc.unfreeze()

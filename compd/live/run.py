@@ -10,7 +10,7 @@ from compd.clock import MonotonicClock
 from compd.configuration import Configuration, load
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
-from compd.live.supervisor import Ending, Supervisor
+from compd.live.processes.supervisor import Ending, Supervisor
 from compd.live.systemd import Notifier
 
 _log = structlog.get_logger()
@@ -26,32 +26,41 @@ def run(configuration: Configuration) -> bool:
     daemon = Daemon(configuration)
     while True:
         _report(daemon)
-        following: list[Daemon] = []
-
-        def reload(now: Daemon = daemon, following: list[Daemon] = following) -> bool:
-            if (found := _reconfigured(now)) is not None:
-                following.append(found)
-            return bool(following)
-
-        ending = Supervisor(daemon, notifier, clock).run(reload)
-        if ending is not Ending.RELOADED:
+        successor = _Successor(daemon)
+        ending = Supervisor(daemon, notifier, clock).run(successor.check, successor.make)
+        if ending is not Ending.RELOADED or successor.daemon is None:
             daemon.close()
             notifier.close()
             return ending is Ending.FAILED
-        daemon.close(after=following[0])
-        daemon = following[0]
+        daemon.close(after=successor.daemon)
+        daemon = successor.daemon
 
 
-def _reconfigured(daemon: Daemon) -> Daemon | None:
-    """The daemon of the configuration as its file is now; None, with the problems in the log, where it cannot run."""
-    path = daemon.configuration.path
-    try:
-        return Daemon(load(path), daemon)
-    except CompdError as error:
-        for problem in error.problems:
-            _log.error("configuration refused", problem=str(problem))
-        _log.warning("the daemon goes on with the configuration that it has", file=str(path))
-        return None
+class _Successor:
+    """The daemon of the configuration as its file is at SIGHUP.
+
+    Attributes
+    ----------
+    daemon : None until it has been made.
+    """
+
+    def __init__(self, now: Daemon) -> None:
+        self.daemon: Daemon | None = None
+        self._now = now
+
+    def check(self) -> None:
+        """Make it in a process of its own, which shows whether it can be made; exit code 1 where it cannot."""
+        if not self.make():
+            raise SystemExit(1)
+
+    def make(self) -> bool:
+        """Whether it could be made; every problem is in the log where it could not."""
+        try:
+            self.daemon = Daemon(load(self._now.configuration.path), self._now)
+        except CompdError as error:
+            for problem in error.problems:
+                _log.error("configuration refused", problem=str(problem))
+        return self.daemon is not None
 
 
 def _report(daemon: Daemon) -> None:

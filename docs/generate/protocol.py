@@ -50,7 +50,11 @@ newer daemon: use nothing of that setpoint.
 
 **Enforce expiry yourself.** Do not use a {term("setpoint")} later than its `valid_until`. On the daemon's computer
 compare it with `CLOCK_MONOTONIC`. On another computer, whose clock is not that one, use the setpoint for `valid_until -
-time_s` seconds from the moment of its arrival. The daemon cannot tell you that it has died.
+time_s` seconds from the moment of its arrival. That the loop has stopped you are told, by a `stop`; that the whole
+daemon, its computer or the network has, nobody can tell you.
+
+**Connect again.** When the daemon ends, or takes another configuration, it holds the correction for 0.2 s, sends a last
+setpoint, `stop`, and closes the connection ([the daemon's processes](../explanation/processes.md#stop-and-reload)).
 
 **Keep up.** The daemon waits for no client. It disconnects one that is {MAX_BEHIND_BYTES // 1024} KiB behind,
 {MAX_READINGS_BEHIND_BYTES // 1024**2} MiB while it watches readings.
@@ -62,9 +66,9 @@ ends. The mode then returns to `{Mode.CMM}`.
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
 """
 PACKET = f"""\
-With [`sockets.udp`](#configuration-sockets-udp) every cycle also sends one UDP packet of {PACKET_SIZE} bytes to the
-controller: little-endian, IEEE 754 numbers. The compute loop sends it itself, without waiting: a packet that the
-network does not take at once is dropped, and counted in [`STATUS`](#protocol-status).
+With [`sockets.udp`](#configuration-sockets-udp) every setpoint also goes as a UDP packet of {PACKET_SIZE} bytes to the
+controller: little-endian, IEEE 754 numbers. It is sent without waiting: a packet that the network does not take at once
+is dropped, and counted in [`STATUS`](#protocol-status).
 
 Links that the machine does not have are nan. When the setpoint is invalid, every number of the tip, the frame and the
 links is nan.

@@ -11,18 +11,16 @@ import subprocess
 import sys
 import tempfile
 import threading
-from dataclasses import replace
 from pathlib import Path
 
-from compd.clock import MonotonicClock
-from compd.configuration.operation import LoopSettings, SocketSettings
+from compd.clock import Clock
 from compd.gauge import good
-from compd.live.loop.loop import Loop
-from compd.live.service.publisher import Publisher
-from compd.live.service.requests import Requests, TargetKeys
-from compd.live.systemd import Notifier
+from compd.live import daemon as daemon_module
+from compd.live.memory.latest import Latest
+from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
-from tests.support.live_machine import RAW_AT_ZERO_MM, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM
+from tests.support.running_daemon import supervised
 
 RATES_HZ = (200, 1000)
 READINGS = 500
@@ -44,44 +42,47 @@ with connect(sys.argv[1]) as client:
 """
 
 
+class AllAtOnce:
+    """In the place of the lines: all gauges have a new reading at the same moment, again and again."""
+
+    def __init__(self, lines: object, latest: Latest, clock: Clock) -> None:
+        self._latest = latest
+        self._clock = clock
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._clock.wait(self._stop, ROUND_S):
+            now_s = self._clock.monotonic()
+            for slot in range(len(self._latest.channels)):
+                self._latest.put(slot, good(RAW_AT_ZERO_MM, now_s))
+
+    def status(self) -> dict[str, object]:
+        return {}
+
+    def stop(self, timeout_s: float) -> bool:
+        self._stop.set()
+        self._thread.join()
+        return True
+
+
 def measure(rate_hz: float) -> list[tuple[float, ...]]:
     """Reading to tick, tick to client, reading to client (s), for READINGS rounds."""
-    measured = machine()
-    settings = LoopSettings(rate_hz=rate_hz, stale_after_s=1, on_stale="hold", hold_s=1)
-    clock = MonotonicClock()
-    stop = threading.Event()
-
-    def read_gauges() -> None:
-        while not clock.wait(stop, ROUND_S):
-            now_s = clock.monotonic()
-            for slot in range(len(measured.latest.channels)):
-                measured.latest.put(slot, good(RAW_AT_ZERO_MM, now_s))
-
-    with tempfile.TemporaryDirectory() as directory:
-        path = Path(directory) / "s"
-        publisher = Publisher(SocketSettings(unix={"path": str(path)}, valid_for_s=0.1), 1 / rate_hz, lambda _: None)
-        version = {"class": "VERSION"}
-        keys = TargetKeys("tip_B0_mm", rotation=False)
-        publisher.start(Requests(version, keys, measured.commands, dict, lambda _: None))
-        cycle = replace(measured.settings, loop=settings)
-        loop = Loop(cycle, measured.latest, measured.commands, [publisher.deliver], Notifier(""), clock)
-        loop.start()
-        reader = threading.Thread(target=read_gauges)
-        reader.start()
-        client = subprocess.Popen([sys.executable, "-c", CLIENT, str(path)], stdout=subprocess.PIPE, text=True)
+    with tempfile.TemporaryDirectory(prefix="bench-") as directory, supervised(configuration(Path(directory), rate_hz)):
+        client = subprocess.Popen([sys.executable, "-c", CLIENT, f"{directory}/s"], stdout=subprocess.PIPE, text=True)
         assert client.stdout is not None
         found = [tuple(map(float, client.stdout.readline().split())) for _ in range(READINGS)]
         client.terminate()
         client.communicate()
-        stop.set()
-        reader.join()
-        loop.stop()
-        publisher.stop()
     return found
 
 
 def main() -> None:
     quiet()
+    daemon_module.Acquisition = AllAtOnce  # type: ignore[misc, assignment]
     rows = []
     for rate_hz in RATES_HZ:
         parts = zip(*measure(rate_hz), strict=True)

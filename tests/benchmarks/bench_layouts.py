@@ -20,12 +20,10 @@ import re
 import socket
 import struct
 import subprocess
-import sys
 import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -39,8 +37,8 @@ from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
-from compd.readings import Snapshot
-from tests.benchmarks.bench_loop import PRIORITY, busy_drivers
+from compd.live.memory.latest import Snapshot
+from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import machine
 
@@ -70,14 +68,27 @@ MEASURED = machine()
 Figures = dict[str, list[float]]
 
 
-class SharedReadings:
-    """The newest readings, as in `Latest`, in memory that processes share. A reader waits for no writer."""
+class Readings:
+    """The newest reading of each channel, in the memory of one process."""
 
     def __init__(self) -> None:
         self.channels = MEASURED.latest.channels
+        self.known: list[Reading] = [bad(0.0, Quality.NEVER_READ)] * len(self.channels)
+
+    def put(self, index: int, reading: Reading) -> None:
+        self.known[index] = reading
+
+    def snapshot(self, time_s: float) -> Snapshot:
+        return Snapshot(time_s, tuple(self.known))
+
+
+class SharedReadings(Readings):
+    """The same in memory that processes share. A reader waits for no writer."""
+
+    def __init__(self) -> None:
+        super().__init__()
         self._memory = mmap.mmap(-1, len(self.channels) * SLOT.size)
         self._versions = [0] * len(self.channels)
-        self._known: list[Reading] = [bad(0.0, Quality.NEVER_READ)] * len(self.channels)
 
     def put(self, index: int, reading: Reading) -> None:
         version = self._versions[index] = self._versions[index] + 1
@@ -89,8 +100,8 @@ class SharedReadings:
         first, second = self._memory[:], self._memory[:]
         for i, (slot, again) in enumerate(zip(SLOT.iter_unpack(first), SLOT.iter_unpack(second), strict=True)):
             if slot == again and slot[0] == slot[3] != 0:
-                self._known[i] = good(slot[1], slot[2])
-        return Snapshot(time_s, tuple(self._known))
+                self.known[i] = good(slot[1], slot[2])
+        return super().snapshot(time_s)
 
 
 class Ring:
@@ -186,10 +197,14 @@ def run_loop(latest: Any, put: Callable[[Setpoint | None], None], rate_hz: float
 def acquire(latest: Any, meanwhile: Callable[[], Figures]) -> Figures:
     """The drivers, for as long as something else takes; its figures, and how often the drivers asked."""
     realtime.shorten_switch_interval()
-    with busy_drivers(latest) as polls:
-        start_s = time.monotonic()
-        figures = meanwhile()
-        return figures | {"polls per second": [sum(polls) / (time.monotonic() - start_s)]}
+    drivers = BusyDrivers(None, latest, None)
+    drivers.start()
+    start_s = time.monotonic()
+    figures = meanwhile()
+    polls = drivers.status()["busy"]["polls"]
+    threading.excepthook = lambda _: None  # a driver's thread ends with its line
+    drivers.stop(0)
+    return figures | {"polls per second": [polls / (time.monotonic() - start_s)]}
 
 
 def serve(get: Callable[[], Setpoint | None], client: socket.socket, scheduling: str) -> Figures:
@@ -225,7 +240,8 @@ def run_together(client: socket.socket, rate_hz: float, seconds: float, go: Any)
     served: Figures = {}
     service = threading.Thread(target=lambda: served.update(serve(setpoints.get, client, "ordinary")))
     service.start()
-    figures = acquire(MEASURED.latest, lambda: run_loop(MEASURED.latest, setpoints.put, rate_hz, seconds, go))
+    latest = Readings()
+    figures = acquire(latest, lambda: run_loop(latest, setpoints.put, rate_hz, seconds, go))
     service.join()
     return figures | served
 
@@ -301,11 +317,7 @@ def main() -> None:
     options = parser.parse_args()
     quiet()
     gc.freeze()  # a collection would copy the pages that the processes share
-    with ExitStack() as stack:
-        for _ in range(LOAD_PROCESSES if options.load else 0):
-            busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
-            stack.callback(busy.wait)
-            stack.callback(busy.terminate)
+    with load_beside(LOAD_PROCESSES if options.load else 0):
         for rate_hz in RATES_HZ:
             layouts = {layout: (layout, "ordinary", "ordinary") for layout in (TOGETHER, TWO, THREE, NO_LOOP)}
             variants = {

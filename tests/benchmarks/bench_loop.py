@@ -64,21 +64,27 @@ while True:
         line.sendall(reply)
 """
 
-# Notes when each setpoint came, and prints the differences in us at the end.
+# Notes when each setpoint came, and prints at the end how long after its tick, us. To read JSON takes time of its own.
 CLIENT = """
-import os, sys, time
-from compd.client import connect
+import json, os, socket, sys, time
 try:
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(int(sys.argv[2])))
 except OSError:
     pass
-late_us = []
-with connect(sys.argv[1]) as client:
-    for setpoint in client.watch():
-        late_us.append((time.monotonic() - setpoint["time_s"]) * 1e6)
-        if len(late_us) == int(sys.argv[3]):
-            break
-print(*(f"{us:.0f}" for us in late_us))
+line = socket.socket(socket.AF_UNIX)
+line.connect(sys.argv[1])
+line.sendall(b'{"class":"WATCH"}\\n')
+pieces, lines = [], 0
+while lines < int(sys.argv[3]):
+    piece = line.recv(65536)
+    pieces.append((time.monotonic(), piece))
+    lines += piece.count(b"\\n")
+rest = b""
+for now_s, piece in pieces:
+    *whole, rest = (rest + piece).split(b"\\n")
+    for message in map(json.loads, whole):
+        if message["class"] == "SETPOINT":
+            print(f"{(now_s - message['time_s']) * 1e6:.0f}")
 """
 
 BUSY = "while True: pass"

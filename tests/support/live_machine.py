@@ -40,7 +40,7 @@ class Machine:
         self.faults: dict[str, Quality] = {}
         self.frozen: set[str] = set()
 
-    def step(self):
+    def step(self, ending=""):
         """One period later: every gauge is read anew, unless it is faulty or frozen."""
         self.now_s += PERIOD_S
         self.tick += 1
@@ -50,13 +50,13 @@ class Machine:
             elif channel not in self.frozen:
                 value = RAW_AT_ZERO_MM + self.change_mm[channel] if channel in self.change_mm else 20.0
                 self.latest.put(slot, good(value, self.now_s - 0.001))
-        return self.run_cycle()
+        return self.run_cycle(ending)
 
-    def run_cycle(self):
+    def run_cycle(self, ending=""):
         """One cycle with the readings as they are: its setpoint."""
         commands = self.commands
         snapshot = self.latest.snapshot(self.now_s)
-        inputs = CycleInputs(self.tick, snapshot, commands.zero, commands.target, commands.models)
+        inputs = CycleInputs(self.tick, snapshot, commands.zero, commands.target, commands.models, ending)
         setpoint, self.state = step(self.state, inputs, self.settings)
         return setpoint
 

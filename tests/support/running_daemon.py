@@ -10,9 +10,9 @@ from contextlib import contextmanager
 
 from compd.clock import MonotonicClock
 from compd.configuration import Configuration
-from compd.live.child_process import ChildProcess
 from compd.live.daemon import Daemon
-from compd.live.supervisor import Supervisor
+from compd.live.processes.child_process import ChildProcess
+from compd.live.processes.supervisor import Supervisor
 from compd.live.systemd import Notifier
 
 START_WITHIN_S = 30
@@ -28,7 +28,7 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
     daemon = Daemon(configuration)
     notifier = notifier or Notifier("")
     supervisor = Supervisor(daemon, notifier, clock)
-    process = ChildProcess("supervisor", lambda: supervisor.run(lambda: False), clock)
+    process = ChildProcess("supervisor", lambda: supervisor.run(lambda: None, lambda: False), clock)
     process.start()
     try:
         polling = clock.monotonic() + START_WITHIN_S

@@ -7,12 +7,16 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.loading import loading
+
 
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
     """Run the daemon: read the gauges, compute, publish, until SIGTERM or Ctrl-C."""
-    from compd.configuration import load
-    from compd.live.run import run as run_daemon
+    with loading():
+        from compd.configuration import load
+        from compd.live.run import run as run_daemon
 
-    failed = run_daemon(load(config))
+        configuration = load(config)
+    failed = run_daemon(configuration)
     if failed:
         raise typer.Exit(1)

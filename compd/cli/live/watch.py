@@ -71,6 +71,8 @@ def view(version: dict[str, Any], setpoint: dict[str, Any], status: dict[str, An
     if setpoint["valid"] and state_named(setpoint["state"]) is not None:
         parts += [_position(setpoint), _corrections(setpoint)]
     parts.append(_loop(status))
+    if ended := _ended_processes(status):
+        parts.append(Text(f"started anew: {ended}", style="yellow"))
     if lost := [gauge for gauge in status["gauges"] if gauge["quality"] != "ok"]:
         parts.append(Text("not good: " + ", ".join(f"{g['channel']} {g['quality']}" for g in lost), style="red"))
     return Group(*parts)
@@ -147,3 +149,13 @@ def _loop(status: dict[str, Any]) -> Text:
         f"cycle {loop['cycle_median_us']:g} us" if "cycle_median_us" in loop else "",
     ]
     return Text(", ".join(filter(None, parts)), style="dim")
+
+
+def _ended_processes(status: dict[str, Any]) -> str:
+    """The daemon's processes that have ended and were started anew; "" where none has."""
+    processes = status.get("processes", {})  # a daemon of 0.2.0 has none
+    return "; ".join(
+        f"{name}, start {process['starts']}, the one before: {process['last_end']}"
+        for name, process in processes.items()
+        if "last_end" in process
+    )

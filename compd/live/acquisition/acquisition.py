@@ -25,7 +25,7 @@ from compd.live.realtime import sharpen_timers
 log = structlog.get_logger()
 
 # Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
-# take the interpreter from the loop.
+# take the interpreter from the other lines, and a processor from everybody.
 FASTEST_ROUND_S = 2e-3
 # Faults after which no byte of a reply can follow. After all others the line is drained, or the rest of a reply would
 # be taken for the answer to the next request.

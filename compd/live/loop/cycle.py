@@ -23,7 +23,7 @@ from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
-from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
+from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_uncertainty import uncertainty_um
 from compd.live.loop.wiring import MachineWires
@@ -88,7 +88,7 @@ def _compute(
     state: CycleState, inputs: CycleInputs, models: Models, settings: CycleSettings
 ) -> tuple[_Outcome, CycleState]:
     """The outcome of a cycle, and the next state; every step that fails returns what the steps before it have left."""
-    tick, snapshot, zero, target, _, ending = inputs
+    tick, snapshot, zero, target, _, _ = inputs
     applied, wires = models.applied, settings.wires
 
     if not isinstance(zero, MachineZero):
@@ -98,8 +98,7 @@ def _compute(
         zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
         state = _with_zero(state, zero, zero_vectors, settings)
 
-    live, lost = (None, ending) if ending else _live_comparators(snapshot, zero_vectors.comparators_mm, applied, wires)
-    usable = usable_comparators(live, state.last_good, lost, snapshot.time_s, settings.loop)
+    live, usable = _comparators(state.last_good, inputs, zero_vectors.comparators_mm, applied, settings)
     comparators = usable.comparators
     if comparators is None:
         return _Outcome(usable.state, usable.reason), state
@@ -171,6 +170,21 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
         return state._replace(zero_vectors=zero_vectors)
     warm_start = WarmStart.at_zero(settings.model)
     return state._replace(zero=zero, zero_vectors=zero_vectors, last_good=None, warm_start=warm_start)
+
+
+def _comparators(
+    last_good: ComparatorSet | None,
+    inputs: CycleInputs,
+    zero_mm: FloatArray,
+    applied: LiveModel,
+    settings: CycleSettings,
+) -> tuple[ComparatorSet | None, UsableComparators]:
+    """The live set of this cycle, and the comparators with which to compute."""
+    snapshot = inputs.snapshot
+    if inputs.ending:
+        return None, held_comparators(last_good, inputs.ending, snapshot.time_s, settings.loop)
+    live, lost = _live_comparators(snapshot, zero_mm, applied, settings.wires)
+    return live, usable_comparators(live, last_good, lost, snapshot.time_s, settings.loop)
 
 
 def _live_comparators(

@@ -9,6 +9,8 @@ from compd.arrays import FloatArray
 from compd.configuration.operation import LoopSettings
 from compd.live.loop.states import State
 
+# How long the correction is held, at most, while the daemon ends.
+_LONGEST_END_S = 1.0
 _NO_QUANTITIES: Mapping[str, FloatArray] = {}
 
 
@@ -78,3 +80,16 @@ def usable_comparators(
     weight = 1.0 - elapsed_s / settings.hold_s
     faded = last_good._replace(change_mm=last_good.change_mm * weight)
     return UsableComparators(faded, State.FADE, f"{lost}; the last good set counts {weight:.0%}", expires_s, weight)
+
+
+def held_comparators(
+    last_good: ComparatorSet | None, why: str, now_s: float, settings: LoopSettings
+) -> UsableComparators:
+    """The last good set while the daemon ends, which takes a moment; a set that was old before as `on_stale` has it.
+
+    why : the daemon ends. now_s : monotonic time of the snapshot.
+    """
+    if last_good is None or now_s - last_good.time_s > _LONGEST_END_S:
+        return usable_comparators(None, last_good, why, now_s, settings)
+    expires_s = last_good.time_s + _LONGEST_END_S
+    return UsableComparators(last_good, State.HOLD, f"{why}; the last good set is held", expires_s)

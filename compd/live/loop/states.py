@@ -10,6 +10,8 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Self
 
+_LOST = "a comparator is lost, or the daemon is about to end; "
+
 
 class State(StrEnum):
     """How a setpoint came about.
@@ -37,9 +39,9 @@ class State(StrEnum):
     OK = "ok", 2, True, 0, "every gauge is good, and the correction is the one that they ask for"
     SLEWING = "slewing", 3, True, 1, "the correction is under way at `limits.slew_mm_per_s`; it never jumps"
     CLAMPED = "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`"
-    HOLD = "hold", 5, True, 2, "a comparator is lost; the last good set of them is used, at most `loop.hold_s`"
-    FADE = "fade", 6, True, 2, "a comparator is lost; the last good set is taken back to zero over `loop.hold_s`"
-    STOP = "stop", 7, False, 4, "a gauge is lost and nothing takes its place"
+    HOLD = "hold", 5, True, 2, _LOST + "the last good set of them is used, at most `loop.hold_s`"
+    FADE = "fade", 6, True, 2, _LOST + "the last good set is taken back to zero over `loop.hold_s`"
+    STOP = "stop", 7, False, 4, "a gauge is lost without a substitute, the loop makes no setpoints, or the daemon ends"
     REFUSED = "refused", 8, False, 4, "beyond a limit with `on_limit: refuse`, out of reach, or not finite"
 
 

@@ -84,7 +84,7 @@ class LoopTiming:
 
     @property
     def missed(self) -> int:
-        """Cycles that were skipped, because one before them took too long."""
+        """Cycles that were skipped, because one before them took too long or there was no loop."""
         return int(self._numbers[2])
 
     @property

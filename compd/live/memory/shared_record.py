@@ -3,8 +3,7 @@
 A record is a header of 16 bytes and the content:
 
     version    8 bytes: odd while the record is being written, and another number after every write
-    length     4 bytes
-    checksum   4 bytes: CRC-32 of the content
+    length, checksum   one word of 8 bytes: the length times 2**32, plus the CRC-32 of the content
     content    `length` bytes
 
 A reader copies the content, then looks whether the version is even and has stayed the same, and whether the checksum

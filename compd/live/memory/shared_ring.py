@@ -8,8 +8,7 @@ The memory begins with a head of 16 bytes, and has `ENTRIES` places of `PLACE_BY
     version    8 bytes: 2 k + 1 while entry k is being written, 2 k + 2 once it is whole
     time_s     8 bytes, float64: monotonic time of the cycle
     state      8 bytes: number of the setpoint's state
-    length     4 bytes
-    checksum   4 bytes: CRC-32 of the content
+    length, checksum   one word of 8 bytes: the length times 2**32, plus the CRC-32 of the content
     content    `length` bytes
 """
 

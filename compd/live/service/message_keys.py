@@ -217,7 +217,9 @@ class LoopStatusKeys(Keys):
 
     rate_hz: float = Field(description="configured rate, Hz")
     cycles: int = Field(description="cycles that were computed")
-    missed_cycles: int = Field(description="cycles that were skipped because one before them took too long")
+    missed_cycles: int = Field(
+        description="cycles that were skipped because one before them took too long, or because there was no loop"
+    )
     period_mean_ms: float | None = Field(default=None, description="mean period, ms")
     period_deviation_ms: float | None = Field(default=None, description="standard deviation of the period, ms")
     lateness_median_us: float | None = Field(default=None, description="start of a cycle after its time, us")
@@ -239,8 +241,8 @@ class ProcessStatusKeys(Keys):
     """One of the daemon's processes."""
 
     pid: int = Field(description="its number; 0 while it is not there")
-    starts: int = Field(description="how often it was started")
-    last_end: str | None = Field(default=None, description="how the one before it ended")
+    starts: int = Field(description="how often it was started; the loop also for every model that was adopted")
+    last_end: str | None = Field(default=None, description="how the last one ended; absent where none has")
 
 
 class PublisherStatusKeys(Keys):

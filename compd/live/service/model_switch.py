@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import structlog
 
-from compd.live.control import Control
+from compd.live.processes.control import Control
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 
 _log = structlog.get_logger()

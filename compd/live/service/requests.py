@@ -257,8 +257,9 @@ class ModelRequest(Request):
     """Asks which models the daemon runs with; with `file` the daemon adopts that one first.
 
     With a file the answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
-    `model_refused` comes, and nothing has changed. An adopted model lasts until the daemon starts anew. Only clients
-    of the Unix socket may ask, because request and answer name files of the daemon's computer.
+    `model_refused` comes, and nothing has changed. An adopted model survives a crash of the loop and lasts until the
+    daemon starts anew. Only clients of the Unix socket may ask, because request and answer name files of the daemon's
+    computer.
     """
 
     wire_name = "MODEL"

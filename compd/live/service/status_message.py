@@ -11,12 +11,12 @@ from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.json_text import omit_unknown
-from compd.live.control import Control
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
+from compd.live.processes.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
 

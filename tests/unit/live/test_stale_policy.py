@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from compd.configuration.operation import LoopSettings
+from compd.gauge import Quality
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
 from compd.live.loop.states import State
+from tests.support.live_machine import PERIOD_S, machine
 
 HOLD_S = 4.0
 LOST = "joint 4 (joints.4): timeout"
@@ -64,3 +66,19 @@ def test_fade_takes_the_set_back_in_a_straight_line_and_then_stops():
     ended = usable_comparators(None, LAST, LOST, 104.0, settings("fade"))
     assert ended.comparators is None
     assert ended.state is State.STOP
+
+
+@pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
+def test_while_the_daemon_ends_a_set_that_was_good_is_held_and_an_old_one_is_not_revived(on_stale):
+    tripod = machine(on_stale=on_stale)
+    tripod.settle()
+    before = tripod.step()
+    held = tripod.step(ending="compd is stopping")
+    assert held.state is State.HOLD
+    assert held.reason == "compd is stopping; the last good set is held"
+    assert held.values.correction_mm == pytest.approx(before.values.correction_mm)
+    assert tripod.step().state is State.OK, "the daemon may have changed its mind"
+    tripod.faults["joints.1"] = Quality.TIMEOUT
+    for _ in range(round(2.0 / PERIOD_S)):
+        lost = tripod.step()
+    assert tripod.step(ending="compd is stopping").state is lost.state

@@ -49,3 +49,13 @@ def test_watch_shows_no_values_of_a_state_that_it_does_not_know():
     setpoint = {"state": "of_tomorrow", "reason": "why", "valid": True, "mode": "cmm", "seq": 1}
     status = {"loop": {"rate_hz": 200, "missed_cycles": 0}, "gauges": []}
     assert len(view(version, setpoint, status).renderables) == 3, "headline, reason and loop"
+
+
+def test_watch_shows_processes_only_where_one_has_ended():
+    setpoint = {"state": "stop", "reason": "", "valid": False, "mode": "cmm", "seq": 1}
+    status = {"loop": {"rate_hz": 200, "missed_cycles": 0}, "gauges": []}
+    well = {"loop": {"pid": 2, "starts": 2}, "service": {"pid": 3, "starts": 1}}  # another model was adopted
+    assert len(view({"machine": "m"}, setpoint, status | {"processes": well}).renderables) == 2, "headline and loop"
+    ended = well | {"line dial": {"pid": 5, "starts": 3, "last_end": "killed by SIGSEGV"}}
+    *_, shown = view({"machine": "m"}, setpoint, status | {"processes": ended}).renderables
+    assert shown.plain == "started anew: line dial, start 3, the one before: killed by SIGSEGV"

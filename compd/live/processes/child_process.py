@@ -6,9 +6,11 @@ import ctypes
 import os
 import select
 import signal
+import stat
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from compd.clock import Clock
@@ -35,9 +37,16 @@ class ChildProcess:
     started_s, ended_s : monotonic time (s) of its last start and end.
     """
 
-    def __init__(self, name: str, run: Callable[[], None], clock: Clock, output: int | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        run: Callable[[], None],
+        clock: Clock,
+        output: int | None = None,
+        keeps_sockets: bool = True,
+    ) -> None:
         """`run`: what the process does; it ends when this returns. `output`: descriptor to which everything goes that
-        it prints; None is the supervisor's own."""
+        it prints; None is the supervisor's own. `keeps_sockets`: whether it has the sockets that are open now."""
         self.name = name
         self.pid = 0
         self.pidfd = -1
@@ -48,6 +57,7 @@ class ChildProcess:
         self._run = run
         self._clock = clock
         self._output = output
+        self._keeps_sockets = keeps_sockets
 
     @property
     def running(self) -> bool:
@@ -116,10 +126,14 @@ class ChildProcess:
             if self._output is not None:
                 os.dup2(self._output, _STDOUT)
                 os.dup2(self._output, _STDERR)
+            if not self._keeps_sockets:
+                _close_sockets()
             self._run()
             code = 0
         except MemoryError:
             code = OUT_OF_MEMORY
+        except SystemExit:
+            pass  # it has said why
         except BaseException:  # noqa: BLE001  the fork must not return into the supervisor's code
             traceback.print_exc()
         finally:
@@ -128,6 +142,14 @@ class ChildProcess:
                 sys.stderr.flush()
             finally:
                 os._exit(code)
+
+
+def _close_sockets() -> None:
+    """Close every socket that this process has from the supervisor."""
+    for descriptor in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
+        with suppress(OSError):  # that of the directory itself is closed already
+            if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                os.close(descriptor)
 
 
 def _meaning(exit_code: int) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.child_process import ChildProcess
-from compd.live.loop_process import LoopProcess, ModelRequest
+from compd.live.processes.child_process import ChildProcess
+from compd.live.processes.loop_process import LoopProcess, ModelRequest
 
 _log = structlog.get_logger()
 
@@ -106,4 +106,4 @@ class LoopSuccession:
         return self._number
 
     def _child(self, name: str, run: Callable[[], None]) -> ChildProcess:
-        return ChildProcess(name, run, self._clock, self._output)
+        return ChildProcess(name, run, self._clock, self._output, keeps_sockets=False)

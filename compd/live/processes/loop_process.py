@@ -15,7 +15,6 @@ import structlog
 from compd.clock import Clock
 from compd.errors import CompdError
 from compd.live import realtime
-from compd.live.control import Control
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
@@ -29,6 +28,7 @@ from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.latest import Latest
 from compd.live.memory.shared_ring import LONGEST_CONTENT, SharedRing
+from compd.live.processes.control import Control
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20

@@ -13,8 +13,8 @@ from termios import FIONREAD
 import pytest
 import structlog
 
-from compd.live import log_relay
-from compd.live.log_relay import BURST_LINES, LINES_PER_S, LONGEST_LINE_BYTES, READ_BYTES, LogRelay
+from compd.live.processes import log_relay
+from compd.live.processes.log_relay import BURST_LINES, LINES_PER_S, LONGEST_LINE_BYTES, READ_BYTES, LogRelay
 from tests.support.wire_rig import PATIENCE_S, InstantClock
 
 LARGE_PIPE = 1 << 20

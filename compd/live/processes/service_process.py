@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.live.control import Control, Phase
-from compd.live.log_relay import LogRelay
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.states import State
+from compd.live.processes.control import Control, Phase
+from compd.live.processes.log_relay import LogRelay
 from compd.live.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher

@@ -17,12 +17,12 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.child_process import ChildProcess
-from compd.live.control import Phase
 from compd.live.daemon import Daemon
-from compd.live.heartbeat import Heartbeat, RestartDelay
-from compd.live.loop_process import ModelRequest
-from compd.live.loop_succession import LoopSuccession
+from compd.live.processes.child_process import ChildProcess
+from compd.live.processes.control import Phase
+from compd.live.processes.heartbeat import Heartbeat, RestartDelay
+from compd.live.processes.loop_process import ModelRequest
+from compd.live.processes.loop_succession import LoopSuccession
 from compd.live.systemd import Notifier
 
 # Between two looks at the beats of the processes.
@@ -55,7 +55,9 @@ class Supervisor:
         self._clock = clock
         self._loops = LoopSuccession(daemon.loop_process, clock, daemon.log_pipe("loop"))
         self._acquisition = {
-            process.name: ChildProcess(process.name, process.run, clock, daemon.log_pipe(process.name))
+            process.name: ChildProcess(
+                process.name, process.run, clock, daemon.log_pipe(process.name), keeps_sockets=False
+            )
             for process in daemon.acquisition
         }
         self._service = ChildProcess("service", daemon.service.run, clock)
@@ -69,11 +71,13 @@ class Supervisor:
         self._headline: str | None = None
         self._ready = False
 
-    def run(self, reload: Callable[[], bool]) -> Ending:
+    def run(self, check: Callable[[], None], reload: Callable[[], bool]) -> Ending:
         """Start everything, and supervise until a signal, or the end of the service, ends it.
 
-        reload : called at SIGHUP; whether the daemon is to end for another configuration, which has been found good.
+        check : called at SIGHUP in a process of its own, since code of a driver's author runs there; raises where the
+            configuration cannot be used. reload : called when it could; whether the daemon is to end for it.
         """
+        self._check = ChildProcess("check", check, self._clock, keeps_sockets=True)
         with _signals() as signals:
             for child in self._acquisition.values():
                 child.start()
@@ -97,10 +101,12 @@ class Supervisor:
                     self._notifier.stopping()
                     self._end(f"compd is stopping ({name})")
                     return Ending.STOPPED
-                if reload():
-                    self._notifier.reloading(self._clock.monotonic())
-                    self._end("compd starts anew with another configuration")
-                    return Ending.RELOADED
+                if not self._check.running:
+                    self._check.start()
+            if self._check.running and self._check.collect() and self._is_good(reload):
+                self._notifier.reloading(self._clock.monotonic())
+                self._end("compd starts anew with another configuration")
+                return Ending.RELOADED
             self._collect()
             if not self._service.running:
                 _log.error("the service has ended, and with it the daemon", how=self._service.last_end)
@@ -122,8 +128,15 @@ class Supervisor:
             selector.select(max(due_s - self._clock.monotonic(), 0.0))
 
     def _running(self) -> list[ChildProcess]:
-        children = [*self._loops.children, self._service, *self._acquisition.values()]
+        children = [*self._loops.children, self._service, *self._acquisition.values(), self._check]
         return [child for child in children if child.running]
+
+    def _is_good(self, reload: Callable[[], bool]) -> bool:
+        """Whether the configuration that has been checked can be used."""
+        if self._check.last_end != "ended with code 0":
+            _log.error("the configuration is refused, the daemon goes on with its own", check=self._check.last_end)
+            return False
+        return reload()
 
     def _collect(self) -> None:
         """Note which processes have ended, and when they are to be started anew."""

@@ -6,15 +6,16 @@ import json
 import math
 import os
 import signal
+import socket
 
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.child_process import OUT_OF_MEMORY, ChildProcess
-from compd.live.control import Control, Phase
-from compd.live.heartbeat import Heartbeat, RestartDelay
 from compd.live.loop.states import State
 from compd.live.memory.shared_ring import SharedRing
+from compd.live.processes.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.processes.control import Control, Phase
+from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.service.loop_watch import LoopWatch
 
 
@@ -136,3 +137,22 @@ def test_the_turn_goes_to_the_successor_that_waits_and_to_nobody_else():
     assert not control.keeps_turn(2)
     assert control.ending() == "the end"
     control.close()
+
+
+def test_a_process_may_have_none_of_the_sockets():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def has_socket():
+            try:
+                os.fstat(listener.fileno())
+            except OSError:
+                os._exit(4)
+            os._exit(5)
+
+        ends = []
+        for keeps in (True, False):
+            child = ChildProcess("child", has_socket, MonotonicClock(), keeps_sockets=keeps)
+            child.start()
+            child.wait()
+            ends.append(child.last_end)
+    assert ends == ["ended with code 5", "ended with code 4"]

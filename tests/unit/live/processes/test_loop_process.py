@@ -8,15 +8,15 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
-from compd.live.control import Control
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models
 from compd.live.loop.sent_cycle import CyclePacker
 from compd.live.loop.states import State
 from compd.live.loop.timing import LoopTiming
-from compd.live.loop_process import LoopProcess, ModelRequest
 from compd.live.memory.shared_ring import SharedRing
+from compd.live.processes.control import Control
+from compd.live.processes.loop_process import LoopProcess, ModelRequest
 from tests.support.live_machine import STEP_MM, machine
 from tests.support.live_models import file_with
 
@@ -116,7 +116,7 @@ def test_a_last_cycle_that_cannot_be_computed_again_does_not_end_the_next_loop(p
     def failing(*_):
         raise RuntimeError("an effect of a user's own")
 
-    monkeypatch.setattr("compd.live.loop_process.step", failing)
+    monkeypatch.setattr("compd.live.processes.loop_process.step", failing)
     assert predecessor.left().correction_mm.tolist() == [0.0, 0.0, 0.0]
 
 

@@ -1,0 +1,272 @@
+"""The shipped unit under a real systemd, in a container: what it promises on a machine whose gauges are simulated.
+
+The times that are printed (`make service`) are this computer's.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from compd.client import Client, connect
+from compd.errors import DaemonError
+from tests.support.container import COMPD, Container, booted, install_compd, wait_until, what_is_missing
+from tests.support.paths import CONFIG, ROOT
+
+UNITS = Path("/opt/systemd")
+SIMULATED = Path("/run/simulated")
+MACHINE = Path("/etc/compd/machine.yaml")
+SOCKET = Path("/run/compd/compd.sock")
+SHIPPED = "tripod-cmm.yaml"
+
+MOST_EXPOSURE = 2.0
+# After a stop that takes longer a person wonders whether it hangs.
+STOP_S = 2.0
+# A bound for waiting, never a measure.
+PATIENCE_S = 60.0
+# Longer than these tests take: the machine stands still, so that machine zero fits its gauges throughout.
+ZERO_HOLD_S = 86_400
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.timeout(900),
+    pytest.mark.skipif(bool(what_is_missing()), reason=what_is_missing()),
+]
+
+
+@dataclass(frozen=True)
+class Service:
+    """The daemon as systemd runs it in a container."""
+
+    container: Container
+
+    def systemctl(self, *arguments: str) -> str:
+        return self.container.run("systemctl", *arguments)
+
+    def shown(self, name: str) -> str:
+        """A property of the unit."""
+        return self.systemctl("show", "--value", f"--property={name}", "compd").strip()
+
+    def reached_s(self, name: str) -> float:
+        """When the unit reached a state, on the monotonic clock that the container shares."""
+        return int(self.shown(f"{name}TimestampMonotonic")) * 1e-6
+
+    def connect(self) -> Client:
+        """A client, from outside the container."""
+        return connect(self.container.path(SOCKET), PATIENCE_S)
+
+    def zero(self) -> Any:
+        with self.connect() as client:
+            return client.status()["zero"]
+
+    def wait_for_ok(self, timeout_s: float = PATIENCE_S) -> float:
+        """Wait until the daemon's setpoints are ok; the time on the monotonic clock at which one was."""
+
+        end_s = time.monotonic() + timeout_s
+
+        def moment_s() -> float | None:
+            try:
+                with self.connect() as client:
+                    for setpoint in client.watch():
+                        if setpoint["state"] == "ok":
+                            return time.monotonic()
+                        assert time.monotonic() < end_s, setpoint
+            except DaemonError:
+                pass  # not yet there
+            return None
+
+        return wait_until(moment_s, "a daemon with setpoints", timeout_s)
+
+    def wait_for_another_process(self, main: str) -> None:
+        """Wait until systemd has started the daemon anew. main : the process id of the one before."""
+        wait_until(lambda: self.shown("MainPID") not in (main, "0"), "a restart", PATIENCE_S)
+
+    def config_hash(self) -> str:
+        """Of the configuration that the daemon runs with."""
+        with self.connect() as client:
+            return str(client.version["config_hash"])
+
+    def log(self, since_s: float = 0.0) -> str:
+        """What daemon and systemd have written to the journal about the unit. since_s : seconds since 1970."""
+        return self.container.run("journalctl", "--unit=compd", "--output=cat", "--quiet", f"--since=@{since_s:.6f}")
+
+    def signal_main(self, name: str) -> None:
+        self.systemctl("kill", "--kill-whom=main", f"--signal={name}", "compd")
+
+
+@pytest.fixture(scope="module")
+def installed() -> Iterator[Service]:
+    """The unit, installed as its header says, enabled, and with machine zero taken."""
+    with tempfile.TemporaryDirectory(prefix="compd-opt-") as directory:
+        read_only = {**install_compd(Path(directory)), ROOT / "systemd": UNITS, CONFIG: Path("/opt/config")}
+        with booted(read_only) as container:
+            # the interpreter may be linked with a library of its own
+            container.path("/etc/ld.so.conf.d/python.conf").write_text("/opt/python/lib\n")
+            container.run("ldconfig")
+            header = re.findall(r"(?m)^#   ((?:install|systemctl) .*)$", (ROOT / "systemd/compd.service").read_text())
+            assert len(header) == 3
+            for line in header[:-1]:
+                container.run("sh", "-ec", f"cd {UNITS}; {line}")
+            _simulate(container)
+            try:
+                container.run("sh", "-ec", header[-1])
+                zero = (f"{COMPD}/bin/compd", "zero", str(SOCKET))
+                # on a busy computer a simulated gauge is late now and then
+                wait_until(lambda: "taken" in container.run(*zero, check=False), "machine zero", PATIENCE_S)
+            except AssertionError as error:
+                raise AssertionError(container.run("journalctl", "--unit=compd", "--no-pager", check=False)) from error
+            yield Service(container)
+
+
+def _simulate(container: Container) -> None:
+    """A simulated machine on ptys of the daemon's user, and the configuration of that machine."""
+    container.run(
+        *("systemd-run", "--unit=simulated-machine", "--quiet"),
+        *("--property=User=compd", f"--property=RuntimeDirectory={SIMULATED.name}"),
+        *(f"{COMPD}/bin/compd", "simulate", f"/opt/config/{SHIPPED}"),
+        *(f"--directory={SIMULATED}", f"--zero-hold={ZERO_HOLD_S}"),
+    )
+    wait_until(container.path(SIMULATED / "control.sock").exists, "the simulated machine", PATIENCE_S)
+    data = yaml.safe_load(container.path(SIMULATED / SHIPPED).read_text())
+    shipped = yaml.safe_load((CONFIG / SHIPPED).read_text())
+    data["sockets"]["unix"] = shipped["sockets"]["unix"]
+    data["state"] = shipped["state"]
+    container.path(MACHINE).parent.mkdir()
+    container.path(MACHINE).write_text(yaml.safe_dump(data))
+
+
+@pytest.fixture
+def service(installed: Service) -> Service:
+    """The unit, active, with the shipped limits, its setpoints ok, no restart counted."""
+    installed.systemctl("reset-failed", "compd")
+    installed.systemctl("start", "compd")
+    installed.wait_for_ok()
+    return installed
+
+
+def report(what: str, **times_s: float) -> None:
+    print(f"{what}: " + ", ".join(f"{name.replace('_', ' ')} {time_s:.2f} s" for name, time_s in times_s.items()))
+
+
+def report_return(what: str, service: Service, from_s: float, ok_s: float) -> None:
+    """Print what the return of the daemon consists of. from_s : when it was killed or stopped."""
+    started_s, ready_s = service.reached_s("ExecMainStart"), service.reached_s("ActiveEnter")
+    report(
+        f"{what}, ok again after {ok_s - from_s:.2f} s",
+        until_systemd_starts_it=started_s - from_s,
+        until_READY=ready_s - started_s,
+        until_ok=ok_s - ready_s,
+    )
+
+
+@contextmanager
+def changed_limit(service: Service, name: str, value: float) -> Iterator[None]:
+    """Write a limit into the machine's configuration; the one before is back after the block."""
+    path = service.container.path(MACHINE)
+    before = path.read_text()
+    data = yaml.safe_load(before)
+    data["limits"][name] = value
+    path.write_text(yaml.safe_dump(data))
+    try:
+        yield
+    finally:
+        path.write_text(before)
+
+
+def test_the_unit_is_active_and_its_setpoints_are_ok(service: Service) -> None:
+    assert service.shown("ActiveState") == "active"
+    assert service.shown("SubState") == "running"
+    watch = (f"{COMPD}/bin/compd", "watch", str(SOCKET), "--count=3", "--json")
+    wait_until(lambda: '"state": "ok"' in service.container.run(*watch), "setpoints that are ok", PATIENCE_S)
+    print("\n".join(re.findall(r"(?m)event=granted what.*|event=\"not permitted\".*", service.log())))
+
+
+def test_exposure_is_at_most_two(service: Service) -> None:
+    last = service.container.run("systemd-analyze", "security", "--no-pager", "compd").splitlines()[-1]
+    print(last)
+    exposure = re.search(r"exposure level for compd.service: ([\d.]+)", last)
+    assert exposure is not None, last
+    assert float(exposure[1]) <= MOST_EXPOSURE
+
+
+def test_a_killed_daemon_comes_back_with_its_machine_zero(service: Service) -> None:
+    zero, main = service.zero(), service.shown("MainPID")
+    assert zero["taken"]
+    killed_s = time.monotonic()
+    service.signal_main("SIGKILL")
+    service.wait_for_another_process(main)
+    ok_s = service.wait_for_ok()
+    report_return("SIGKILL", service, killed_s, ok_s)
+    assert service.zero() == zero
+
+
+def test_a_daemon_that_hangs_is_restarted_by_the_watchdog(service: Service) -> None:
+    zero, main = service.zero(), service.shown("MainPID")
+    stopped_s = time.monotonic()
+    service.signal_main("SIGSTOP")
+    service.wait_for_another_process(main)
+    ok_s = service.wait_for_ok()
+    report_return("SIGSTOP", service, stopped_s, ok_s)
+    assert "Watchdog timeout" in service.log()
+    assert service.zero() == zero
+
+
+def test_a_start_that_fails_is_tried_again_until_it_succeeds(service: Service) -> None:
+    """systemd by itself gives up at the sixth start within ten seconds."""
+    with changed_limit(service, "slew_mm_per_s", -1):
+        with pytest.raises(AssertionError, match="journalctl"):
+            service.systemctl("restart", "compd")
+        wait_until(lambda: int(service.shown("NRestarts")) > 5, "starts", PATIENCE_S)
+        assert service.shown("SubState") in ("start", "auto-restart")
+    service.wait_for_ok()
+
+
+def test_reload_takes_the_new_configuration_and_keeps_the_unit_active(service: Service) -> None:
+    main, zero = service.shown("MainPID"), service.zero()
+    before = service.config_hash()
+    with changed_limit(service, "slew_mm_per_s", 0.4):
+        reload_s = time.monotonic()
+        service.systemctl("reload", "compd")
+        wait_until(lambda: service.config_hash() != before, "the new configuration", PATIENCE_S)
+        ok_s = service.wait_for_ok()
+        report("reload", until_ok_with_the_new_configuration=ok_s - reload_s)
+        assert service.shown("ActiveState") == "active"
+        assert service.shown("MainPID") == main
+        assert service.zero() == zero
+    service.systemctl("reload", "compd")
+    wait_until(lambda: service.config_hash() == before, "the first configuration", PATIENCE_S)
+
+
+def test_reload_refuses_an_invalid_configuration_and_the_old_one_goes_on(service: Service) -> None:
+    main = service.shown("MainPID")
+    with service.connect() as client, changed_limit(service, "slew_mm_per_s", -1):
+        setpoints = client.watch()
+        reload_s = time.time()
+        service.systemctl("reload", "compd")
+        wait_until(lambda: "slew_mm_per_s" in service.log(reload_s), "the refusal in the log", PATIENCE_S)
+        before_s = time.monotonic()
+        after = next(setpoint for setpoint in setpoints if setpoint["time_s"] > before_s)
+        assert after["state"] == "ok", "the same connection, the same daemon"
+        assert service.config_hash() == client.version["config_hash"]
+        assert service.shown("ActiveState") == "active"
+        assert service.shown("MainPID") == main
+
+
+def test_stop_ends_at_once_and_by_itself(service: Service) -> None:
+    started_s = time.monotonic()
+    service.systemctl("stop", "compd")
+    took_s = time.monotonic() - started_s
+    report("systemctl stop", took=took_s)
+    assert service.shown("Result") == "success"
+    assert service.shown("ExecMainStatus") == "0"
+    assert not service.container.path(SOCKET).exists()
+    assert took_s <= STOP_S
