@@ -17,9 +17,11 @@ import multiprocessing
 import os
 import queue
 import re
+import signal
 import socket
 import struct
 import subprocess
+import sys
 import threading
 import time
 from collections import defaultdict
@@ -238,7 +240,7 @@ def run_together(client: socket.socket, rate_hz: float, seconds: float, go: Any)
     """Drivers and service are threads beside the loop."""
     setpoints: queue.SimpleQueue[Setpoint | None] = queue.SimpleQueue()
     served: Figures = {}
-    service = threading.Thread(target=lambda: served.update(serve(setpoints.get, client, "ordinary")))
+    service = threading.Thread(target=lambda: served.update(serve(setpoints.get, client, "ordinary")), daemon=True)
     service.start()
     latest = Readings()
     figures = acquire(latest, lambda: run_loop(latest, setpoints.put, rate_hz, seconds, go))
@@ -316,6 +318,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
     quiet()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # no loop with priority is left behind
     gc.freeze()  # a collection would copy the pages that the processes share
     with load_beside(LOAD_PROCESSES if options.load else 0):
         for rate_hz in RATES_HZ:
