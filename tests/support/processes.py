@@ -110,12 +110,13 @@ class Watcher:
     seen : all that arrived. ended : why no more come; "" while they do. broken : which setpoint broke which rule.
     """
 
-    def __init__(self, address: Path, rules: Rules) -> None:
+    def __init__(self, address: Path, rules: Rules, rate_hz: float | None = None) -> None:
         self.seen: list[Seen] = []
         self.ended = ""
         self.broken: list[str] = []
         self._rules = rules
         self._end = threading.Event()
+        self._rate_hz = rate_hz
         self._client = connect(address, PATIENCE_S)
         self._thread = threading.Thread(target=self._run, name="watcher", daemon=True)
         self._thread.start()
@@ -164,7 +165,7 @@ class Watcher:
         before = last_valid = None
         why = "stopped watching"
         try:
-            for setpoint in self._client.watch():
+            for setpoint in self._client.watch(self._rate_hz):
                 broken = [f"{rule}: {setpoint}" for rule in broken_rules(setpoint, before, last_valid, self._rules)]
                 before, last_valid = setpoint, setpoint if setpoint["valid"] else last_valid
                 self.seen.append(Seen(time.monotonic(), setpoint))
@@ -294,9 +295,12 @@ class Daemon:
         return found
 
     @contextmanager
-    def watched(self) -> Iterator[Watcher]:
-        """A client that watches during the block; no setpoint may break a rule."""
-        watcher = Watcher(self.socket, self.rules)
+    def watched(self, rate_hz: float | None = None) -> Iterator[Watcher]:
+        """A client that watches during the block; no setpoint may break a rule.
+
+        rate_hz : None for every setpoint, which at 1 kHz is more than a busy computer can read.
+        """
+        watcher = Watcher(self.socket, self.rules, rate_hz)
         try:
             yield watcher
         finally:

@@ -45,6 +45,8 @@ from tests.support.processes import (
 MISSED_SHARE = 0.02
 PAUSE_S = 0.1
 PAUSES = Pauses()
+# Of a loop at 1 kHz.
+WATCHED_HZ = 200.0
 # How long a misdeed is watched after its first effect.
 WATCHED_S = 2.0
 # Promised are the longer of 20 ms and two periods until clients hear of a lost loop, and 2 s from SIGTERM to the end.
@@ -544,7 +546,7 @@ def test_adopting_a_model_and_a_shadow_costs_no_cycle(machine: Machine, tmp_path
         duration_s = time.monotonic() - start_s
         return fast.status()["loop"]["missed_cycles"] - before["missed_cycles"], largest_gap(seen), duration_s
 
-    with fast.watched() as watcher, fast.connected() as operator:
+    with fast.watched(WATCHED_HZ) as watcher, fast.connected() as operator:
 
         def adopt() -> list[Seen]:
             since = watcher.now
