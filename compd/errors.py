@@ -54,6 +54,9 @@ class CompdError(Exception):
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[CompdError], tuple[tuple[Problem, ...]]]:
+        return type(self), (self.problems,)
+
 
 class ConfigurationError(CompdError):
     """The configuration cannot be used; every problem in it is listed."""

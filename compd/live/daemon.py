@@ -25,7 +25,6 @@ from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
-from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.pipeline import build_pipeline
@@ -88,9 +87,10 @@ class Daemon:
             raise
         # what follows opens descriptors, and cannot fail
         self.commands = Commands(self._zero_on_disk())
-        self.setpoints, cycles, self.control = SharedRing(), SharedRing(), Control()
+        channels = len(self.latest.channels)
+        self.setpoints, cycles, self.control = SharedRing(channels), SharedRing(channels), Control()
         adopted = AdoptedModels(models)
-        packet_hash = bytes.fromhex(configuration.config_hash)[:8] if configuration.sockets.udp is not None else None
+        packet_hash = bytes.fromhex(configuration.config_hash)[:8] if packets is not None else None
         timing = LoopTiming(self.period_s)
         self.loop_process = LoopProcess(
             pipeline.settings,
@@ -110,7 +110,7 @@ class Daemon:
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
         observers = [StateLog(self.control).note]
         if packets is not None:
-            observers.append(partial(_send_packet, packets))
+            observers.append(packets.deliver)
         publisher = Publisher(
             self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
         )
@@ -199,7 +199,7 @@ class Daemon:
         return [
             AcquisitionProcess(
                 name,
-                partial(_polling, {line: lines[line] for line in group}, self.latest, clock),
+                partial(Acquisition, {line: lines[line] for line in group}, self.latest, clock),
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
@@ -226,15 +226,6 @@ class Daemon:
             return error
         _log.info("machine zero", taken_at=zero.taken_at)
         return zero
-
-
-def _send_packet(packets: UdpSender, setpoint: SentSetpoint) -> None:
-    packets.send(setpoint.packet)
-
-
-def _polling(lines: dict[str, Any], latest: Any, clock: Clock) -> Acquisition:
-    """The acquisition of some lines; made in its own process."""
-    return Acquisition(lines, latest, clock)
 
 
 def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:

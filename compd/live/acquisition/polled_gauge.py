@@ -9,7 +9,7 @@ from typing import Any
 import structlog
 
 from compd.gauge import Gauge, Quality, Reading, bad
-from compd.live.memory.latest import Latest
+from compd.live.memory.latest import LONGEST_DETAIL, Latest
 
 log = structlog.get_logger()
 
@@ -125,7 +125,7 @@ class PolledGauge:
             log_change = log.info if quality is Quality.OK else log.warning
             log_change("gauge", gauge=self.name, quality=str(quality), was=str(self.quality), detail=detail)
         self.quality = quality
-        self.detail = detail
+        self.detail = detail[:LONGEST_DETAIL]
 
     def status(self) -> dict[str, Any]:
         """The gauge's part of STATUS, as plain data; what is not known is left out."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import Any, NamedTuple
 
 from compd.live.loop.model_loader import ModelLoader, Models, ModelText
-from compd.live.memory.shared_record import SharedRecord
+from compd.live.memory.shared_message import SharedMessage
 
 # Two model files with ledgers of years; memory that is not used costs nothing.
 _CAPACITY = 64 * 1024 * 1024
@@ -15,9 +14,9 @@ _CAPACITY = 64 * 1024 * 1024
 class _Adopted(NamedTuple):
     """Model files of the applied model and of the shadow, and their summary."""
 
-    applied: ModelText | None = None
-    shadow: ModelText | None = None
-    summary: dict[str, Any] = {}  # noqa: RUF012
+    applied: ModelText | None
+    shadow: ModelText | None
+    summary: dict[str, Any]
 
 
 class AdoptedModels:
@@ -25,28 +24,21 @@ class AdoptedModels:
 
     def __init__(self, models: Models) -> None:
         """`models`: with which the daemon starts."""
-        self._record = SharedRecord(_CAPACITY)
-        self._version = 0
-        self._adopted = _Adopted()
+        self._message = SharedMessage(_CAPACITY)
         self.write(models)
 
     def write(self, models: Models) -> None:
         """Replace them. Raises ValueError for model files that are too long."""
         applied, shadow = models
-        adopted = _Adopted(applied.text, None if shadow is None else shadow.text, models.summary)
-        self._record.write(pickle.dumps(tuple(adopted)))
+        self._message.write(_Adopted(applied.text, None if shadow is None else shadow.text, models.summary))
 
     @property
     def summary(self) -> dict[str, Any]:
         """For MODEL and STATUS, see `Models.summary`."""
-        return self._read().summary
+        adopted: _Adopted = self._message.read()
+        return adopted.summary
 
     def load(self, loader: ModelLoader) -> Models:
         """The models themselves. Raises CompdError where an effect of a user's own file can no longer be loaded."""
-        applied, shadow, _ = self._read()
-        return Models(loader.load(applied), None if shadow is None else loader.load(shadow))
-
-    def _read(self) -> _Adopted:
-        if (version := self._record.version) != self._version and (content := self._record.read()):
-            self._adopted, self._version = _Adopted(*pickle.loads(content)), version
-        return self._adopted
+        adopted: _Adopted = self._message.read()
+        return Models(loader.load(adopted.applied), None if adopted.shadow is None else loader.load(adopted.shadow))

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import dataclass
 
 from compd.errors import StateError
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
-from compd.live.memory.shared_record import SharedRecord
+from compd.live.memory.shared_message import SharedMessage
 
-# Machine zero has some 60 bytes for each length gauge.
-_ZERO_BYTES = 256 * 1024
 _TARGET_BYTES = 1024
 
 
@@ -40,36 +37,26 @@ class Commands:
 
     def __init__(self, zero: MachineZero | StateError, models: Models | None = None) -> None:
         self.models = models
-        self._zero_record = SharedRecord(_ZERO_BYTES)
-        self._target_record = SharedRecord(_TARGET_BYTES)
-        self._zero, self._zero_version = zero, 0
-        self._target: Target | None = None
-        self._target_version = 0
+        self._zero = SharedMessage()
+        self._target = SharedMessage(_TARGET_BYTES)
         self.zero = zero
 
     @property
     def zero(self) -> MachineZero | StateError:
         """Machine zero, or why there is none. It is the same object until another one has been written."""
-        if (version := self._zero_record.version) != self._zero_version and (content := self._zero_record.read()):
-            fields = pickle.loads(content)
-            self._zero = MachineZero(**fields) if isinstance(fields, dict) else StateError(fields)
-            self._zero_version = version
-        return self._zero
+        zero: MachineZero | StateError = self._zero.read()
+        return zero
 
     @zero.setter
     def zero(self, zero: MachineZero | StateError) -> None:
-        fields = zero.to_json() if isinstance(zero, MachineZero) else zero.problems
-        self._zero_record.write(pickle.dumps(fields))
-        self._zero, self._zero_version = zero, self._zero_record.version
+        self._zero.write(zero)
 
     @property
     def target(self) -> Target | None:
         """The controller's target; None is CMM mode."""
-        if (version := self._target_record.version) != self._target_version and (content := self._target_record.read()):
-            self._target, self._target_version = pickle.loads(content), version
-        return self._target
+        target: Target | None = self._target.read()
+        return target
 
     @target.setter
     def target(self, target: Target | None) -> None:
-        self._target_record.write(pickle.dumps(target))
-        self._target, self._target_version = target, self._target_record.version
+        self._target.write(target)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -66,19 +67,22 @@ class LiveModel:
     quantities : names of the temperatures, forces and so on that its effects need.
     wires : of these quantities, in the same order.
     text : its model file; None without effects.
-    file, hash : path and hash of the model file; "" without effects.
     """
 
     machine: MachineModel
     quantities: tuple[str, ...]
     wires: Wires
     text: ModelText | None = None
-    file: str = field(init=False)
-    hash: str = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "file", self.text.file if self.text else "")
-        object.__setattr__(self, "hash", self.text.hash if self.text else "")
+    @property
+    def file(self) -> str:
+        """Path of the model file; "" without effects."""
+        return self.text.file if self.text else ""
+
+    @cached_property
+    def hash(self) -> str:
+        """Hash of the model file; "" without effects. Every setpoint has it."""
+        return self.text.hash if self.text else ""
 
     def read(self, snapshot: Snapshot) -> WiredValues:
         """The quantities in a snapshot, in their own units."""

@@ -110,9 +110,7 @@ class CyclePacker:
         self._directions.update(setpoint)
         if inputs.zero is not self._zero:  # it has kilobytes, and is the same for days
             self._zero = inputs.zero
-            self._zero_bytes = pickle.dumps(
-                inputs.zero.to_json() if isinstance(inputs.zero, MachineZero) else inputs.zero.problems
-            )
+            self._zero_bytes = pickle.dumps(inputs.zero)
         if inputs.models is not self._models:
             self._models = inputs.models
             self._names = NO_MODELS if inputs.models is None else inputs.models.names
@@ -141,9 +139,7 @@ class CycleUnpacker:
         readings, commands, (fields, has_zero), line, names, approach = pickle.loads(content)
         tick, time_s, image, zero_bytes = readings
         if zero_bytes != self._zero_bytes or self._zero is None:
-            content_of_zero = pickle.loads(zero_bytes)
-            is_zero = isinstance(content_of_zero, dict)
-            self._zero = MachineZero(**content_of_zero) if is_zero else StateError(content_of_zero)
+            self._zero = pickle.loads(zero_bytes)
             self._zero_bytes = zero_bytes
         target, ending = commands
         inputs = CycleInputs(tick, Snapshot(time_s, unpack_readings(image)), self._zero, target, None, ending)

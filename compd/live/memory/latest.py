@@ -29,7 +29,7 @@ _HEAD = struct.Struct("=ddBBxxI")
 _CHECKED = struct.Struct("=ddBBxx")
 _CHECKED_BYTES = _CHECKED.size
 SLOT_BYTES = _SLOT.size
-_LONGEST_DETAIL = SLOT_BYTES - _HEAD.size
+LONGEST_DETAIL = SLOT_BYTES - _HEAD.size
 _TRIES = 2
 
 _QUALITIES = tuple(Quality)
@@ -116,7 +116,7 @@ def packed(reading: Reading) -> bytes:
     value, time_s, quality, detail = reading
     text = b""
     if detail:
-        text = detail.encode(errors="replace")[:_LONGEST_DETAIL].decode(errors="ignore").encode()
+        text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
     head = _CHECKED.pack(value, time_s, _NUMBERS[quality], len(text))
     return _SLOT.pack(value, time_s, _NUMBERS[quality], len(text), zlib.crc32(text, zlib.crc32(head)), text)
 

@@ -1,6 +1,6 @@
 """A ring through which entries go from the loop to the service, without either waiting for the other.
 
-The memory begins with a head of 16 bytes, and has `ENTRIES` places of `PLACE_BYTES` after it:
+The memory begins with a head of 16 bytes, and has `ENTRIES` places of the same size after it, 64 KiB or more:
 
     count      8 bytes: how many entries have ever been written; entry k is at place k modulo `ENTRIES`
     due        8 bytes, float64: monotonic time from which on the reader wants to be woken
@@ -18,35 +18,35 @@ import math
 import os
 import zlib
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 from compd.live.memory.shared_array import shared_memory
 
 # Half a second at 1 kHz: longer than any pause of the service that is not a fault.
 ENTRIES = 512
-# Ten times what a hexapod with ten effects needs. Memory that is not used costs nothing.
-PLACE_BYTES = 64 * 1024
+# Ten times what a cycle of a hexapod with ten effects needs, and for larger machines so much for each channel. Memory
+# that is not used costs nothing.
+_SMALLEST_PLACE_BYTES = 64 * 1024
+_CHANNEL_BYTES = 1024
 _HEAD_BYTES = 16
 _HEADER_BYTES = 32
-LONGEST_CONTENT = PLACE_BYTES - _HEADER_BYTES
 _CHECKSUM_BITS = 32
 # Entries that may be written while one is read.
 _MARGIN = 16
 
 
-class Entry(NamedTuple):
-    """One entry: monotonic time (s) of a cycle, number of its setpoint's state, and the content."""
-
-    time_s: float
-    state: int
-    content: bytes
-
-
 class SharedRing:
-    """A ring. One loop writes it at any time; whoever reads keeps count of what has been read."""
+    """A ring. One loop writes it at any time; whoever reads keeps count of what has been read.
 
-    def __init__(self) -> None:
-        memory = memoryview(shared_memory(_HEAD_BYTES + ENTRIES * PLACE_BYTES))
+    Attributes
+    ----------
+    longest_content : bytes that an entry may have.
+    """
+
+    def __init__(self, channels: int = 0) -> None:
+        """`channels`: of the machine, whose readings an entry may have."""
+        self._place_bytes = max(_SMALLEST_PLACE_BYTES, channels * _CHANNEL_BYTES)
+        self.longest_content = self._place_bytes - _HEADER_BYTES
+        memory = memoryview(shared_memory(_HEAD_BYTES + ENTRIES * self._place_bytes))
         self._count = memory[:8].cast("Q")
         self._due_s = memory[8:16].cast("d")
         self._due_s[0] = math.inf
@@ -68,10 +68,10 @@ class SharedRing:
 
     def put(self, time_s: float, state: int, content: bytes) -> None:
         """Write an entry in the place of the oldest one. Raises ValueError for content that is too long."""
-        if len(content) > LONGEST_CONTENT:
-            raise ValueError(f"{len(content)} bytes, at most {LONGEST_CONTENT}")
+        if len(content) > self.longest_content:
+            raise ValueError(f"{len(content)} bytes, at most {self.longest_content}")
         number = self._count[0]
-        start = number % ENTRIES * PLACE_BYTES
+        start = number % ENTRIES * self._place_bytes
         word = start // 8
         self._words[word] = 2 * number + 1
         self._times[word + 1] = time_s
@@ -90,22 +90,18 @@ class SharedRing:
 
     def when(self, number: int) -> tuple[float, int]:
         """Time (s) and state's number of entry `number`, which must be among the last ones."""
-        word = number % ENTRIES * PLACE_BYTES // 8
+        word = number % ENTRIES * self._place_bytes // 8
         return self._times[word + 1], self._words[word + 2]
 
-    def get(self, number: int) -> Entry | None:
-        """Entry `number`, counted from 0; None where newer ones have taken its place, or it is not whole."""
-        start = number % ENTRIES * PLACE_BYTES
+    def get(self, number: int) -> bytes | None:
+        """The content of entry `number`, counted from 0; None where newer ones have its place, or it is not whole."""
+        start = number % ENTRIES * self._place_bytes
         word = start // 8
         version = self._words[word]
         length, checksum = divmod(self._words[word + 3], 1 << _CHECKSUM_BITS)
-        entry = Entry(
-            self._times[word + 1],
-            self._words[word + 2],
-            bytes(self._places[start + _HEADER_BYTES : start + _HEADER_BYTES + length]),
-        )
-        whole = version == 2 * number + 2 == self._words[word] and zlib.crc32(entry.content) == checksum
-        return entry if whole else None
+        content = bytes(self._places[start + _HEADER_BYTES : start + _HEADER_BYTES + length])
+        whole = version == 2 * number + 2 == self._words[word] and zlib.crc32(content) == checksum
+        return content if whole else None
 
     def close(self) -> None:
         """Close `woken`."""
@@ -138,8 +134,8 @@ class RingReader:
             number = self._next
             self._next += 1
             if is_due(*self.ring.when(number)):
-                entry = self.ring.get(number)
-                if entry is None:
+                content = self.ring.get(number)
+                if content is None:
                     self.dropped += 1
                 else:
-                    yield entry.content
+                    yield content

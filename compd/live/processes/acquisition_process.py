@@ -12,8 +12,9 @@ from typing import Any
 
 from compd.clock import Clock
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
-from compd.live.processes.control import Control, Phase, SharedMessage
+from compd.live.processes.control import Control, Phase
 
 _TELL_EVERY_S = 0.1
 # A driver in the middle of a poll may take so long to let go of its line.

@@ -34,7 +34,8 @@ class ChildProcess:
     pid, pidfd : of the process that runs; 0 and -1 where none does.
     starts : how often it was started.
     last_end : how it ended last; "" before.
-    started_s, ended_s : monotonic time (s) of its last start and end.
+    succeeded : whether it ended by itself and had done what it was for.
+    started_s : monotonic time (s) of its last start.
     """
 
     def __init__(
@@ -53,7 +54,8 @@ class ChildProcess:
         self.starts = 0
         self.last_end = ""
         self._killed_because = ""
-        self.started_s = self.ended_s = 0.0
+        self.succeeded = False
+        self.started_s = 0.0
         self._run = run
         self._clock = clock
         self._output = output
@@ -93,9 +95,10 @@ class ChildProcess:
         pid, status = os.waitpid(self.pid, os.WNOHANG)
         if pid == 0:
             return False
-        self.last_end = self._killed_because or _meaning(os.waitstatus_to_exitcode(status))
+        exit_code = os.waitstatus_to_exitcode(status)
+        self.succeeded = exit_code == 0
+        self.last_end = self._killed_because or _meaning(exit_code)
         self._killed_because = ""
-        self.ended_s = self._clock.monotonic()
         os.close(self.pidfd)
         self.pid, self.pidfd = 0, -1
         return True

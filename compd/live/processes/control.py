@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import os
-import pickle
 import select
 from enum import IntEnum
-from typing import Any
 
 from compd.live.memory.shared_array import shared_counters
-from compd.live.memory.shared_record import SharedRecord
+from compd.live.memory.shared_message import SharedMessage
 
 _TEXT_BYTES = 4096
-# A request names a file; an answer may hold a summary, or a list of problems.
-_MESSAGE_BYTES = 256 * 1024
 
 _PHASE, _TURN, _SUCCESSOR, _SERVICE_BEAT = range(4)
 
@@ -24,30 +20,6 @@ class Phase(IntEnum):
     RUNNING = 0
     HOLDING = 1
     STOPPING = 2
-
-
-class SharedMessage:
-    """Plain data that one process replaces and others read."""
-
-    def __init__(self, capacity: int = _MESSAGE_BYTES) -> None:
-        self._record = SharedRecord(capacity)
-        self._version = 0
-        self._data: Any = None
-
-    @property
-    def version(self) -> int:
-        """Another number after every write."""
-        return self._record.version
-
-    def write(self, data: Any) -> None:
-        """Replace the data. Raises ValueError where they are too long."""
-        self._record.write(pickle.dumps(data))
-
-    def read(self) -> Any:
-        """The data; None before the first write."""
-        if (version := self._record.version) != self._version and (content := self._record.read()):
-            self._data, self._version = pickle.loads(content), version
-        return self._data
 
 
 class Control:

@@ -27,7 +27,7 @@ from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.latest import Latest
-from compd.live.memory.shared_ring import LONGEST_CONTENT, SharedRing
+from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.control import Control
 
 # Cycles that a loop computes before the first that counts.
@@ -41,8 +41,11 @@ _log = structlog.get_logger()
 
 
 @dataclass(frozen=True)
-class ModelRequest:
-    """A request to run with another model. number : of the request. file : "" for none. shadow : compute beside."""
+class ModelChange:
+    """A change of models that a client asks for.
+
+    number : of the request. file : "" for none. shadow : whether it is to be computed beside the applied one.
+    """
 
     number: int
     file: str
@@ -79,7 +82,7 @@ class LoopProcess:
         realtime.use_fifo(self.settings.loop.priority)
         loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
 
-    def run_successor(self, number: int, request: ModelRequest) -> None:
+    def run_successor(self, number: int, request: ModelChange) -> None:
         """Read and try the model that is asked for, take the turn and cycle; or answer why not."""
         control = self.control
         try:
@@ -107,7 +110,7 @@ class LoopProcess:
         self.control.model_answer.write((number, summary, refusal))
         self.setpoints.wake_reader()
 
-    def _models_wanted(self, before: Models, request: ModelRequest) -> Models:
+    def _models_wanted(self, before: Models, request: ModelChange) -> Models:
         """The pair of applied model and shadow with the new one (none: no effects, or no shadow) in its place."""
         model: LiveModel | None = self.loader.read(Path(request.file)) if request.file else None
         if request.shadow:
@@ -147,8 +150,8 @@ class LoopProcess:
             setpoint, state = step(state, self._inputs(tick), self.settings)
             sent = SentSetpoint.of(setpoint, self.packet_hash)
             # what effects remember may grow while the machine moves
-            if len(packer.pack(setpoint, sent.line)) > LONGEST_CONTENT // 2:
-                raise ValueError(f"the effects remember more than {LONGEST_CONTENT // 2} bytes from cycle to cycle")
+            if len(packer.pack(setpoint, sent.line)) > (most := self.cycles.longest_content // 2):
+                raise ValueError(f"a cycle, with what its effects remember, has more than {most} bytes")
 
     def _inputs(self, tick: int) -> CycleInputs:
         snapshot = self.latest.snapshot(self.clock.monotonic())
@@ -161,10 +164,10 @@ class LoopProcess:
         is the correction that is applied, from which the next one slews.
         """
         start = CycleState.at_start(self.settings.model)
-        entry = self.cycles.get(self.cycles.count - 1) if self.cycles.count else None
-        if entry is None:
+        content = self.cycles.get(self.cycles.count - 1) if self.cycles.count else None
+        if content is None:
             return start
-        sent = CycleUnpacker().unpack(entry.content)
+        sent = CycleUnpacker().unpack(content)
         inputs, state = sent.inputs, sent.state_before
         bare = start._replace(correction_mm=state.correction_mm, adopting=True)
         if forget or sent.models != models.names:

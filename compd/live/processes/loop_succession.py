@@ -9,7 +9,7 @@ import structlog
 
 from compd.clock import Clock
 from compd.live.processes.child_process import ChildProcess
-from compd.live.processes.loop_process import LoopProcess, ModelRequest
+from compd.live.processes.loop_process import LoopProcess, ModelChange
 
 _log = structlog.get_logger()
 
@@ -65,7 +65,7 @@ class LoopSuccession:
         self._starts += 1
         self.loop.start()
 
-    def start_successor(self, request: ModelRequest) -> None:
+    def start_successor(self, request: ModelChange) -> None:
         """Start a loop that takes over as soon as it is ready with the model that is asked for."""
         number = self._successor_number = self._next_number()
         self._successor = self._child("next loop", lambda: self._process.run_successor(number, request))
@@ -91,15 +91,21 @@ class LoopSuccession:
         if successor is not None and successor.collect():
             self._successor = None
             self._control.withdraw(self._successor_number)
-            answer = self._control.model_answer.read()
-            if answer is None or answer[0] != request:
-                why = f"the loop that was to use it has ended: {successor.last_end}"
-                _log.error("model refused", reason=why)
-                self._process.answer(request, None, why)
+            self._refuse_unless_answered(request, successor)
         if self.loop.running and self.loop.collect():
             self._last_end = self.loop.last_end
+            if self._successor is None:  # it may have had the turn, and not yet answered
+                self._refuse_unless_answered(request, self.loop)
             return True
         return False
+
+    def _refuse_unless_answered(self, request: int, ended: ChildProcess) -> None:
+        """Answer a request in the place of the loop that was to use the model and has ended."""
+        answer = self._control.model_answer.read()
+        if request and (answer is None or answer[0] != request):
+            why = f"the loop that was to use it has ended: {ended.last_end}"
+            _log.error("model refused", reason=why)
+            self._process.answer(request, None, why)
 
     def _next_number(self) -> int:
         self._number += 1

@@ -20,6 +20,9 @@ from compd.live.service.requests import Requests
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
 
+# Characters. A reason that names every gauge of a machine has thousands; the log has it whole.
+_LONGEST_HEADLINE = 500
+
 _log = structlog.get_logger()
 
 
@@ -37,7 +40,8 @@ class StateLog:
         self._state = setpoint.state
         log = _log.info if setpoint.state.valid else _log.warning
         log("state", state=setpoint.state.value, reason=setpoint.reason, mode=setpoint.mode.value)
-        self._control.headline.write(f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else setpoint.state)
+        headline = f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else str(setpoint.state)
+        self._control.headline.write(headline[:_LONGEST_HEADLINE])
         self._control.wake_supervisor()
 
 

@@ -21,7 +21,7 @@ from compd.live.daemon import Daemon
 from compd.live.processes.child_process import ChildProcess
 from compd.live.processes.control import Phase
 from compd.live.processes.heartbeat import Heartbeat, RestartDelay
-from compd.live.processes.loop_process import ModelRequest
+from compd.live.processes.loop_process import ModelChange
 from compd.live.processes.loop_succession import LoopSuccession
 from compd.live.systemd import Notifier
 
@@ -133,7 +133,7 @@ class Supervisor:
 
     def _is_good(self, reload: Callable[[], bool]) -> bool:
         """Whether the configuration that has been checked can be used."""
-        if self._check.last_end != "ended with code 0":
+        if not self._check.succeeded:
             _log.error("the configuration is refused, the daemon goes on with its own", check=self._check.last_end)
             return False
         return reload()
@@ -197,7 +197,7 @@ class Supervisor:
         request = control.model_request.read()
         if request is not None and request[0] != self._request and not self._loops.has_successor:
             self._request = request[0]
-            self._loops.start_successor(ModelRequest(*request))
+            self._loops.start_successor(ModelChange(*request))
         if self._loops.turn_has_changed():
             self._tell()
 

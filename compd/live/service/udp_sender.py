@@ -7,6 +7,7 @@ from typing import Any
 
 from compd.configuration.operation import UdpTarget
 from compd.errors import DaemonError, Problem
+from compd.live.loop.sent_cycle import SentSetpoint
 
 
 class UdpSender:
@@ -34,10 +35,10 @@ class UdpSender:
         self.sent = 0
         self.dropped = 0
 
-    def send(self, packet: bytes) -> None:
-        """Send one packet, without waiting."""
+    def deliver(self, setpoint: SentSetpoint) -> None:
+        """Send the packet of a setpoint, without waiting."""
         try:
-            self._socket.sendto(packet, self._address)
+            self._socket.sendto(setpoint.packet, self._address)
         except OSError:
             self.dropped += 1
         else:

@@ -11,7 +11,7 @@ import pytest
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.memory.latest import Latest, packed, unpack_readings, unpacked
 from compd.live.memory.shared_record import SharedRecord
-from compd.live.memory.shared_ring import ENTRIES, LONGEST_CONTENT, RingReader, SharedRing
+from compd.live.memory.shared_ring import ENTRIES, RingReader, SharedRing
 from tests.support.other_process import beside
 
 READS = 20_000
@@ -135,10 +135,11 @@ def test_an_entry_that_is_overwritten_or_too_long_is_refused():
     for number in range(ENTRIES + 1):
         ring.put(float(number), 1, b"x")
     assert ring.get(0) is None
-    assert ring.get(1).time_s == 1.0
+    assert ring.get(1) == b"x"
+    assert ring.when(1) == (1.0, 1)
     assert ring.get(ENTRIES + 1) is None, "not yet written"
     with pytest.raises(ValueError, match="at most"):
-        ring.put(0.0, 1, bytes(LONGEST_CONTENT + 1))
+        ring.put(0.0, 1, bytes(ring.longest_content + 1))
     ring.close()
 
 
@@ -164,3 +165,10 @@ def ring_has_woken(ring):
         return os.eventfd_read(ring.woken) > 0
     except BlockingIOError:
         return False
+
+
+def test_a_ring_has_room_for_the_readings_of_a_large_machine():
+    ring = SharedRing(channels=500)
+    ring.put(1.0, 1, bytes(200 * 500 * 4))
+    assert ring.get(0) == bytes(200 * 500 * 4)
+    ring.close()

@@ -7,15 +7,21 @@ import math
 import os
 import signal
 import socket
+from types import SimpleNamespace
 
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.loop.states import State
+from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.states import Mode, State
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.child_process import OUT_OF_MEMORY, ChildProcess
 from compd.live.processes.control import Control, Phase
 from compd.live.processes.heartbeat import Heartbeat, RestartDelay
+from compd.live.processes.loop_process import ModelChange
+from compd.live.processes.loop_succession import LoopSuccession
+from compd.live.processes.service_process import StateLog
+from compd.live.realtime import RationedPriority
 from compd.live.service.loop_watch import LoopWatch
 
 
@@ -156,3 +162,75 @@ def test_a_process_may_have_none_of_the_sockets():
             child.wait()
             ends.append(child.last_end)
     assert ends == ["ended with code 5", "ended with code 4"]
+
+
+def test_a_state_whose_reason_names_every_gauge_is_logged_and_told_in_one_line():
+    """A hexapod with all its lines lost: the reason has thousands of characters."""
+    control = Control()
+    reason = ", ".join(f"joint {k} (joints.{k}): line_lost ({'cannot open ' * 12})" for k in range(1, 41))
+    StateLog(control).note(SentSetpoint(1, 1.0, State.STOP, reason, Mode.CMM, b""))
+    assert control.headline.read().startswith("stop: joint 1 (joints.1): line_lost")
+    assert len(control.headline.read()) <= 500
+    control.close()
+
+
+def test_a_request_is_answered_where_the_successor_ends_with_the_turn_and_without_an_answer():
+    control, setpoints = Control(), SharedRing()
+    process = SimpleNamespace(
+        control=control,
+        run=lambda number, forget: None,
+        run_successor=lambda number, change: os._exit(9 if control.await_turn(number, 60) else 8),
+        answer=lambda *answer: control.model_answer.write(answer),
+    )
+    loops = LoopSuccession(process, MonotonicClock(), None)
+    loops.start()
+    loops.loop.wait()
+    loops.start_successor(ModelChange(3, "m.yaml", False))
+    while not control.successor:
+        pass
+    control.give_turn(control.successor)
+    assert loops.turn_has_changed()
+    while not loops.collect(3):
+        pass
+    number, summary, refusal = control.model_answer.read()
+    assert (number, summary) == (3, None)
+    assert "ended with code 9" in refusal
+    setpoints.close()
+    control.close()
+
+
+def test_priority_is_given_up_while_a_thread_takes_more_than_half_a_processor(monkeypatch):
+    now, used, policies = [0.0], [0.0], []
+    monkeypatch.setattr("compd.live.realtime.time.thread_time", lambda: used[0])
+    monkeypatch.setattr(
+        "compd.live.realtime.os.sched_setscheduler", lambda _, policy, parameters: policies.append(policy)
+    )
+    priority = RationedPriority(20, SimpleNamespace(monotonic=lambda: now[0]))
+    had = []
+    for share in (0.1, 0.1, 0.9, 0.9, 0.1):
+        priority.look()
+        had.append(priority.has_priority)
+        now[0] += 0.11
+        used[0] += 0.11 * share
+    priority.look()
+    had.append(priority.has_priority)
+    assert had == [True, True, True, False, False, True]
+    assert [policy & ~os.SCHED_RESET_ON_FORK for policy in policies] == [os.SCHED_FIFO, os.SCHED_OTHER, os.SCHED_FIFO]
+    assert all(policy & os.SCHED_RESET_ON_FORK for policy in policies), "threads that it starts have none"
+
+
+def test_where_priority_is_not_permitted_it_is_asked_for_once(monkeypatch):
+    asked = []
+
+    def refuse(*arguments):
+        asked.append(arguments)
+        raise PermissionError
+
+    monkeypatch.setattr("compd.live.realtime.os.sched_setscheduler", refuse)
+    now = [0.0]
+    priority = RationedPriority(20, SimpleNamespace(monotonic=lambda: now[0]))
+    for _ in range(5):
+        priority.look()
+        now[0] += 1.0
+    assert len(asked) == 1
+    assert not priority.has_priority

@@ -16,7 +16,7 @@ from compd.live.loop.states import State
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.control import Control
-from compd.live.processes.loop_process import LoopProcess, ModelRequest
+from compd.live.processes.loop_process import LoopProcess, ModelChange
 from tests.support.live_machine import STEP_MM, machine
 from tests.support.live_models import file_with
 
@@ -123,7 +123,7 @@ def test_a_last_cycle_that_cannot_be_computed_again_does_not_end_the_next_loop(p
 def test_a_model_that_is_refused_is_answered_and_leaves_the_turn_where_it_is(predecessor, tmp_path):
     process, control = predecessor.process, predecessor.control
     control.give_turn(1)
-    process.run_successor(2, ModelRequest(7, str(tmp_path / "none.yaml"), False))
+    process.run_successor(2, ModelChange(7, str(tmp_path / "none.yaml"), False))
     number, summary, refusal = control.model_answer.read()
     assert (number, summary) == (7, None)
     assert "cannot be read" in refusal
@@ -143,7 +143,7 @@ def test_a_successor_takes_the_turn_between_two_ticks_and_tells_its_models(prede
             control.give_turn(3)
 
     process = replace(process, timing=Once(process.settings.period_s))
-    process.run_successor(2, ModelRequest(1, str(file), False))
+    process.run_successor(2, ModelChange(1, str(file), False))
     number, summary, refusal = control.model_answer.read()
     assert (number, refusal) == (1, "")
     assert summary["applied"]["effects"] == ["link_zero"]
