@@ -49,9 +49,9 @@ class _Successor:
         self._now = now
 
     def check(self) -> None:
-        """Make it in a process of its own, which shows whether it can be made; exit code 1 where it cannot."""
+        """Make it in a process of its own, which shows whether it can be made; exit code 2 where it cannot."""
         if not self.make():
-            raise SystemExit(1)
+            raise SystemExit(2)
 
     def make(self) -> bool:
         """Whether it could be made; every problem is in the log where it could not."""

@@ -135,8 +135,8 @@ class ChildProcess:
             code = 0
         except MemoryError:
             code = OUT_OF_MEMORY
-        except SystemExit:
-            pass  # it has said why
+        except SystemExit as end:  # it has said why
+            code = end.code if isinstance(end.code, int) else 1
         except BaseException:  # noqa: BLE001  the fork must not return into the supervisor's code
             traceback.print_exc()
         finally:
