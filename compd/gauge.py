@@ -82,6 +82,7 @@ class Quality(StrEnum):
     LINE_LOST = "line_lost", "the port is gone; the line is opened again after a pause"
     DRIVER_ERROR = "driver_error", "the driver itself failed: a defect in it, to be reported"
     STALE = "stale", "there was a value, which is too old now"
+    DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
 
 
 class Reading(NamedTuple):
@@ -226,6 +227,28 @@ class GaugeOptions(BaseModel):
         allow_inf_nan=False,
         description="standard deviation of one reading of a length, um; without it the tip's uncertainty is unknown",
     )
+    fastest_mm_per_s: float | None = Field(
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="lengths: the fastest that what is measured moves; a faster reading is not believed",
+    )
+    acceleration_mm_per_s2: float | None = Field(
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="lengths: the largest acceleration of what is measured; a reading that jumped is not believed",
+    )
+    absolute: bool | None = Field(
+        default=None,
+        description="lengths: whether the device shows the same value again after its power was off; false: it counts "
+        "from where it was switched on; left out: what the driver knows of its device",
+    )
+    trust_after_loss: bool = Field(
+        default=False,
+        description="lengths: the device keeps its power and goes on counting while only its cable is out, so that it "
+        "needs no `compd accept` when it comes back",
+    )
 
 
 LineT = TypeVar("LineT", ByteLine, RegisterLine)
@@ -246,6 +269,8 @@ class Gauge(ABC, Generic[LineT]):
     sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver; None where
         they must be given in a file.
     sample_range : lowest and highest value that the gauge can show with these options, in its channels' unit.
+    absolute : whether the device shows the same value again after its power was off (an LVDT, an absolute encoder). One
+        that counts from where it was switched on does not; False also where it is not known.
     usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
     about : what the device speaks and where that was read; "" where the module's docstring says it.
     """
@@ -255,6 +280,7 @@ class Gauge(ABC, Generic[LineT]):
     integrity: ClassVar[Literal["checksum", "format"]] = "format"
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
+    absolute: ClassVar[bool] = False
     usual_line: ClassVar[tuple[int, str] | None] = None
     about: ClassVar[str] = ""
 
@@ -274,6 +300,15 @@ class Gauge(ABC, Generic[LineT]):
         Returns one reading per channel, in their order, each with its own time and quality.
         Raises LineFault where the poll as a whole failed. Any other exception is reported as a defect of the driver.
         """
+
+    @property
+    def reply_identity(self) -> str | None:
+        """What every reply has that those of other gauges on the same line do not have; None where there is nothing.
+
+        On a line with several gauges, of which two have the same identity or one has none, a late reply looks like the
+        answer to the next request. Register lines tell replies apart themselves.
+        """
+        return None
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         """(bytes sent, bytes received) of every exchange that one `read` makes, for planning lines; None = unknown.

@@ -171,7 +171,17 @@ class Configuration:
     @property
     def zero_hash(self) -> str:
         """Hash of what machine zero depends on, geometry, gauges and wiring, but no port, rate, limit or noise."""
-        return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=("noise_um", "noise"))
+        return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=_NOT_IN_ZERO)
+
+
+# What says how far a gauge is believed, and not what it shows.
+_NOT_IN_ZERO = ("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss")
+_LATER_OPTIONS: Mapping[str, Any] = {
+    "fastest_mm_per_s": None,
+    "acceleration_mm_per_s2": None,
+    "absolute": None,
+    "trust_after_loss": False,
+}
 
 
 def load(path: Path) -> Configuration:
@@ -247,6 +257,11 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
     return gauges, drivers
 
 
+def _says(key: str, value: Any) -> bool:
+    """Whether an option says anything: one that a later release has brought, and that is left out, changes no hash."""
+    return key not in _LATER_OPTIONS or value != _LATER_OPTIONS[key]
+
+
 def _line_number(where: str) -> int:
     """The line in "file:line key.path"; 0 where there is none, so that problems of the whole file come first."""
     head = where.split(" ", maxsplit=1)[0].rsplit(":", 1)
@@ -258,7 +273,7 @@ def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[
 
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            value = value.model_dump(mode="json")
+            value = {k: v for k, v in value.model_dump(mode="json").items() if _says(k, v)}
         if isinstance(value, Mapping):
             return {k: plain(v) for k, v in value.items() if k not in without}
         return [plain(v) for v in value] if isinstance(value, list) else value

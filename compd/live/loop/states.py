@@ -43,6 +43,8 @@ class State(StrEnum):
     FADE = "fade", 6, True, 2, _LOST + "the last good set is taken back to zero over `loop.hold_s`"
     STOP = "stop", 7, False, 4, "a gauge is lost without a substitute, the loop makes no setpoints, or the daemon ends"
     REFUSED = "refused", 8, False, 4, "beyond a limit with `on_limit: refuse`, out of reach, or not finite"
+    DEGRADED = "degraded", 9, True, 2, "a correction that `reason` names is absent; `u_tip_um` says what that costs"
+    FAULT = "fault", 10, False, 4, "a gauge is not believed any more; a person looks at it, then `compd accept`"
 
 
 def state_named(name: str) -> State | None:

@@ -8,8 +8,8 @@ from compd.cli.live.watch import state_colour, view
 from compd.live.loop.states import State, state_named
 from docs.generate.states import page
 
-CODES = ["starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused"]
-VALID = {"ok", "slewing", "clamped", "hold", "fade"}
+CODES = ["starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused", "degraded", "fault"]
+VALID = {"ok", "slewing", "clamped", "hold", "fade", "degraded"}
 
 
 def test_names_codes_and_validity_are_part_of_the_protocol_and_do_not_move():
