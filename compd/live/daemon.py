@@ -207,6 +207,7 @@ class Daemon:
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
+                configuration.loop.priority // 4,
             )
             for name, group in groups.items()
             if group

@@ -107,6 +107,11 @@ class LineThread:
         """Start to poll; return at once, whether or not the line can be opened."""
         self._thread.start()
 
+    @property
+    def thread_id(self) -> int | None:
+        """Of the line's thread, as the kernel counts; None before its start."""
+        return self._thread.native_id
+
     def stop(self) -> None:
         """Ask the thread to end, which it does after its current poll."""
         self._stop.set()

@@ -15,6 +15,7 @@ from compd.live.acquisition.acquisition import Acquisition
 from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
 from compd.live.processes.control import Control, Phase
+from compd.live.realtime import LARGEST_SHARE, RationedPriority
 
 _TELL_EVERY_S = 0.1
 # A driver in the middle of a poll may take so long to let go of its line.
@@ -32,14 +33,24 @@ class AcquisitionProcess:
     """
 
     def __init__(
-        self, name: str, make: Callable[[], Acquisition], control: Control, clock: Clock, memory_mb: float
+        self,
+        name: str,
+        make: Callable[[], Acquisition],
+        control: Control,
+        clock: Clock,
+        memory_mb: float,
+        priority: int,
     ) -> None:
-        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB."""
+        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB.
+
+        `priority`: real-time priority of the lines' threads, below the loop's and the service's; 0 for none.
+        """
         self.name = name
         self._make = make
         self._control = control
         self._clock = clock
         self._memory_mb = memory_mb
+        self._priority = priority
         self._status = SharedMessage(_STATUS_BYTES)
 
     @property
@@ -58,11 +69,22 @@ class AcquisitionProcess:
         acquisition = self._make()
         acquisition.start()
         _limit_memory(self._memory_mb)
+        priorities = self._priorities(acquisition)
         never = threading.Event()
         while self._control.phase != Phase.STOPPING:
+            for priority in priorities:
+                priority.look()
             self._status.write(dict(acquisition.status()))
             self._clock.wait(never, _TELL_EVERY_S)
         acquisition.stop(_STOP_WITHIN_S)
+
+    def _priorities(self, acquisition: Acquisition) -> list[RationedPriority]:
+        """Of this thread and of every line's. This one looks after the others, so that a driver which never waits
+        cannot keep its own; together they may take what the service may."""
+        threads = [line.thread_id for line in acquisition.lines.values()]
+        share = LARGEST_SHARE / len(threads) if threads else LARGEST_SHARE
+        own = RationedPriority(self._priority, self._clock)
+        return [own, *(RationedPriority(self._priority, self._clock, thread, share) for thread in threads)]
 
 
 def _limit_memory(memory_mb: float) -> None:
