@@ -86,7 +86,7 @@ def shorten_switch_interval() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
 
-def _thread_time_s(thread_id: int) -> float:
+def thread_time_s(thread_id: int) -> float:
     """Processor time (s) of a thread of this process, by the kernel's id. OSError where there is none.
 
     The clock's id as glibc's pthread_getcpuclockid makes it, which wants a thread that is alive.
@@ -119,7 +119,7 @@ class RationedPriority:
         if now_s < self._next_s or not self._priority:
             return
         try:
-            used_s = time.thread_time() if self._thread_id is None else _thread_time_s(self._thread_id)
+            used_s = time.thread_time() if self._thread_id is None else thread_time_s(self._thread_id)
         except OSError:  # the thread has ended
             self._priority = 0
             return

@@ -22,8 +22,8 @@ from compd.live.acquisition.acquisition import Acquisition
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
 from tests.unit.drivers.test_serial_ascii import gauge
 
-# pyserial's client names its thread in a way that Python has given up, and leaves closing its socket to Python where the
-# server has gone.
+# pyserial's client names its thread in a way that Python has given up, and leaves its socket to the garbage collector
+# where the server has gone.
 pytestmark = pytest.mark.filterwarnings(
     "ignore:setDaemon:DeprecationWarning",
     "ignore:setName:DeprecationWarning",
