@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
-from typing import Annotated, Any, get_args
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from compd.configuration.document import Document, Location
@@ -42,6 +44,47 @@ def validate(kind: Any, document: Document, location: Location, problems: list[P
     except ValidationError as error:
         problems += validation_problems(error, document, location, kind)
         return None
+
+
+def readable(kind: Any, value: Any) -> Any:
+    """`value` as `kind`, or as much of it as can be read, for checks that must not wait until the rest is mended.
+
+    A section with a faulty key becomes a namespace with the same attributes, None for what is missing or cannot be
+    read; of a list or mapping the faulty entries do. None where nothing can be read.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(value)
+    except ValidationError:
+        pass
+    if get_origin(kind) is Annotated:
+        inner = get_args(kind)[0]
+        # of a number or a text nothing is left where its limits do not hold
+        return readable(inner, value) if get_origin(inner) in (tuple, dict, Union, UnionType) else None
+    arguments = get_args(kind)
+    if get_origin(kind) in (Union, UnionType) and isinstance(value, Mapping):
+        kind = next((model for model in _models(kind) if _is_tagged(model, value)), None)
+    if isinstance(kind, type) and issubclass(kind, Section) and isinstance(value, Mapping):
+        return SimpleNamespace(
+            **{name: _readable_field(field, name, value) for name, field in kind.model_fields.items()}
+        )
+    if get_origin(kind) is tuple and isinstance(value, list):
+        kinds = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
+        return tuple(readable(kind, entry) for kind, entry in zip(kinds, value, strict=False))
+    if get_origin(kind) is dict and isinstance(value, Mapping):
+        return {name: readable(arguments[1], entry) for name, entry in value.items()}
+    return None
+
+
+def _readable_field(field: FieldInfo, name: str, section: Mapping[Any, Any]) -> Any:
+    if name not in section:
+        return None if field.is_required() else field.default
+    kind = field.annotation
+    return readable(Annotated[kind, *field.metadata] if field.metadata else kind, section[name])
+
+
+def _is_tagged(model: type[BaseModel], value: Mapping[Any, Any]) -> bool:
+    """Whether the mapping has the tag of this member of a union: `kind: serial`, `on: plate`."""
+    return any(value.get(name) in get_args(field.annotation) for name, field in model.model_fields.items())
 
 
 def validation_problems(error: ValidationError, document: Document, location: Location, kind: Any) -> list[Problem]:
@@ -96,7 +139,10 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
 
 
 def _value_text(value: Any) -> str:
-    return "" if isinstance(value, dict | list) and len(str(value)) > _LONGEST_VALUE else repr(value)
+    text = repr(value)
+    if len(text) <= _LONGEST_VALUE:
+        return text
+    return "" if isinstance(value, dict | list) else f"{text[:_LONGEST_VALUE]} ..."
 
 
 def _location_in_file(document: Document, root: Location, loc: Location) -> Location:
