@@ -345,8 +345,8 @@ def _says(key: str, value: Any) -> bool:
 
 def _line_number(where: str) -> int:
     """The line in "file:line key.path"; 0 where there is none, so that problems of the whole file come first."""
-    head = where.split(" ", maxsplit=1)[0].rsplit(":", 1)
-    return int(head[1]) if len(head) == 2 and head[1].isdigit() else 0
+    found = re.search(r":(\d+)(?: |$)", where)
+    return int(found[1]) if found else 0
 
 
 def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[str, ...] = ()) -> str:

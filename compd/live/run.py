@@ -7,11 +7,12 @@ import sys
 import structlog
 
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, load
+from compd.configuration import Configuration
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
 from compd.live.processes.supervisor import Ending, Supervisor
 from compd.live.systemd import Notifier
+from compd.machine_check import load_whole
 
 _log = structlog.get_logger()
 
@@ -56,7 +57,7 @@ class _Successor:
     def make(self) -> bool:
         """Whether it could be made; every problem is in the log where it could not."""
         try:
-            self.daemon = Daemon(load(self._now.configuration.path), self._now)
+            self.daemon = Daemon(load_whole(self._now.configuration.path), self._now)
         except CompdError as error:
             for problem in error.problems:
                 _log.error("configuration refused", problem=str(problem))
