@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from compd.configuration import Configuration
 from compd.configuration.document import Document, Location
 from compd.configuration.geometry import Geometry
@@ -48,7 +50,8 @@ def examine_whole(path: Path) -> Examined:
     problems = list(examined.problems)
     if examined.geometry is not None and examined.wiring is not None and not _has_problem(problems):
         try:
-            model = build_model(examined.geometry, examined.wiring)
+            with np.errstate(all="ignore"):
+                model = build_model(examined.geometry, examined.wiring)
         except (KinematicsError, ValueError) as error:
             problems += _at_machine_zero(error, document, warnings)
         else:
@@ -78,7 +81,9 @@ def _at_machine_zero(error: Exception, document: Document, warnings: list[Proble
     found = error.problems if isinstance(error, KinematicsError) else (Problem(where="machine zero", what=str(error)),)
     in_metres = [warning for warning in warnings if warning.next_step.startswith(_IN_METRES)]
     for problem in found:
-        location: Location = ("geometry", "base") if problem.where.startswith("frame") else ("geometry", "tool")
+        location: Location = (
+            ("geometry", "plate_points_M_mm") if problem.where.startswith("frame") else ("geometry", "tool")
+        )
         where, value, next_step = document.where(location), "", problem.next_step
         if in_metres:
             where, value = in_metres[0].where, in_metres[0].value

@@ -47,7 +47,9 @@ def problems(sections: Sections) -> list[Problem]:
 def warnings(sections: Sections) -> list[Problem]:
     """What can be used but is probably a mistake or a risk: lines without gauges, gauges without wires, drivers from
     elsewhere in the process of the other lines."""
-    used_lines = {options.line for options in sections.gauges.values()}
+    gauges = sections.document.data.get("gauges")
+    named = gauges.values() if isinstance(gauges, dict) else ()
+    used_lines = {options.get("line") for options in named if isinstance(options, dict)}
     unused = [
         Problem(
             where=sections.document.where(("lines", name)),
@@ -55,9 +57,10 @@ def warnings(sections: Sections) -> list[Problem]:
             next_step="remove it or wire a gauge",
         )
         for name in sections.lines
-        if name not in used_lines
+        if used_lines and name not in used_lines
     ]
     wired_gauges = {channel.split(".")[0] for _, channel, _ in _wires(sections.wiring)}
+    whole = all(_is_whole(sections.wiring, kind, "gauge") for kind in ("scale", "joint", "frame", "quantities"))
     unused += [
         Problem(
             where=sections.document.where(("gauges", name)),
@@ -65,7 +68,7 @@ def warnings(sections: Sections) -> list[Problem]:
             next_step="name it under `wiring:` or remove it",
         )
         for name in sections.gauges
-        if name not in wired_gauges
+        if whole and name not in wired_gauges
     ]
     return [*unused, *_shared_process_warnings(sections)]
 

@@ -27,8 +27,14 @@ class Document:
         """`file:line key.path` of the deepest part of `location` that the file has."""
         for length in range(len(location), -1, -1):
             if location[:length] in self.lines:
-                return f"{self.path}:{self.lines[location[:length]]} {dotted(location)}".rstrip()
-        return f"{self.path} {dotted(location)}".rstrip()
+                return f"{self.path}:{self.lines[location[:length]]} {self._dotted(location)}".rstrip()
+        return f"{self.path} {self._dotted(location)}".rstrip()
+
+    def _dotted(self, location: Location) -> str:
+        """The location in words, in which a number that is a key is no place in a list."""
+        return dotted(
+            tuple(str(part) if isinstance(self.value(location[:i]), dict) else part for i, part in enumerate(location))
+        )
 
     def value(self, location: Location) -> Any:
         """The value at `location`; None where the file has none."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import combinations
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
@@ -122,7 +123,12 @@ def contradictions(geometry: Any) -> list[Contradiction]:
     geometry : a `Geometry`, or what `section.readable` makes of a faulty one.
     """
     base = getattr(geometry, "base", None)
-    return [*_frame_contradictions(base), *_count_contradictions(geometry), *_length_contradictions(geometry)]
+    return [
+        *_frame_contradictions(base),
+        *_point_contradictions(geometry),
+        *_count_contradictions(geometry),
+        *_length_contradictions(geometry),
+    ]
 
 
 def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
@@ -144,6 +150,25 @@ def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
         yield Contradiction((*place, 0), "b1 must lie on +y", str(list(b1)), "[0, y, 0] with y > 0")
     if (b2[0] - b1[0]) * (b3[1] - b1[1]) - (b2[1] - b1[1]) * (b3[0] - b1[0]) <= 0:
         yield Contradiction(place, "(b2-b1) x (b3-b1) must point along +z", next_step="exchange b2 and b3")
+
+
+def _point_contradictions(geometry: Any) -> Iterator[Contradiction]:
+    """Points that are the same, and a plate whose points lie in line."""
+    lists: tuple[tuple[Location, Any], ...] = (
+        (("base", "joints_B_mm"), getattr(getattr(geometry, "base", None), "joints_B_mm", None)),
+        (("platform", "joints_P_mm"), getattr(getattr(geometry, "platform", None), "joints_P_mm", None)),
+        (("plate_points_M_mm",), getattr(geometry, "plate_points_M_mm", None)),
+    )
+    for location, points in lists:
+        known = [(i, point) for i, point in enumerate(points or ()) if point is not None]
+        for (i, one), (k, other) in combinations(known, 2):
+            if math.dist(one, other) < CONVENTION_TOLERANCE_MM:
+                yield Contradiction((*location, k), f"is the same point as entry {i + 1}", str(list(other)))
+    plate = lists[-1][1]
+    if plate is not None and len(plate) == 3 and None not in plate:
+        sides_mm = sorted(math.dist(one, other) for one, other in combinations(plate, 2))
+        if sides_mm[2] > 0 and sides_mm[0] + sides_mm[1] - sides_mm[2] < CONVENTION_TOLERANCE_MM and sides_mm[0] > 0:
+            yield Contradiction(lists[-1][0], "the three points lie on one line", next_step="let them span the plate")
 
 
 def _count_contradictions(geometry: Any) -> Iterator[Contradiction]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
@@ -26,7 +26,7 @@ from compd.configuration.operation import (
     Wiring,
 )
 from compd.configuration.plausible import implausible
-from compd.configuration.section import readable, unknown_key, validate, validation_problems
+from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
@@ -36,8 +36,23 @@ from compd.tables import Columns, data_frame, html_table
 if TYPE_CHECKING:
     import pandas as pd
 
+# Sidecars name any machine so that compd does not know.
+_EXTERNAL = "external"
+
+
+def _own_name(machine: str) -> str:
+    """The name itself; ValueError where a sidecar would mean something else by it."""
+    if machine == _EXTERNAL:
+        raise ValueError("recordings of machines without a configuration have this name: choose another one")
+    return machine
+
+
 SECTIONS: Mapping[str, Any] = {
-    "machine": Annotated[str, Field(description="the machine's name, which recordings and model files repeat")],
+    "machine": Annotated[
+        Text,
+        AfterValidator(_own_name),
+        Field(description="the machine's name, which recordings and model files repeat"),
+    ],
     "geometry": Geometry,
     "lines": Annotated[
         dict[str, LineSettings], Field(description="The lines (ports), by name; each is polled by a thread of its own.")
@@ -306,7 +321,7 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
                 Problem(
                     where=document.where(location),
                     what="needs `driver:`",
-                    value=str(raw),
+                    value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw),
                     next_step="`compd check --drivers` lists them",
                 )
             )

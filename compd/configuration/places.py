@@ -30,6 +30,15 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
                 next_step="choose a name that is not used yet",
             )
         )
+    if state is not None and state.model_file is not None and not os.path.lexists(state.model_file):
+        problems.append(
+            Problem(
+                where=document.where(("state", "model_file")),
+                what="there is no such file",
+                value=state.model_file,
+                next_step="`compd effect add` writes a model file; or leave the key out",
+            )
+        )
     for location, path, *_ in _directories(sockets, state):
         if why := _why_impossible(path):
             problems.append(

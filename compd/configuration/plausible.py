@@ -16,6 +16,7 @@ from compd.gauge import GaugeOptions
 
 # A coordinate below this, with all others of its list, is more likely in metres than of a machine for a watchmaker.
 _SMALLEST_MACHINE_MM = 5.0
+_LARGEST_MACHINE_MM = 1e5
 
 
 class PlausibleRange(NamedTuple):
@@ -123,7 +124,7 @@ def implausible(
         for location, value in _values(values, plausible.key.split("."), ()):
             if (problem := _out_of_range(plausible, location, value, document)) is not None:
                 yield problem
-    yield from _points_in_metres(document, sections)
+    yield from _points_out_of_scale(document, sections)
     yield from _times_that_do_not_fit(document, sections)
 
 
@@ -144,7 +145,7 @@ def _out_of_range(plausible: PlausibleRange, location: Location, value: float, d
     )
 
 
-def _points_in_metres(document: Document, sections: Mapping[str, Any]) -> Iterator[Problem]:
+def _points_out_of_scale(document: Document, sections: Mapping[str, Any]) -> Iterator[Problem]:
     for location in (*_POINTS, *_tool_points(sections)):
         points = [value for _, value in _values(sections, [*map(str, location), "*", "*"], ())]
         points = points or [value for _, value in _values(sections, [*map(str, location), "*"], ())]
@@ -155,6 +156,13 @@ def _points_in_metres(document: Document, sections: Mapping[str, Any]) -> Iterat
                 what="is not plausible: no coordinate is larger than a few millimetres",
                 value=f"at most {largest_mm:g} mm",
                 next_step="in metres? then multiply every number by 1000",
+            )
+        elif largest_mm > _LARGEST_MACHINE_MM:
+            yield Problem(
+                where=document.where(location),
+                what="is not plausible: no machine is a hundred metres large",
+                value=f"{largest_mm:g} mm",
+                next_step="all lengths are in mm",
             )
 
 
@@ -178,6 +186,16 @@ def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> I
             allowed=f"{2 / rate_hz:g} s or more",
             next_step="write five periods or more",
         )
+
+    for name, line in (sections.get("lines") or {}).items():
+        back_off_s = getattr(line, "back_off_s", None)
+        if back_off_s is not None and None not in back_off_s and back_off_s[0] > back_off_s[1]:
+            yield Problem(
+                where=document.where(("lines", name, "back_off_s")),
+                what="is not plausible: the first wait is the longest",
+                value=f"{list(back_off_s)} s",
+                next_step="write the first wait, then the longest",
+            )
 
 
 def _value(sections: Mapping[str, Any], section: str, key: str) -> float | None:
