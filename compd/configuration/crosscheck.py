@@ -49,7 +49,7 @@ def warnings(sections: Sections) -> list[Problem]:
     elsewhere in the process of the other lines."""
     gauges = sections.document.data.get("gauges")
     named = gauges.values() if isinstance(gauges, dict) else ()
-    used_lines = {options.get("line") for options in named if isinstance(options, dict)}
+    used_lines = {str(options.get("line")) for options in named if isinstance(options, dict)}
     unused = [
         Problem(
             where=sections.document.where(("lines", name)),

@@ -134,7 +134,7 @@ def contradictions(geometry: Any) -> list[Contradiction]:
 def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
     """{B} is the frame of its supports: origin at their centroid, z_B their normal, y_B towards b1."""
     supports = getattr(base, "supports_B_mm", None)
-    if supports is None or len(supports) != 3 or None in supports:
+    if supports is None:
         return
     b1, b2, b3 = supports
     place: Location = ("base", "supports_B_mm")
@@ -165,7 +165,7 @@ def _point_contradictions(geometry: Any) -> Iterator[Contradiction]:
             if math.dist(one, other) < CONVENTION_TOLERANCE_MM:
                 yield Contradiction((*location, k), f"is the same point as entry {i + 1}", str(list(other)))
     plate = lists[-1][1]
-    if plate is not None and len(plate) == 3 and None not in plate:
+    if plate is not None:
         sides_mm = sorted(math.dist(one, other) for one, other in combinations(plate, 2))
         if sides_mm[2] > 0 and sides_mm[0] + sides_mm[1] - sides_mm[2] < CONVENTION_TOLERANCE_MM and sides_mm[0] > 0:
             yield Contradiction(lists[-1][0], "the three points lie on one line", next_step="let them span the plate")
@@ -196,7 +196,7 @@ def _count_contradictions(geometry: Any) -> Iterator[Contradiction]:
 
 def _length_contradictions(geometry: Any) -> Iterator[Contradiction]:
     limits = getattr(geometry, "link_length_mm", None)
-    if limits is not None and None not in limits and limits[0] >= limits[1]:
+    if limits is not None and limits[0] >= limits[1]:
         yield Contradiction(
             ("link_length_mm",), "must be the shortest length first, then the longest", str(list(limits))
         )

@@ -189,7 +189,7 @@ def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> I
 
     for name, line in (sections.get("lines") or {}).items():
         back_off_s = getattr(line, "back_off_s", None)
-        if back_off_s is not None and None not in back_off_s and back_off_s[0] > back_off_s[1]:
+        if back_off_s is not None and back_off_s[0] > back_off_s[1]:
             yield Problem(
                 where=document.where(("lines", name, "back_off_s")),
                 what="is not plausible: the first wait is the longest",

@@ -103,9 +103,9 @@ def readable(kind: Any, value: Any) -> Any:
         return SimpleNamespace(
             **{name: _readable_field(field, name, value) for name, field in kind.model_fields.items()}
         )
-    if get_origin(kind) is tuple and isinstance(value, list):
-        kinds = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
-        return tuple(readable(kind, entry) for kind, entry in zip(kinds, value, strict=False))
+    # of a vector nothing is left where a coordinate is wrong, of a list of entries the others are
+    if get_origin(kind) is tuple and isinstance(value, list) and arguments[-1] is Ellipsis:
+        return tuple(readable(arguments[0], entry) for entry in value)
     if get_origin(kind) is dict and isinstance(value, Mapping):
         return {name: readable(arguments[1], entry) for name, entry in value.items()}
     return None

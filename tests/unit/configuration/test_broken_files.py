@@ -269,8 +269,11 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         swap(("timeout_s: 0.2\n", "timeout_s: 0.2\n    back_off_s: [10, 1]\n")),
         [("lines.joints.back_off_s", "first wait is the longest")],
     ),
-    "an open port": (swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")), [("sockets.tcp.host", "become the controller")]),
-}  # fmt: skip
+    "an open port": (
+        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
+        [("sockets.tcp.host", "become the controller")],
+    ),
+}
 
 
 @pytest.mark.parametrize(("edit", "said"), WARNINGS.values(), ids=WARNINGS)
