@@ -103,7 +103,7 @@ class ReadingTrust:
         Parameters
         ----------
         reading : good, and the last answer of the poll.
-        window_s : how long a reply took, s.
+        window_s : by how much the sample may be later than the reading's time, s.
         first : the first answer of a poll that was asked twice, where that is good too.
         """
         memory, i = self._memory, self._i

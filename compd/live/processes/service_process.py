@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
+from compd.live.journal import Journal
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.states import State
 from compd.live.processes.control import Control, Phase
@@ -67,7 +68,8 @@ class ServiceProcess:
 
     def run(self) -> None:
         """Serve until the daemon stops."""
-        relay = LogRelay(self.logs, _write, self.clock)
+        journal = Journal.from_environment()
+        relay = LogRelay(self.logs, _write if journal is None else journal.write, self.clock)
         relay.start()
         self.last_readings.start()
         shorten_switch_interval()
