@@ -22,6 +22,7 @@ from compd.configuration.operation import (
     LoopSettings,
     SocketSettings,
     StateSettings,
+    TargetSettings,
     Wiring,
 )
 from compd.configuration.section import unknown_key, validate, validation_problems
@@ -181,6 +182,9 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "acceleration_mm_per_s2": None,
     "absolute": None,
     "trust_after_loss": False,
+    "allow": [],
+    "token_file": None,
+    "target": TargetSettings().model_dump(mode="json"),
 }
 
 
@@ -211,6 +215,7 @@ def load(path: Path) -> Configuration:
         drivers,
         sections["wiring"],
         sections["acquisition"],
+        sections["sockets"],
     )
     problems += crosscheck.problems(readable)
     if problems:
@@ -273,9 +278,9 @@ def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[
 
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            value = {k: v for k, v in value.model_dump(mode="json").items() if _says(k, v)}
+            value = value.model_dump(mode="json")
         if isinstance(value, Mapping):
-            return {k: plain(v) for k, v in value.items() if k not in without}
+            return {k: plain(v) for k, v in value.items() if k not in without and _says(k, v)}
         return [plain(v) for v in value] if isinstance(value, list) else value
 
     text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)

@@ -38,8 +38,10 @@ from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.requests import Requests, TargetKeys
+from compd.live.service.request import TargetKeys
+from compd.live.service.requests import Requests
 from compd.live.service.status_message import StatusReport
+from compd.live.service.tcp_access import TcpAccess
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
 from compd.release import __version__
@@ -78,6 +80,7 @@ class Daemon:
         # compiles what the loop calls, so that its processes have it from their first cycle
         try_model(pipeline.settings.model, (), str(configuration.path))
         sockets = configuration.sockets
+        access = TcpAccess.of(sockets.tcp)
         packets = UdpSender(sockets.udp) if sockets.udp is not None else None
         try:
             self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
@@ -114,6 +117,10 @@ class Daemon:
         publisher = Publisher(
             self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
         )
+
+        def accept(gauge: str) -> list[str]:
+            return []
+
         zero_capture = ZeroCapture(
             self._wires,
             self.latest,
@@ -121,6 +128,7 @@ class Daemon:
             Path(configuration.state.directory),
             configuration.zero_hash,
             clock,
+            accept,
         )
         model_switch = ModelSwitch(self.control)
         version: dict[str, Any] = {
@@ -157,6 +165,10 @@ class Daemon:
             ReadingsMessage(self._wires, self.latest.channels),
             model_switch.start,
             lambda: adopted.summary,
+            accept,
+            sockets.target,
+            access,
+            clock,
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
         self.service = ServiceProcess(

@@ -35,7 +35,7 @@ def check(
 
     configuration = load(config)
     build_model(configuration.geometry, configuration.wiring)
-    for warning in (*configuration.warnings, *print_line_budgets(configuration)):
+    for warning in (*configuration.warnings, *print_line_budgets(configuration), *socket_warnings(configuration)):
         typer.echo(f"warning: {warning}")
     wiring = configuration.wiring
     own_process = configuration.acquisition.own_process
@@ -46,6 +46,22 @@ def check(
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
     )
+
+
+def socket_warnings(configuration: Configuration) -> list[Problem]:
+    """What on this computer would keep the daemon from listening: the Unix socket's path, the token's file."""
+    from compd.errors import DaemonError
+    from compd.live.service.listeners import unix_path_problem
+    from compd.live.service.tcp_access import TcpAccess
+
+    warnings = []
+    if (problem := unix_path_problem(Path(configuration.sockets.unix.path))) is not None:
+        warnings.append(problem)
+    try:
+        TcpAccess.of(configuration.sockets.tcp)
+    except DaemonError as error:
+        warnings += error.problems
+    return warnings
 
 
 def _list_drivers() -> None:

@@ -37,7 +37,7 @@ def test_what_is_saved_is_what_is_loaded(tmp_path):
         ("", "not JSON"),
         ('{"format": 1, "zero_hash": "abc"', "not JSON"),
         ("[]", "not a machine zero"),
-        ('{"format": 2, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
+        ('{"format": 3, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
         ('{"zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "format: is not a machine zero: Field required"),
         ('{"format": 1, "zero_hash": 7, "taken_at": "", "readings_mm": {}}', "zero_hash: is not a machine zero"),
         (
@@ -134,8 +134,8 @@ class Taking:
             reading = good(self.value_mm(channel, self.reads), self.now_s)
             self.latest.put(self.latest.index[channel], reading if quality is Quality.OK else bad(self.now_s, quality))
 
-    def take(self):
-        self.taker.start(self.answers.append)
+    def take(self, replace=False):
+        self.taker.start(replace, self.answers.append)
         self.taker._job.join()
         return json.loads(self.answers[-1])
 
