@@ -49,9 +49,13 @@ class Peer:
         self.socket.settimeout(TIMEOUT_S)
         self.socket.connect(address)
         self.file = self.socket.makefile("rb")
-        self.version = self.read()
-        if token is not None:
-            self.version = self.ask({"class": "AUTH", "token": token})
+        try:
+            self.version = self.read()
+            if token is not None:
+                self.version = self.ask({"class": "AUTH", "token": token})
+        except AssertionError:
+            self.close()
+            raise
 
     def send(self, message):
         self.socket.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
@@ -121,7 +125,7 @@ class Service:
         self.publisher = Publisher(
             self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, self.clock, [self.observed.append]
         )
-        requests = Requests(
+        self.requests = Requests(
             VERSION,
             target_keys,
             self.commands,
@@ -134,7 +138,7 @@ class Service:
             clock=self.clock,
         )
         self.stopping = threading.Event()
-        self.thread = threading.Thread(target=self.run, args=(requests,))
+        self.thread = threading.Thread(target=self.run, args=(self.requests,))
         self.thread.start()
         self.peers = []
 

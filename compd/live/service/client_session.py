@@ -6,6 +6,7 @@ import math
 import socket
 import struct
 from collections import deque
+from contextlib import suppress
 from enum import Enum, auto
 
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
@@ -15,6 +16,7 @@ MAX_BEHIND_BYTES = 128 * 1024
 # About 1500 READINGS: 1.5 s at 1 kHz. A recorder needs all of them, however late, and runs on this computer.
 MAX_READINGS_BEHIND_BYTES = 8 * 1024 * 1024
 _RECEIVE_BYTES = 4096
+_LAST_RECEIVE_BYTES = 64 * 1024
 _LONGEST_INTERVAL_S = 1e6
 # struct ucred of unix(7): process, user, group.
 _CREDENTIALS = struct.Struct("3i")
@@ -110,6 +112,11 @@ class ClientSession:
                 self._lines.append(_too_long())
 
     @property
+    def is_heard(self) -> bool:
+        """Whether its requests are answered: it has not been dismissed."""
+        return self.dismissed_s == math.inf
+
+    @property
     def has_lines(self) -> bool:
         """Whether whole lines wait. As long as they do, nothing more should be received: the client has to wait."""
         return bool(self._lines)
@@ -144,6 +151,8 @@ class ClientSession:
     def close(self) -> None:
         """Close the connection."""
         self.open = False
+        with suppress(OSError):  # with data that nobody has read the system would reset it, and the last line be lost
+            self.connection.recv(_LAST_RECEIVE_BYTES)
         self.connection.close()
 
 

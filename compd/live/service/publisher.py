@@ -34,6 +34,8 @@ from compd.live.service.seats import WRONG_TOKEN_REST_S, prepare_tcp, seat_lost,
 _LOOK_EVERY_S = 0.25
 # The requests of all clients but the controller take at most a third of the time.
 _REST_PER_TURN = 2.0
+# The process may have been suspended in a turn.
+_LONGEST_REST_S = 0.05
 
 _log = structlog.get_logger()
 
@@ -167,8 +169,8 @@ class Publisher:
             self._send(session, reply)
         if others and turns:
             now_s = self._clock.monotonic()
-            self._next_turn_s = now_s + _REST_PER_TURN * (now_s - start_s)
-        self._waiting = [session for session in self._waiting if session.open and session.has_lines]
+            self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _LONGEST_REST_S)
+        self._waiting = [session for session in self._waiting if session.open and session.is_heard and session.has_lines]
         for session in turns:
             self._update_events(session)
         if turns:
@@ -180,10 +182,10 @@ class Publisher:
                 raise received
             return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
-            if not session.authorized and session.dismissed_s == math.inf:
+            if not session.authorized and session.is_heard:
                 _log.warning("a client has not shown the token", client=session.name, what=error.text)
                 session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
-            return b"" if session.dismissed_s < math.inf else error.to_json()
+            return error.to_json() if session.is_heard else b""
 
     def _look_at_seats(self) -> None:
         """Close the connections of clients that have lost their place."""
@@ -275,7 +277,7 @@ class Publisher:
         connection = session.connection
         registered = connection in self._selector.get_map()
         events = selectors.EVENT_WRITE if session.has_unsent else 0
-        if not session.has_lines and session.dismissed_s == math.inf:
+        if not session.has_lines and session.is_heard:
             events |= selectors.EVENT_READ
         if registered and (not session.open or not events):
             self._selector.unregister(connection)

@@ -166,3 +166,15 @@ def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(service):
     ((_, answer),) = service.zeros
     threading.Thread(target=answer, args=(line({"class": "ZERO", "taken_at": "now"}),)).start()
     assert peer.read() == {"class": "ZERO", "taken_at": "now"}
+
+
+def test_gauges_are_accepted_over_the_unix_socket_alone(service):
+    assert service.tcp().ask({"class": "ACCEPT", "gauge": "all"})["code"] == "unix_only"
+    peer = service.unix()
+    assert peer.ask({"class": "ACCEPT", "gauge": "scale_1"}) == {"class": "ACCEPT", "gauges": ["scale_1.position"]}
+    assert peer.ask({"class": "ACCEPT", "gauge": "all"}) == {"class": "ACCEPT", "gauges": ["joints.1", "joints.2"]}
+    assert peer.ask({"class": "ACCEPT", "gauge": "all"}) == {"class": "ACCEPT", "gauges": []}
+    unknown = peer.ask({"class": "ACCEPT", "gauge": "scale_9"})
+    assert (unknown["code"], unknown["text"]) == ("bad_message", "no gauge scale_9; there are ")
+    for gauge in ({}, {"gauge": ""}, {"gauge": 1}):
+        assert peer.ask({"class": "ACCEPT", **gauge})["code"] == "bad_message"

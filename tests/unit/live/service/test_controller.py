@@ -49,3 +49,53 @@ def test_a_hexapod_and_a_tool_on_the_plate_take_their_own_targets(tmp_path):
         peer.send({"class": "TARGET", "tip_P_mm": [1, 2, 3]})
         peer.ask({"class": "STATUS"})
         assert plate.commands.target is not None
+
+
+TARGET = {"class": "TARGET", "tip_B0_mm": [1, 2, 3]}
+
+
+def test_a_target_may_be_used_for_a_time_and_a_repeated_one_for_longer(tmp_path):
+    with closing(Service(tmp_path, target={"valid_for_s": 0.5})) as service:
+        controller = service.tcp()
+        controller.send(TARGET)
+        controller.ask({"class": "STATUS"})
+        first_s = service.commands.target.valid_until_s
+        assert 0 < first_s - service.clock.monotonic() <= 0.5
+        service.pass_time(10)
+        controller.send(TARGET)
+        controller.ask({"class": "STATUS"})
+        assert service.commands.target.valid_until_s >= first_s + 10, "the same target, sent again"
+        service.pass_time(3600)
+        assert controller.ask({"class": "STATUS"})
+        assert service.commands.target is not None, "a target that is too old does not end the role: not silently cmm"
+
+
+def test_the_role_is_taken_over_the_unix_socket_and_not_taken_back(service):
+    controller, owner = service.tcp(), service.unix()
+    controller.send(TARGET)
+    controller.ask({"class": "STATUS"})
+    assert owner.ask({"class": "RELEASE"}) == {"class": "RELEASE"}
+    assert service.commands.target is None
+    answer = controller.ask(TARGET)
+    assert answer["code"] == "role_taken"
+    assert "connect again" in answer["text"]
+    assert service.commands.target is None
+    owner.send(TARGET)
+    owner.ask({"class": "STATUS"})
+    assert service.commands.target is not None
+    assert owner.ask({"class": "RELEASE"}) == {"class": "RELEASE"}
+    assert owner.ask({"class": "RELEASE"})["code"] == "not_controller", "nobody has it"
+    again = service.tcp()
+    again.send(TARGET)
+    again.ask({"class": "STATUS"})
+    assert service.commands.target is not None, "a new connection may"
+
+
+def test_targets_may_be_for_the_unix_socket_alone(tmp_path):
+    with closing(Service(tmp_path, target={"unix_only": True})) as service:
+        answer = service.tcp().ask(TARGET)
+        assert (answer["code"], service.commands.target) == ("unix_only", None)
+        owner = service.unix()
+        owner.send(TARGET)
+        owner.ask({"class": "STATUS"})
+        assert service.commands.target is not None
