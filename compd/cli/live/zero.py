@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,6 +12,8 @@ from compd.units import UM_PER_MM
 
 # The daemon looks at the gauges for a second; a slow disk may take as long again.
 _TIMEOUT_S = 15.0
+# Gauges whose difference is printed; the others differ less.
+_SHOWN = 9
 
 
 def zero(
@@ -41,12 +43,12 @@ def zero(
     typer.echo(f"kept in {answer['path']}")
 
 
-def changes_text(changed_mm: Mapping[str, Any]) -> str:
-    """By how much each gauge differs from the machine zero before: channel -> mm, the largest first, two to a line."""
+def changes_text(changed_mm: Mapping[str, float]) -> str:
+    """By how much the gauges differ from the machine zero before: channel -> mm, the largest ones first."""
     largest = sorted(changed_mm, key=lambda channel: -abs(changed_mm[channel]))
     width = max(map(len, largest), default=0)
-    cells = [f"{channel:<{width}} {changed_mm[channel] * UM_PER_MM:+11.2f} um" for channel in largest]
-    rows = ["   ".join(cells[i : i + 2]) for i in range(0, len(cells), 2)]
-    return "\n".join(
-        ["against the zero before, which is kept as machine-zero.json.old:", *(f"  {row}" for row in rows)]
-    )
+    lines = ["against the zero before, which is kept as machine-zero.json.old:"]
+    lines += [f"  {channel:<{width}} {changed_mm[channel] * UM_PER_MM:+11.2f} um" for channel in largest[:_SHOWN]]
+    if others := largest[_SHOWN:]:
+        lines.append(f"  and {len(others)} others, up to {abs(changed_mm[others[0]]) * UM_PER_MM:.2f} um")
+    return "\n".join(lines)

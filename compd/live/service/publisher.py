@@ -170,7 +170,9 @@ class Publisher:
         if others and turns:
             now_s = self._clock.monotonic()
             self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _LONGEST_REST_S)
-        self._waiting = [session for session in self._waiting if session.open and session.is_heard and session.has_lines]
+        self._waiting = [
+            session for session in self._waiting if session.open and session.is_heard and session.has_lines
+        ]
         for session in turns:
             self._update_events(session)
         if turns:
