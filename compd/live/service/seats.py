@@ -19,7 +19,7 @@ AUTH_WITHIN_S = 5.0
 WRONG_TOKEN_REST_S = 1.0
 
 # A peer whose computer or cable is gone is noticed after about 10 s, tcp(7).
-_KEEPALIVE = {
+KEEPALIVE = {
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE): 1,
     (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE): 4,  # s without a word, then a probe
     (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL): 2,  # s between two probes
@@ -31,7 +31,7 @@ _KEEPALIVE = {
 def prepare_tcp(connection: socket.socket) -> None:
     """Send without delay, and notice a peer that has gone without a word."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    for (level, option), value in _KEEPALIVE.items():
+    for (level, option), value in KEEPALIVE.items():
         connection.setsockopt(level, option, value)
 
 
