@@ -19,7 +19,8 @@ from compd.live.service import seats
 from tests.support.service import Service
 
 TOKEN = "hvNhV6l3Zk3lY0cJ4lV5Wg"
-HOST, CLIENT = "10.231.77.1", "10.231.77.2"
+# A network of its own for each process that runs these tests.
+HOST, CLIENT = (f"10.231.{os.getpid() % 256}.{number}" for number in (1, 2))
 TIMEOUT_S = 30
 
 CONTROLLER = """
