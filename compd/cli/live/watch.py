@@ -43,12 +43,13 @@ def watch(
 ) -> None:
     """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
     token = None if token_file is None else token_file.read_text(encoding="utf-8")
-    with connect(unix_address(address), token=token) as client:
+    address = unix_address(address)
+    with connect(address, token=token) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)
             else:
-                _show(client, rate_hz, count)
+                _show(client, rate_hz, count, same_clock="/" in address)
         except KeyboardInterrupt:
             return
 
@@ -69,11 +70,13 @@ class NewestSetpoint:
     A setpoint is shown no longer than its `valid_until`: whatever has stopped, what looks alive is alive.
     """
 
-    def __init__(self, client: Client, rate_hz: float, clock: Clock) -> None:
-        """`rate_hz`: at which the picture is to change; setpoints are read more often, so that a silence shows."""
+    def __init__(self, client: Client, rate_hz: float, clock: Clock, same_clock: bool) -> None:
+        """`rate_hz`: at which the picture is to change; setpoints are read more often, so that a silence shows.
+        `same_clock`: whether `clock` is the daemon's, on its own computer."""
         self._client = client
         self._rate_hz = max(rate_hz, _LEAST_RATE_HZ)
         self._clock = clock
+        self._same_clock = same_clock
         self._change = threading.Condition()
         self._setpoint: dict[str, Any] | None = None
         self._status: dict[str, Any] = {}
@@ -116,18 +119,20 @@ class NewestSetpoint:
                     asked_s = setpoint["time_s"]
                 rate_hz = min(self._rate_hz, status["loop"]["rate_hz"])
                 lasts_s = max(setpoint["valid_until"] - setpoint["time_s"], _PERIODS / rate_hz)
+                expires_s = self._clock.monotonic() + lasts_s
+                if self._same_clock and setpoint["valid"]:  # it may have waited: this program was suspended
+                    expires_s = min(expires_s, setpoint["valid_until"])
                 with self._change:
-                    self._setpoint, self._status = setpoint, status
-                    self._expires_s = self._clock.monotonic() + lasts_s
+                    self._setpoint, self._status, self._expires_s = setpoint, status, expires_s
         except CompdError as error:
             with self._change:
                 self._error, self._expires_s = error, min(self._expires_s, self._clock.monotonic())
                 self._change.notify_all()
 
 
-def _show(client: Client, rate_hz: float, count: int) -> None:
+def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
     clock = MonotonicClock()
-    newest = NewestSetpoint(client, rate_hz, clock)
+    newest = NewestSetpoint(client, rate_hz, clock, same_clock)
     shown, due_s = 0, clock.monotonic()
     with Live(console=Console(), auto_refresh=False) as live:
         try:

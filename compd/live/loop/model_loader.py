@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -54,6 +55,8 @@ class ModelText(NamedTuple):
         """
         try:
             real = path.resolve(strict=True)
+            if not real.is_file():
+                raise OSError(errno.EINVAL, "it is not a regular file")
             problem = trust_problem(real, str(path), "model", own_users() | {user})
         except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
             raise _unreadable(path, error) from error

@@ -15,8 +15,8 @@ from compd.errors import DaemonError, Problem
 STATUS = {"time_s": 0.0, "loop": {"rate_hz": 200, "missed_cycles": 0}, "gauges": []}
 SETPOINT = {
     "seq": 7,
-    "time_s": 0.5,
-    "valid_until": 0.6,
+    "time_s": 100.0,
+    "valid_until": 100.1,
     "valid": True,
     "state": "ok",
     "reason": "",
@@ -47,10 +47,10 @@ class Daemon:
         raise DaemonError(Problem(where="here", what="the daemon is gone"))
 
 
-@pytest.fixture
-def shown():
+@pytest.fixture(params=[False, True], ids=["other computer", "same computer"])
+def shown(request):
     daemon, clock = Daemon(), SimpleNamespace(monotonic=lambda: clock.now_s, now_s=100.0)
-    newest = NewestSetpoint(daemon, 10.0, clock)
+    newest = NewestSetpoint(daemon, 10.0, clock, request.param)
     assert daemon.sent.wait(TIMEOUT_S)
 
     def text():
