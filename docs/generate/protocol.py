@@ -69,8 +69,8 @@ socket does, or its connection ends. The mode then returns to `{Mode.CMM}`.
 **Wait your turn.** The daemon answers one request of each client in turn, the controller's first, and sends setpoints
 before them: who asks without end waits for the answers, and delays nobody else's setpoints.
 
-**Show the token first** where one is [configured](#configuration-sockets-tcp): a TCP client is then greeted by `AUTH` in
-place of `VERSION`.
+**Show the token first** where one is [configured](#configuration-sockets-tcp): a TCP client is then greeted by `AUTH`
+in place of `VERSION`.
 
 **Answers come in the order of the questions**, except `ZERO`, `MODEL` with a file, and setpoints, which come when they
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
