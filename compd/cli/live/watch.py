@@ -12,13 +12,15 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compd.cli.options import unix_address
-from compd.client import DEFAULT_ADDRESS, Client, connect
+from compd.cli.waiting import connect_patiently
+from compd.client import DEFAULT_ADDRESS, Client
 from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
 _STATUS_EVERY_S = 1.0
+# Setpoints come many times a second; a daemon that says nothing for so long is gone.
+_TIMEOUT_S = 5.0
 
 
 def watch(
@@ -30,7 +32,7 @@ def watch(
     json_lines: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one per line.")] = False,
 ) -> None:
     """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
-    with connect(unix_address(address)) as client:
+    with connect_patiently(address, _TIMEOUT_S) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)
