@@ -28,7 +28,7 @@ from compd.report.diagnosis_evidence import (
     without_gain,
 )
 from compd.report.page_table import PageTable
-from compd.report.terminal_table import name_column_width
+from compd.report.terminal_table import keep_words_whole
 
 # Findings that are listed; --json has them all.
 SHOWN = 8
@@ -134,12 +134,10 @@ def _print_pairs(console: Console, pairs: Iterable[Sequence[str]]) -> None:
 
 
 def _print_planned_rows(console: Console, table: PageTable) -> None:
-    """A purpose only in the first of its rows; no number is cut."""
+    """A purpose only in the first of its rows."""
     shown = Table(*table.head, box=SIMPLE_HEAD)
-    for column, name, texts in zip(shown.columns, table.head, zip(*table.rows, strict=True), strict=True):
-        if name != PURPOSE_COLUMN:
-            column.justify = "right"
-            column.width = max(map(len, [*name.split(), *texts]))
+    for column, name in zip(shown.columns, table.head, strict=True):
+        column.justify = "left" if name == PURPOSE_COLUMN else "right"
     last = ""
     for row in table.rows:
         cells = dict(zip(table.head, row, strict=True))
@@ -148,15 +146,13 @@ def _print_planned_rows(console: Console, table: PageTable) -> None:
             cells[PURPOSE_COLUMN] = ""
         last = purpose
         shown.add_row(*map(Text, cells.values()))
-    console.print(shown)
+    console.print(keep_words_whole(shown, console.width))
 
 
 def _print_table(console: Console, table: PageTable) -> None:
     shown = Table(*table.head)
     for column, is_numeric in zip(shown.columns, table.numeric, strict=True):
         column.justify = "right" if is_numeric else "left"
-    # an id is to be copied whole; a sentence leaves room for the other columns
-    shown.columns[0].width = name_column_width([row[0] for row in table.rows])
     for row in table.rows:
         shown.add_row(*(Text(cell) for cell in row))
-    console.print(shown)
+    console.print(keep_words_whole(shown, console.width))

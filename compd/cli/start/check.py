@@ -55,6 +55,7 @@ def _list_drivers() -> None:
     from compd.plugins import GAUGES, load, names
 
     table = Table("driver", "needs a line that carries", "what it is")
+    table.columns[0].no_wrap = True
     for name in names(GAUGES):
         driver = load(GAUGES, name, name)
         table.add_row(name, driver.line_kind, (driver.__doc__ or "").strip().splitlines()[0])
@@ -67,6 +68,7 @@ def print_line_budgets(configuration: Configuration) -> list[Problem]:
     from rich.table import Table
 
     from compd.commissioning.line_budget import budget_warnings, line_budgets
+    from compd.report.terminal_table import keep_words_whole
 
     budgets = line_budgets(configuration)
     table = Table(
@@ -93,7 +95,8 @@ def print_line_budgets(configuration: Configuration) -> list[Problem]:
             f"{budget.usual_s * 1e3:.1f}" if budget.known else "?",
             _rates(budget.usual_hz, budget.ideal_hz),
         )
-    Console().print(table)
+    console = Console()
+    console.print(keep_words_whole(table, console.width))
     return budget_warnings(configuration, budgets)
 
 
