@@ -43,13 +43,13 @@ def wait_for_file(path: Path, clock: Clock | None = None) -> None:
     wait_until(path.exists, f"{path} is not there yet", clock)
 
 
-def connect_patiently(address: str, timeout_s: float, clock: Clock | None = None) -> Client:
+def connect_patiently(address: str, connect: Callable[[str], Client], clock: Clock | None = None) -> Client:
     """A connection to the daemon, which may be about to start.
 
-    address : host:port, Unix socket, or the configuration that names one. Raises DaemonError, ConfigurationError.
+    address : host:port, Unix socket, or the configuration that names one.  connect : as `compd.client.connect`.
+    Raises DaemonError, ConfigurationError.
     """
     from compd.cli.options import unix_address
-    from compd.client import connect
 
     if address.endswith((".yaml", ".yml")):
         wait_for_file(Path(address), clock)
@@ -58,7 +58,7 @@ def connect_patiently(address: str, timeout_s: float, clock: Clock | None = None
 
     def is_there() -> bool:
         try:
-            clients.append(connect(path, timeout_s))
+            clients.append(connect(path))
         except DaemonError as error:
             if not isinstance(error.__cause__, _NOT_YET):
                 raise
@@ -66,7 +66,7 @@ def connect_patiently(address: str, timeout_s: float, clock: Clock | None = None
 
     if wait_until(is_there, f"{path}: no daemon answers yet", clock):
         return clients[0]
-    return connect(path, timeout_s)
+    return connect(path)
 
 
 def wait_for_gauges(client: Client, clock: Clock | None = None) -> None:

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compd.cli.waiting import connect_patiently
-from compd.client import DEFAULT_ADDRESS, Client
+from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
 
@@ -23,8 +23,6 @@ _LEAST_FULL_BAR_MM = 1e-3
 # Sources of the correction in the table of the links; every other is an effect, with a row of its own.
 _OWN_COLUMN = ("joints", "frame")
 _STATUS_EVERY_S = 1.0
-# Setpoints come many times a second; a daemon that says nothing for so long is gone.
-_TIMEOUT_S = 5.0
 
 
 def watch(
@@ -36,7 +34,7 @@ def watch(
     json_lines: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one per line.")] = False,
 ) -> None:
     """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
-    with connect_patiently(address, _TIMEOUT_S) as client:
+    with connect_patiently(address, connect) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)

@@ -22,8 +22,9 @@ def zero(
     A daemon that is about to start, and gauges that have no value yet, are waited for, for half a minute.
     """
     from compd.cli.waiting import connect_patiently, wait_for_gauges
+    from compd.client import connect
 
-    with connect_patiently(address, _TIMEOUT_S) as client:
+    with connect_patiently(address, lambda path: connect(path, _TIMEOUT_S)) as client:
         wait_for_gauges(client)
         answer = client.zero()
     typer.echo(f"machine zero taken at {answer['taken_at']} from {len(answer['readings_mm'])} gauges")

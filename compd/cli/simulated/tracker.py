@@ -29,6 +29,7 @@ def tracker(
 
     from compd.cli.progress import ElapsedShown
     from compd.cli.waiting import connect_patiently
+    from compd.client import connect
     from compd.clock import MonotonicClock
     from compd.errors import CompdError, Problem
     from compd.simulation.wires.control_client import ControlClient
@@ -42,7 +43,7 @@ def tracker(
     apart_mm, at_rest = [], 0
     with (
         ControlClient(simulation / "control.sock") as machine,
-        connect_patiently(str(simulation / "compd.sock"), _ANSWER_TIMEOUT_S) as daemon,
+        connect_patiently(str(simulation / "compd.sock"), lambda path: connect(path, _ANSWER_TIMEOUT_S)) as daemon,
         ElapsedShown(seconds, MonotonicClock()) as shown,
     ):
         typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")

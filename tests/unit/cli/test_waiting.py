@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from compd.cli.waiting import PATIENCE_S, connect_patiently, wait_for_file, wait_for_gauges
+from compd.client import connect
 from compd.errors import ConfigurationError, DaemonError
 from compd.live.service.messages import line
 
@@ -40,14 +41,14 @@ def test_a_file_that_comes_is_waited_for_and_one_that_is_there_is_not(tmp_path, 
 def test_after_its_patience_the_usual_error_comes(tmp_path, capsys):
     clock = Turned()
     with pytest.raises(DaemonError, match="no daemon answers: No such file or directory"):
-        connect_patiently(str(tmp_path / "s"), 1.0, clock)
+        connect_patiently(str(tmp_path / "s"), connect, clock)
     assert PATIENCE_S <= clock.now_s < PATIENCE_S + 1
     assert capsys.readouterr().err.count("no daemon answers yet: waiting up to 30 s") == 1
 
 
 def test_a_configuration_that_never_comes_is_the_usual_error_too(tmp_path):
     with pytest.raises(ConfigurationError):
-        connect_patiently(str(tmp_path / "m.yaml"), 1.0, Turned())
+        connect_patiently(str(tmp_path / "m.yaml"), connect, Turned())
 
 
 def test_a_daemon_that_starts_meanwhile_is_connected_to(tmp_path):
@@ -67,7 +68,7 @@ def test_a_daemon_that_starts_meanwhile_is_connected_to(tmp_path):
             listener.listen()
             threading.Thread(target=greet).start()
 
-    with listener, connect_patiently(str(path), 10.0, Turned(start)) as client:
+    with listener, connect_patiently(str(path), connect, Turned(start)) as client:
         assert client.version["protocol"] == 1
 
 

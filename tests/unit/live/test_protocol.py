@@ -190,6 +190,8 @@ BAD = [
     (b'"WATCH"\n', "bad_json"),
     (DEEP + b"\n", "bad_json"),
     (b'{"class":"WATCH","rate_hz":NaN}\n', "bad_json"),
+    (b'{"class":"WATCH","rate_hz":1,"rate_hz":200}\n', "bad_json"),
+    (b'{"class":"STATUS","class":"VERSION"}\n', "bad_json"),
     (b'{"class":"WATCH","rate_hz":' + b"9" * 4000 + b"}\n", "bad_message"),
     (b'{"class":"WATCH","rate_hz":1e999}\n', "bad_message"),
     (b'{"class":"WATCH","rate_hz":-1}\n', "bad_message"),
