@@ -232,6 +232,12 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(service, message, code):
     assert service.commands.target is None
 
 
+def test_an_empty_line_is_ignored(service):
+    peer = service.tcp()
+    peer.send(b"\n  \n")
+    assert peer.ask({"class": "VERSION"}) == VERSION
+
+
 @pytest.mark.parametrize(
     ("message", "text"),
     [
