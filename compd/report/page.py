@@ -75,8 +75,8 @@ def write_page(
     """Write the page to `path`; all texts are escaped. Its footer ends with the date and the release of compd.
 
     verdict : a sentence or two, or lines.
-    shared_script : plotly's script (4.8 MB) is inside a page with figures, which is then a single file. True writes it to
-    SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
+    shared_script : plotly's script (4.8 MB) is inside a page with figures, which is then a single file. True writes it
+    to SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
     """
     has_figure = any(isinstance(panel.content, Figure) for panel in panels)
     if shared_script:
