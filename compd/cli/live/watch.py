@@ -85,7 +85,13 @@ class NewestSetpoint:
         self._status: dict[str, Any] = {}
         self._expires_s = math.inf
         self._error: CompdError | None = None
-        threading.Thread(target=self._follow, name="watch", daemon=True).start()
+        self._thread = threading.Thread(target=self._follow, name="watch", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Follow no more; the client can be closed then."""
+        self._client.interrupt()
+        self._thread.join()
 
     def picture(self) -> RenderableType | None:
         """What is true now; None before the first setpoint."""
@@ -151,6 +157,8 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
             if (picture := newest.picture()) is not None:
                 live.update(picture, refresh=True)  # no number stays on the screen
             raise
+        finally:
+            newest.stop()
     if not console.is_terminal:
         console.print()  # `Live` leaves the last line open
 
