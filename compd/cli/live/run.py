@@ -17,11 +17,11 @@ def run(config: Annotated[Path, typer.Argument(help="The machine's configuration
     A configuration that is not there yet is waited for, for half a minute: `compd simulate` may be about to write it.
     """
     with loading():
-        from compd.configuration import load
         from compd.live.run import run as run_daemon
+        from compd.machine_check import load_whole
 
         wait_for_file(config)
-        configuration = load(config)
+        configuration = load_whole(config)
     failed = run_daemon(configuration)
     if failed:
         raise typer.Exit(1)
