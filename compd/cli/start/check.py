@@ -202,6 +202,7 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     from rich.table import Table
 
     from compd.commissioning.feigned_jumps import named_together
+    from compd.report.terminal_table import keep_words_whole
 
     title = "Largest jump that is believed"
     table = Table("gauge", "measures", "ms to the next reading", "jump, um", title=title, title_justify="left")
@@ -210,9 +211,9 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     for jump in jumps:
         poll = "?" if math.isnan(jump.poll_s) else f"{jump.poll_s * 1e3:.1f}"
         size = "any" if math.isinf(jump.jump_mm) else "?" if math.isnan(jump.jump_mm) else f"{jump.jump_mm * 1e3:.3g}"
-        noise = " + 6 x noise" if math.isnan(jump.noise_um) and math.isfinite(jump.jump_mm) else ""
-        table.add_row(jump.gauge, named_together(jump.measures), poll, size + noise)
-    Console().print(table)
+        table.add_row(jump.gauge, named_together(jump.measures), poll, size)
+    console = Console()
+    console.print(keep_words_whole(table, console.width))
 
 
 def _rates(usual_hz: float, ideal_hz: float) -> str:
