@@ -23,7 +23,8 @@ class _LineSettings(Section):
 
 class _SerialSettings(_LineSettings):
     port: str = Field(
-        min_length=1, description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port)"
+        min_length=1,
+        description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port, rfc2217://host:port)",
     )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")

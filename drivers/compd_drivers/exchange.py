@@ -30,7 +30,8 @@ class ExchangeOptions(WithoutChecksumOptions):
         default=None, description="between two bytes of a reply; the line's own, for the whole reply, if left out"
     )
     extra_input: Literal["error", "ignore"] = Field(
-        default="error", description="bytes behind a reply: a fault, or nothing to do with it"
+        default="error",
+        description="bytes behind a reply: a fault, or nothing to do with it (a gauge alone on its line)",
     )
 
 
