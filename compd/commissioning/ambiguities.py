@@ -96,7 +96,7 @@ def _of_a_number(column: Sequence[ReplyPart], unit: str, decimals: int | None) -
             start,
             f"has {places} decimals of {unit}: are the last ones a checksum or a status?",
             texts[:3],
-            f"--decimals {places} if the display shows so many; --decimals {places - 2} if two digits are not its",
+            f"--decimals {places} if the display shows so many; --decimals {places - 2} where two are no part of it",
         )
     whole = [text.partition(".")[0] for text in texts]
     alike = "".join(
