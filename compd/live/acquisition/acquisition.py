@@ -271,8 +271,8 @@ class LineThread:
         elif not self._order.guarded and not absent:
             line.drain()
         gauge.fail(quality, detail, failed_s)
-        if self._order.guarded and len(self.gauges) == 1 and gauge.failures == 1:
-            gauge.resume()  # asked again at once: nobody else is on the line, and a late reply will be noticed
+        if len(self.gauges) == 1 and gauge.failures == 1:
+            gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed or has had its time
 
 
 class Acquisition:
