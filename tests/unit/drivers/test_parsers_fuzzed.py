@@ -91,12 +91,7 @@ def check(make: Callable[[], Any], reply: bytes, values: Callable[[bytes], list[
             assert reading.value == pytest.approx(wanted, rel=1e-9, abs=1e-12)
 
 
-ND28X = [
-    b"+     12.345     \r\n",
-    b"-      0.001  A\r\n"[:15] + b"A\r\n",
-    b'+    1.23456"  \r\n',
-    b"+     12.345 ?  \r\n",
-]
+ND28X = [b"+    12.345    \r\n", b"-     0.001   A\r\n", b'+   1.23456 "  \r\n', b"+    12.345 ?  \r\n"]
 
 
 nd28x = driver("heidenhain_nd28x")
@@ -285,3 +280,21 @@ def test_modbus_frames(reply: bytes) -> None:
         return [whole * 1e-4, real if plausible else None]
 
     check(registers, reply, values)
+
+
+@pytest.mark.parametrize(
+    ("make", "reply"),
+    [
+        (nd28x, ND28X[0]),
+        (dlrs1a, DLRS1A[0]),
+        (dlen1, DLEN1[0]),
+        (c1202, b"1 +0012.3 um;2 ERR6;3 -0001.5 um = <\r"),
+        (described_ascii, ASCII[0]),
+        (described_frame, FRAME[0]),
+        (registers, RTU[0]),
+    ],
+)
+def test_what_is_mutated_is_a_reply_with_numbers(make: Callable[[], Any], reply: bytes) -> None:
+    readings = outcome(make(), reply)
+    assert not isinstance(readings, LineFault)
+    assert readings[0].ok
