@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -21,6 +22,8 @@ from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
 from compd.errors import CompdError, Problem
+from compd.output_file import check_replaceable
+from compd.release import __version__
 from compd.report.page_table import PageTable
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
@@ -33,6 +36,9 @@ _PLOTLY_CONFIG = {
     "showSendToCloud": False,
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
 }
+
+# In the head of every page: its generator; in those of releases before 0.6 the style of their text.
+_PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
 
 # Name of plotly's script where pages share it.
 SHARED_SCRIPT = "plotly.min.js"
@@ -59,23 +65,28 @@ class Panel:
     content: Figure | PageTable | PageText
 
 
-def check_page_path(path: Path) -> None:
-    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it."""
+def check_page_path(path: Path, overwrite: bool | None = None) -> None:
+    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it.
+
+    overwrite : whether to write over a file that is no page of compd; another page is replaced in any case.
+    """
     if not path.parent.is_dir():
         raise CompdError(
             Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
         )
+    check_replaceable(path, _PAGE_MARKS, "a page of compd", overwrite)
 
 
 def write_page(
     path: Path, title: str, verdict: str | PageText, panels: Sequence[Panel], footer: str, shared_script: bool = False
 ) -> None:
-    """Write the page to `path`; all texts are escaped.
+    """Write the page to `path`; all texts are escaped. Its footer ends with the date and the release of compd.
 
     verdict : a sentence or two, or lines.
-    shared_script : plotly's script (4.8 MB) is inside the page, which is then a single file. True writes it to
-    SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
+    shared_script : plotly's script (4.8 MB) is inside a page with figures, which is then a single file. True writes it
+    to SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
     """
+    has_figure = any(isinstance(panel.content, Figure) for panel in panels)
     if shared_script:
         path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
@@ -92,9 +103,9 @@ def write_page(
             }
             for number, panel in enumerate(panels)
         ],
-        footer=footer,
-        shared_script=SHARED_SCRIPT if shared_script else "",
-        plotly_script="" if shared_script else get_plotlyjs(),
+        footer=f"{footer} Written on {datetime.now(UTC):%Y-%m-%d} by compd {__version__}.".strip(),
+        shared_script=SHARED_SCRIPT if shared_script and has_figure else "",
+        plotly_script=get_plotlyjs() if has_figure and not shared_script else "",
     )
     path.write_text(page, encoding="utf-8")
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.options import OverwriteOption
 from compd.units import UM_PER_MM
 
 _ANSWER_TIMEOUT_S = 15.0
@@ -20,6 +21,7 @@ def tracker(
     out: Annotated[Path, typer.Option(help="The export, a CSV for `compd join`.")],
     seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
     rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Measurements per second.")] = 20.0,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
 
@@ -27,23 +29,30 @@ def tracker(
     """
     import numpy as np
 
+    from compd.cli.progress import ElapsedShown
+    from compd.cli.waiting import connect_patiently
     from compd.client import connect
+    from compd.clock import MonotonicClock
     from compd.errors import CompdError, Problem
+    from compd.output_file import check_replaceable
     from compd.simulation.wires.control_client import ControlClient
 
     if not out.parent.is_dir():
         raise CompdError(
             Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
         )
+    check_replaceable(out, (), "an export", overwrite)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    looks, apart_mm, at_rest = [], [], 0
+    looks: list[list[float]] = []
+    apart_mm, at_rest = [], 0
     with (
         ControlClient(simulation / "control.sock") as machine,
-        connect(simulation / "compd.sock", _ANSWER_TIMEOUT_S) as daemon,
+        connect_patiently(str(simulation / "compd.sock"), lambda path: connect(path, _ANSWER_TIMEOUT_S)) as daemon,
+        ElapsedShown(seconds, MonotonicClock()) as shown,
     ):
         typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")
         try:
-            for setpoint in daemon.watch(rate_hz):
+            for setpoint in shown.show(daemon.watch(rate_hz), lambda: f"{len(looks)} looks"):
                 seen = machine.ask("MEASURE")
                 looks.append([seen["monotonic_s"], *seen["reference_mm"]])
                 at_rest = 0 if seen["moving"] else at_rest + 1

@@ -22,12 +22,14 @@ from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
 from compd.lines.stream import shown
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
 
 log = structlog.get_logger()
 
+_NO_TRUST: Mapping[str, ReadingTrust] = {}
 # Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
 # take the interpreter from the other lines, and a processor from everybody.
 FASTEST_ROUND_S = 2e-3
@@ -78,10 +80,12 @@ class LineThread:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
         """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel".
 
-        `stale_after_s`: by gauge, age (s) from which its readings are not used.
+        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: judges the readings of each
+        length channel that is wired, by "gauge.channel".
         """
         self.name = name
         self.state = "opening"
@@ -90,7 +94,8 @@ class LineThread:
         self.lost = 0
         self.round_s = math.nan
         self.gauges = [
-            PolledGauge(gauge, driver, latest, settings.timeout_s, stale_after_s[gauge]) for gauge, driver in gauges
+            PolledGauge(gauge, driver, latest, settings.timeout_s, stale_after_s[gauge], clock, trust)
+            for gauge, driver in gauges
         ]
         self._settings = settings
         self._clock = clock
@@ -285,13 +290,14 @@ class Acquisition:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
         """`lines`: settings of each line and its gauges as (name, driver), by name of the line.
 
-        `stale_after_s`: by gauge, age (s) from which its readings are not used.
+        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: see `LineThread`.
         """
         self.lines = {
-            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener)
+            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener, trust)
             for name, (settings, gauges) in lines.items()
         }
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import structlog
 
+from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
+from compd.live.acquisition.gauge_trust import GaugeTrust
+from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.memory.latest import LONGEST_DETAIL, Latest
 
 log = structlog.get_logger()
 
+_NO_TRUST: Mapping[str, ReadingTrust] = {}
 # Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
 MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # A gauge on a line that is open rests at most so long, s: what a fault has cost is known again within a second.
@@ -55,8 +59,18 @@ class PolledGauge:
     reported : whether an exception of its driver is in the log already.
     """
 
-    def __init__(self, name: str, driver: Gauge[Any], latest: Latest, timeout_s: float, stale_after_s: float) -> None:
-        """`timeout_s`: of the line; `stale_after_s`: age (s) from which a reading is not used."""
+    def __init__(
+        self,
+        name: str,
+        driver: Gauge[Any],
+        latest: Latest,
+        timeout_s: float,
+        stale_after_s: float,
+        clock: Clock,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+    ) -> None:
+        """`timeout_s`: of the line; `stale_after_s`: age (s) from which a reading is not used; `trust`: judges the
+        readings of each length channel that is wired, by "gauge.channel"."""
         self.name = name
         self.driver = driver
         self.polls = 0
@@ -73,13 +87,15 @@ class PolledGauge:
         self._back_off = BackOff(min(timeout_s, LONGEST_REST_S), LONGEST_REST_S)
         self._stale_after_s = stale_after_s
         self._latest = latest
-        self._slots = [latest.index[f"{name}.{channel.name}"] for channel in driver.channels]
+        channels = [f"{name}.{channel.name}" for channel in driver.channels]
+        self._slots = [latest.index[channel] for channel in channels]
+        self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
         self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
         self._logged = Quality.NEVER_READ
 
     def read(self, line: Any) -> Sequence[Reading]:
-        """Poll the device. Raises LineFault, and whatever the driver raises."""
-        return self.driver.read(line)
+        """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises."""
+        return self._trust.read(lambda: self.driver.read(line))
 
     def put(self, readings: Sequence[Reading], now_s: float) -> None:
         """Publish the readings of one poll, one per channel in order, and count the poll.
@@ -88,16 +104,15 @@ class PolledGauge:
         """
         if len(readings) != len(self._slots):
             raise ValueError(f"{len(readings)} readings for {len(self._slots)} channels")
-        faulty = None
         for reading in readings:
             if not reading.time_s <= now_s + AHEAD_S:
                 raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
-            if reading.quality is not Quality.OK:
-                faulty = reading
-            elif not math.isfinite(reading.value):
+            if reading.ok and not math.isfinite(reading.value):
                 raise ValueError(f"{reading.value} given as ok")
+        readings = self._trust.judge(readings, now_s)
+        faulty = next((reading for reading in reversed(readings) if not reading.ok), None)
         for place, reading in enumerate(readings):
-            self._publish(place, reading)
+            self._publish_unless_kept(place, reading, now_s)
         self.polls += 1
         if faulty is None:
             self.ok += 1
@@ -119,12 +134,9 @@ class PolledGauge:
         """
         self.polls += 1
         self.faults[quality] += 1
-        kept = 0
-        for place, reading in enumerate(self._published):
-            if quality in MAY_PASS and reading.ok and now_s - reading.time_s <= self._stale_after_s:
-                kept += 1
-            else:
-                self._publish(place, bad(now_s, quality, detail))
+        self._trust.fail(quality, now_s)
+        published = bad(now_s, quality, detail)
+        kept = sum(self._publish_unless_kept(place, published, now_s) for place in range(len(self._slots)))
         self._note(quality, detail)
         if not kept:
             self._log_change()
@@ -134,6 +146,7 @@ class PolledGauge:
 
     def lose(self, quality: Quality, detail: str, now_s: float) -> None:
         """Give every channel `quality`, without a poll: the line is lost."""
+        self._trust.fail(quality, now_s)
         self.faults[quality] += 1
         for place in range(len(self._slots)):
             self._publish(place, bad(now_s, quality, detail))
@@ -143,6 +156,14 @@ class PolledGauge:
     def resume(self) -> None:
         """End a rest, since the line has been opened anew."""
         self.rests_until_s = -math.inf
+
+    def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
+        """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
+        last = self._published[place]
+        if reading.quality in MAY_PASS and last.ok and now_s - last.time_s <= self._stale_after_s:
+            return True
+        self._publish(place, reading)
+        return False
 
     def _publish(self, place: int, reading: Reading) -> None:
         self._published[place] = reading

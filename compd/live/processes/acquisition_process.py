@@ -12,12 +12,12 @@ from typing import Any
 
 from compd.clock import Clock
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition.votes.votes import LOOK_EVERY_S
 from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
 from compd.live.processes.control import Control, Phase
 from compd.live.realtime import LARGEST_SHARE, RationedPriority
 
-_TELL_EVERY_S = 0.1
 # A driver in the middle of a poll may take so long to let go of its line.
 _STOP_WITHIN_S = 0.5
 # Processor time of a line that polls as fast as it goes, with a margin: 115200 baud takes 0.04 (benchmarks/).
@@ -42,16 +42,19 @@ class AcquisitionProcess:
         clock: Clock,
         memory_mb: float,
         priority: int,
+        look: Callable[[float], None] = lambda now_s: None,
     ) -> None:
         """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB.
 
-        `priority`: real-time priority of the lines' threads, below the loop's and the service's; 0 for none.
+        `priority`: real-time priority of the lines' threads, below the loop's and the service's; 0 for none. `look`:
+        called with the time (s) every `LOOK_EVERY_S`, for the votes of the gauges.
         """
         self.name = name
         self._make = make
         self._control = control
         self._clock = clock
         self._memory_mb = memory_mb
+        self._look = look
         self._priority = priority
         self._status = SharedMessage(_STATUS_BYTES)
 
@@ -77,7 +80,8 @@ class AcquisitionProcess:
             for priority in priorities:
                 priority.look()
             self._status.write(dict(acquisition.status()))
-            self._clock.wait(never, _TELL_EVERY_S)
+            self._look(self._clock.monotonic())
+            self._clock.wait(never, LOOK_EVERY_S)
         acquisition.stop(_STOP_WITHIN_S)
 
     def _priorities(self, acquisition: Acquisition) -> list[RationedPriority]:
