@@ -26,15 +26,12 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.errors import Problem, StateError
-from compd.files import read_small_file, write_files
+from compd.configuration.yaml_reader import decode, parse_yaml, read_text
+from compd.errors import ConfigurationError, Problem, StateError
+from compd.files import write_files
 from compd.release import __version__
 
 FORMAT = 2
-# A model of a hundred effects has 100 KB.
-LARGEST_FILE_BYTES = 1_000_000
-# The file itself has 6 levels; a formula's declaration a few more.
-_DEEPEST = 20
 Kind = Literal["add", "remove", "fit", "undo"]
 # An effect's id, /absolute/file.py:NAME, or a formula written out.
 Declaration: TypeAlias = str | dict[str, Any]
@@ -145,13 +142,12 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
     """
     where = str(path)
     try:
-        data = yaml.load(_content(path, content).decode(), Loader=_Loader)
-    except OSError as error:
-        raise StateError(
-            Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise StateError(Problem(where=where, what="is not YAML", value=_first_line(error))) from error
+        text = (
+            read_text(path, "a model file; `compd effect add` writes one") if content is None else decode(content, path)
+        )
+        data, _ = parse_yaml(text, path, dumped=True)
+    except ConfigurationError as error:
+        raise StateError(error.problems) from error
     if not isinstance(data, dict):
         raise StateError(
             Problem(
@@ -178,35 +174,6 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
         raise StateError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
     return document, StoredModel(document.machine, state, tuple(document.steps), document.geometry)
-
-
-def _content(path: Path, content: bytes | None) -> bytes:
-    return read_small_file(path, LARGEST_FILE_BYTES) if content is None else content
-
-
-def _first_line(error: Exception) -> str:
-    """The error in one line, with its place."""
-    problem, mark = getattr(error, "problem", None), getattr(error, "problem_mark", None)
-    if problem and mark:
-        return f"line {mark.line + 1}: {problem}"
-    return str(error).splitlines()[0]
-
-
-class _Loader(yaml.SafeLoader):
-    """Reads what a model file has, and nothing that would take memory or time without bound."""
-
-    _depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.MarkedYAMLError(problem="aliases (*name) are not used in a model file", problem_mark=mark)
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise yaml.MarkedYAMLError(problem=f"is nested deeper than {_DEEPEST} levels", problem_mark=mark)
-        node: yaml.Node | None = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
 
 
 def _problem(detail: ErrorDetails, where: str) -> Problem:

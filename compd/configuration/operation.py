@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from compd.configuration.section import Positive, Section, refusal
+from compd.configuration.section import AbsolutePath, Positive, Section, Text, refusal
 
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
@@ -78,9 +78,10 @@ class LoopSettings(Section):
 
     rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)] = Field(description="cycles per second")
     stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
-    on_stale: Literal["hold", "fade", "stop"] = Field(
+    on_stale: Literal["hold", "fade", "degrade", "stop"] = Field(
         description="hold: compute with the last good comparators for hold_s, then stop; fade: let them count less and "
-        "less over hold_s, then stop; stop: invalid at once"
+        "less over hold_s, then stop; degrade: let joints, frame or effects alone fade, then go on without them; stop: "
+        "invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
     priority: Annotated[int, Field(ge=1, le=98)] = Field(
@@ -113,6 +114,44 @@ class LimitSettings(Section):
     )
 
 
+class FrameVote(Section):
+    """Frame comparators against a thermometer of the frame."""
+
+    temperature: str = Field(description="name of the quantity, under `wiring: quantities:`")
+    expansion_ppm_per_K: Annotated[float, Field(gt=-50, lt=50, allow_inf_nan=False)] = Field(
+        description="growth of the frame against the comparators' rods, 1e-6 per kelvin: steel on Super-Invar 11"
+    )
+    tolerance_um: Positive = Field(description="how far a distance may be from what the temperature says, um")
+
+
+class VoteSettings(Section):
+    """What the gauges say of each other; the section may be left out. A gauge that others contradict is not believed
+    until a person accepts it."""
+
+    repeated_digits: bool = Field(
+        default=True,
+        description="a length gauge that repeats the very same digits while others scatter is stuck; for gauges whose "
+        "`noise_um` is larger than their resolution",
+    )
+    standing_scale_mm: Positive | None = Field(
+        default=2.0,
+        description="a scale that stands while all others move by this much is stuck; null: not looked at",
+    )
+    following_mm: Positive | None = Field(
+        default=None,
+        description="machine-tool mode: a scale that is further from the setpoint for 1 s does not follow; left out: "
+        "not looked at",
+    )
+    joint_pair_um: Positive | None = Field(
+        default=None,
+        description="the two ball shanks of one revolute joint (Ra, Rb) differ by no more, um; left out: not looked at",
+    )
+    tip_mm_per_s: Positive | None = Field(
+        default=None, description="CMM mode: the tip never moves faster; left out: not looked at"
+    )
+    frame: FrameVote | None = Field(default=None, description="frame comparators against a thermometer")
+
+
 class TcpSocket(Section):
     """Clients over TCP."""
 
@@ -128,9 +167,8 @@ class TcpSocket(Section):
         description="addresses and networks (10.1.2.0/24) from which clients may connect; left out: every address that "
         "reaches the port",
     )
-    token_file: str | None = Field(
+    token_file: AbsolutePath | None = Field(
         default=None,
-        pattern=r"^/",
         description="absolute path of a file, of mode 600, with a secret of 16 characters or more that every TCP "
         "client sends in its first line, `AUTH`; left out: none",
     )
@@ -170,13 +208,13 @@ class TcpSocket(Section):
 class UnixSocket(Section):
     """Clients on this computer; machine zero is taken here only."""
 
-    path: str = Field(pattern=r"^/", max_length=100, description="absolute path of the Unix socket")
+    path: AbsolutePath = Field(max_length=100, description="absolute path of the Unix socket")
 
 
 class UdpTarget(Section):
     """Where the binary SETPOINT goes, one packet per cycle."""
 
-    host: str = Field(description="name or address of the controller")
+    host: Text = Field(description="name or address of the controller")
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="UDP port of the controller")
 
 
@@ -206,7 +244,7 @@ class SocketSettings(Section):
 class StateSettings(Section):
     """What the daemon keeps across restarts, and what it starts with."""
 
-    directory: str = Field(pattern=r"^/", description="absolute path of the directory in which machine zero is kept")
-    model_file: str | None = Field(
-        default=None, pattern=r"^/", description="absolute path of the model file to start with; without: no effects"
+    directory: AbsolutePath = Field(description="absolute path of the directory in which machine zero is kept")
+    model_file: AbsolutePath | None = Field(
+        default=None, description="absolute path of the model file to start with; without: no effects"
     )
