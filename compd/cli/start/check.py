@@ -58,9 +58,9 @@ def check(
         return
     warnings = [
         *configuration.warnings,
+        *token_warnings(configuration),
         *print_lines(configuration),
         *_print_cycle(configuration),
-        *socket_warnings(configuration),
     ]
     print_problems(warnings, "warning: ", sys.stdout)
     wiring = configuration.wiring
@@ -131,20 +131,16 @@ def _print_cycle(configuration: Configuration) -> list[Problem]:
     return cycle_warnings(configuration, cycle)
 
 
-def socket_warnings(configuration: Configuration) -> list[Problem]:
-    """What on this computer would keep the daemon from listening: the Unix socket's path, the token's file."""
+def token_warnings(configuration: Configuration) -> list[Problem]:
+    """What would keep the daemon from using the token's file; run by another user, check may not be able to read it."""
     from compd.errors import DaemonError
-    from compd.live.service.listeners import unix_path_problem
     from compd.live.service.tcp_access import TcpAccess
 
-    warnings = []
-    if (problem := unix_path_problem(Path(configuration.sockets.unix.path))) is not None:
-        warnings.append(problem)
     try:
         TcpAccess.of(configuration.sockets.tcp)
     except DaemonError as error:
-        warnings += error.problems
-    return warnings
+        return list(error.problems)
+    return []
 
 
 def _list_drivers() -> None:

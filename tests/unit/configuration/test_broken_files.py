@@ -270,8 +270,8 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         [("lines.joints.back_off_s", "first wait is the longest")],
     ),
     "an open port": (
-        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
-        [("sockets.tcp.host", "become the controller")],
+        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, allow: [10.0.0.0/8], token_file: /etc/compd/token, port")),
+        [("sockets.tcp.host", "OPEN TO THE NETWORK")],
     ),
 }
 
