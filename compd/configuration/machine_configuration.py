@@ -23,6 +23,7 @@ from compd.configuration.operation import (
     LoopSettings,
     SocketSettings,
     StateSettings,
+    VoteSettings,
     Wiring,
 )
 from compd.configuration.plausible import implausible
@@ -60,12 +61,13 @@ SECTIONS: Mapping[str, Any] = {
     "wiring": Wiring,
     "loop": LoopSettings,
     "acquisition": AcquisitionSettings,
+    "votes": VoteSettings,
     "limits": LimitSettings,
     "sockets": SocketSettings,
     "state": StateSettings,
 }
 # What stands for a section that the file does not have.
-OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings()}
+OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,6 +100,8 @@ class Configuration:
         What the daemon keeps across restarts.
     acquisition : AcquisitionSettings
         Which lines are polled in processes of their own.
+    votes : VoteSettings
+        What the gauges say of each other.
     warnings : tuple of Problem
         What can be used but is probably a mistake or a risk.
     document : Document or None
@@ -116,6 +120,7 @@ class Configuration:
     sockets: SocketSettings
     state: StateSettings
     acquisition: AcquisitionSettings = OPTIONAL_SECTIONS["acquisition"]
+    votes: VoteSettings = OPTIONAL_SECTIONS["votes"]
     warnings: tuple[Problem, ...] = ()
     document: Document | None = field(default=None, compare=False)
 
@@ -206,6 +211,24 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "acceleration_mm_per_s2": None,
     "absolute": None,
     "trust_after_loss": False,
+}
+
+
+# Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
+_FORMER_SPEED_LIMITS: Mapping[str, float] = {
+    "heidenhain_nd28x": 200.0,
+    **dict.fromkeys(
+        (
+            "keyence_gt2_dlrs1a",
+            "keyence_dlen1",
+            "mahr_c1202",
+            "serial_ascii",
+            "serial_frame",
+            "sylvac_optors",
+            "tesa_tt80",
+        ),
+        0.5,
+    ),
 }
 
 
@@ -353,9 +376,12 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
     return None
 
 
-def _says(key: str, value: Any) -> bool:
-    """Whether an option says anything: one that a later release has brought, and that is left out, changes no hash."""
-    return key not in _LATER_OPTIONS or value != _LATER_OPTIONS[key]
+def _said(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
+    said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
+        said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
+    return said
 
 
 def _line_number(where: str) -> int:
@@ -369,7 +395,7 @@ def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[
 
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            value = {k: v for k, v in value.model_dump(mode="json").items() if _says(k, v)}
+            value = _said(value.model_dump(mode="json"))
         if isinstance(value, Mapping):
             return {k: plain(v) for k, v in value.items() if k not in without}
         return [plain(v) for v in value] if isinstance(value, list) else value

@@ -11,6 +11,7 @@ Readings, setpoints and commands pass through shared memory, and nobody waits fo
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,17 +22,22 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition.votes.votes import Votes
+from compd.live.length_trust import length_memory, length_trust, wired_lengths
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.shared_ring import SharedRing
+from compd.live.memory.trust_memory import TrustMemory
 from compd.live.pipeline import build_pipeline
 from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import LoopProcess
 from compd.live.processes.service_process import ServiceProcess, StateLog
+from compd.live.service.last_readings import LastReadings
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import PROTOCOL
@@ -42,6 +48,7 @@ from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
+from compd.model.machine import MachineModel
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -52,7 +59,7 @@ class Daemon:
 
     Attributes
     ----------
-    configuration, latest, commands, setpoints, control : as their names say.
+    configuration, latest, trust, commands, setpoints, control : as their names say.
     loop_process, acquisition, service : what each process does.
     period_s : of the loop.
     """
@@ -105,7 +112,8 @@ class Daemon:
             self.control,
             clock,
         )
-        self.acquisition = self._acquisition(gauges, clock)
+        self.trust = self._trust(before)
+        self.acquisition = self._acquisition(gauges, self._votes(pipeline.settings.model), clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
         observers = [StateLog(self.control).note]
@@ -122,6 +130,9 @@ class Daemon:
             configuration.zero_hash,
             clock,
         )
+        last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
+        if before is None or before.trust is not self.trust:
+            last_readings.recall()
         model_switch = ModelSwitch(self.control)
         version: dict[str, Any] = {
             "class": "VERSION",
@@ -163,6 +174,7 @@ class Daemon:
             publisher,
             requests,
             zero_capture,
+            last_readings,
             model_switch,
             packets,
             self.control,
@@ -187,26 +199,67 @@ class Daemon:
         self.loop_process.cycles.close()
         self.control.close()
 
-    def _acquisition(self, gauges: dict[str, Any], clock: Clock) -> list[AcquisitionProcess]:
-        """One process for all lines but those that have one of their own."""
+    def _acquisition(self, gauges: dict[str, Any], votes: Votes, clock: Clock) -> list[AcquisitionProcess]:
+        """One process for all lines but those that have one of their own; the first one looks at the votes."""
         configuration = self.configuration
+        trust = length_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
         lines = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
         }
+        stale_after_s = {
+            name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s
+            for name, options in configuration.gauges.items()
+        }
         groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
+        groups = {name: group for name, group in groups.items() if group}
+        first = next(iter(groups))
         return [
             AcquisitionProcess(
                 name,
-                partial(Acquisition, {line: lines[line] for line in group}, self.latest, clock),
+                partial(
+                    Acquisition, {line: lines[line] for line in group}, stale_after_s, self.latest, clock, trust=trust
+                ),
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
+                configuration.loop.priority // 4,
+                *([votes.look] if name == first else []),
             )
             for name, group in groups.items()
-            if group
         ]
+
+    def _votes(self, model: MachineModel) -> Votes:
+        """What the gauges say of each other."""
+        configuration = self.configuration
+
+        def zero_mm() -> Mapping[str, float] | None:
+            zero = self.commands.zero
+            return zero.readings_mm if isinstance(zero, MachineZero) else None
+
+        def setpoint_line() -> bytes | None:
+            count = self.setpoints.count
+            content = self.setpoints.get(count - 1) if count else None
+            return None if content is None else SentSetpoint.unpack(content).line
+
+        return Votes(
+            configuration.votes,
+            self.trust,
+            wired_lengths(configuration, self._wires, model),
+            self._wires.quantity_channels,
+            self.latest,
+            zero_mm,
+            setpoint_line,
+        )
+
+    def _trust(self, before: Daemon | None) -> TrustMemory:
+        """What is known of the length gauges: that of the daemon whose place this one takes, where it has the same."""
+        memory = length_memory(self.configuration, self._wires)
+        if before is not None and before.configuration.zero_hash == self.configuration.zero_hash:
+            before.trust.tolerance_mm[:] = memory.tolerance_mm
+            return before.trust
+        return memory
 
     def _lines_status(self) -> dict[str, Any]:
         """Every line's part of STATUS, by its name."""
