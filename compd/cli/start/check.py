@@ -76,7 +76,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of
+    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
 
     console = Console()
     figures = figures_of(configuration)
@@ -90,7 +90,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     for spot in BLIND_SPOTS:
         console.print(Text(spot.fault[0].upper() + spot.fault[1:], style="bold"))
         for name, text in (
-            ("shown by", spot.shown_by or "nothing"),
+            ("shown by", shown_by(spot, configuration)),
             ("unseen", spot.unseen),
             ("cost", spot.cost(figures)),
         ):
@@ -185,8 +185,7 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     for jump in jumps:
         poll = "?" if math.isnan(jump.poll_s) else f"{jump.poll_s * 1e3:.1f}"
         size = "any" if math.isinf(jump.jump_mm) else "?" if math.isnan(jump.jump_mm) else f"{jump.jump_mm * 1e3:.3g}"
-        noise = " + 6 x noise" if math.isnan(jump.noise_um) and math.isfinite(jump.jump_mm) else ""
-        table.add_row(jump.gauge, named_together(jump.measures), poll, size + noise)
+        table.add_row(jump.gauge, named_together(jump.measures), poll, size)
     Console().print(table)
 
 
