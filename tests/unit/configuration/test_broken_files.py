@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from compd.configuration.machine_configuration import Examined
-from compd.errors import ConfigurationError
+from compd.errors import ConfigurationError, Problem, StateError
 from compd.machine_check import examine_whole, load_whole
+from compd.model_document import read_stored
+from compd.recording.sidecar import read_sidecar
 from tests.support.paths import CONFIG
 
 TRIPOD = (CONFIG / "tripod-cmm.yaml").read_text()
@@ -353,3 +355,18 @@ def test_run_reads_the_configuration_by_the_same_code(tmp_path: Path) -> None:
         load_whole(tmp_path / "machine.yaml")
     assert list(caught.value.problems) == found.problems
     assert len(found.problems) == 2
+
+
+@pytest.mark.parametrize(("content", "line", "words"), UNREADABLE.values(), ids=UNREADABLE)
+def test_model_files_and_sidecars_are_read_by_the_same_code(
+    tmp_path: Path, content: bytes, line: int, words: str
+) -> None:
+    path = tmp_path / "run.yaml"
+    path.write_bytes(content)
+    with pytest.raises(StateError) as caught:
+        read_stored(path)
+    problems: list[Problem] = []
+    assert read_sidecar(path, problems) is None
+    for (problem,) in (caught.value.problems, problems):
+        assert problem.where.startswith(f"{path}:{line}")
+        assert words in str(problem)
