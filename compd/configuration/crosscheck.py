@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from compd.configuration.document import Document, Location
-from compd.configuration.operation import FRAME_DISTANCES
+from compd.configuration.operation import FRAME_DISTANCES, TcpSocket
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
 
@@ -32,6 +32,7 @@ class Sections:
     wiring: Any
     acquisition: Any = None
     votes: Any = None
+    sockets: Any = None
 
 
 def problems(sections: Sections) -> list[Problem]:
@@ -72,7 +73,12 @@ def warnings(sections: Sections) -> list[Problem]:
         for name in sections.gauges
         if whole and name not in wired_gauges
     ]
-    return [*unused, *_vote_warnings(sections), *_shared_process_warnings(sections)]
+    return [
+        *unused,
+        *_vote_warnings(sections),
+        *_shared_process_warnings(sections),
+        *_open_port_warnings(sections),
+    ]
 
 
 def resolve_channel(
@@ -205,6 +211,20 @@ def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
                 value=options.driver,
                 next_step=f"write `{options.line}` under `acquisition: own_process:`",
             )
+
+
+def _open_port_warnings(sections: Sections) -> Iterator[Problem]:
+    """A TCP port that other computers can reach."""
+    tcp = getattr(sections.sockets, "tcp", None)
+    if isinstance(tcp, TcpSocket) and tcp.is_open:
+        yield Problem(
+            where=sections.document.where(("sockets", "tcp", "host")),
+            what="OPEN TO THE NETWORK: other computers can watch and, with the token, move this machine; nothing "
+            "on the way is encrypted, the token neither",
+            value=f"{tcp.host}, allowed from {', '.join(tcp.allow)}",
+            next_step="let compd listen on 127.0.0.1 and a proxy with TLS on the network, or keep this network to the "
+            "machine; `target: {unix_only: true}` under `sockets:` lets other computers only watch",
+        )
 
 
 def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:

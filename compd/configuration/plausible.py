@@ -62,6 +62,11 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "a controller may go on so long with the last setpoint of a daemon that has died",
     ),
     PlausibleRange(
+        "sockets.target.valid_for_s", 0.05, 60, "s",
+        "a controller would have to send its target many times a second",
+        "a controller that hangs keeps the machine at its last target so long",
+    ),
+    PlausibleRange(
         "lines.*.timeout_s", 0.005, 5, "s",
         "devices take 1 to 100 ms to answer: good replies would come too late",
         "one lost reply keeps all gauges of the line waiting so long",

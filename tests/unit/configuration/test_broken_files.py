@@ -207,6 +207,10 @@ PROBLEMS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         swap(("{link: 3, gauge: scale_3}", "{link: 3, gauge: scale_1}")),
         [("wiring.scale[3].gauge", "wired already")],
     ),
+    "an open port without a list of who may connect": (
+        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
+        [("sockets.tcp", "allow and token_file are missing")],
+    ),
     "a machine called external": (swap(("machine: tripod-cmm", "machine: external")), [("machine", "another one")]),
     "a machine without a name": (swap(("machine: tripod-cmm", 'machine: ""')), [("machine", "must not be empty")]),
     "a name with a colour": (swap(("machine: tripod-cmm", 'machine: "\\e[31m"')), [("machine", "printable")]),
@@ -270,10 +274,6 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
     "waits in the wrong order": (
         swap(("timeout_s: 0.2\n", "timeout_s: 0.2\n    back_off_s: [10, 1]\n")),
         [("lines.joints.back_off_s", "first wait is the longest")],
-    ),
-    "an open port": (
-        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
-        [("sockets.tcp.host", "become the controller")],
     ),
 }
 
