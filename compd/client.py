@@ -33,6 +33,7 @@ Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 from collections import deque
@@ -330,6 +331,11 @@ class Client:
         """Close the connection; a controller's role ends with it."""
         self._lines.close()
         self._connection.close()
+
+    def interrupt(self) -> None:
+        """End what another thread waits for: it gets a DaemonError. Nothing more can be asked."""
+        with contextlib.suppress(OSError):
+            self._connection.shutdown(socket.SHUT_RDWR)
 
     def __enter__(self) -> Self:
         return self
