@@ -7,7 +7,7 @@ import json
 from datetime import UTC, datetime
 from pathlib import Path
 
-from tests.injection.cases import MATRIX
+from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import settle, try_case
 from tests.support.simulated import run_directory

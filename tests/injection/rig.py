@@ -178,7 +178,7 @@ class InjectedMachine:
         self._attacks = running.enter_context(ExitStack())
         self._tcp = (LOOPBACK, _free_port())
         self.daemon = Daemon(self._write_configuration())
-        running.callback(lambda: self.daemon.stop())
+        running.callback(self.daemon.stop)
         self.daemon.__enter__()
         with self.daemon.connected() as client, self.daemon.connected() as observer:
             wait_for_gauges(observer, client.watch(10))

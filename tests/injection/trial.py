@@ -11,7 +11,8 @@ from typing import Any
 from compd.client import Client
 from compd.errors import DaemonError
 from compd.live.loop.states import State
-from tests.injection.cases import REST_MM, Case, Way
+from tests.injection.beginnings import REST_MM
+from tests.injection.case import Case, Way
 from tests.injection.rig import InjectedMachine, Verdict
 from tests.support.watching import Seen, Watcher
 
@@ -84,7 +85,7 @@ def try_case(machine: InjectedMachine, case: Case) -> Outcome:
         case.begin(machine)
         _watch_fault(machine, case, outcome, watcher, start, start_s)
         during = watcher.seen[start:]
-        end, end_s = watcher.now, time.monotonic()
+        end_s = time.monotonic()
         machine.repair()
         if not case.lost:
             _leave(machine, case, outcome, watcher, end_s)
@@ -101,7 +102,6 @@ def try_case(machine: InjectedMachine, case: Case) -> Outcome:
     elif ended:
         outcome.problems.append(f"the connection ended: {ended}")
     _judge(machine, case, outcome, seen, during)
-    del end
     return outcome
 
 
@@ -109,19 +109,18 @@ def _watch_fault(
     machine: InjectedMachine, case: Case, outcome: Outcome, watcher: Watcher, start: int, start_s: float
 ) -> None:
     """Until the fault shows and its time is over."""
-    end_s = start_s + case.watched_s
+    begun_s = time.monotonic()
     while not watcher.ended:
         shown = [seen for seen in watcher.seen[start:] if seen["state"] in case.states and _named(case, seen)]
         if shown and math.isnan(outcome.shown_s):
             outcome.shown_s = shown[0].arrived_s - start_s
         now_s = time.monotonic()
-        if now_s >= end_s and (shown or not case.states or now_s >= start_s + max(SHOWS_WITHIN_S, case.watched_s)):
+        enough = case.watched_s if shown or not case.states else max(SHOWS_WITHIN_S, case.watched_s)
+        if now_s >= begun_s + enough:
             break
         machine.truth.rest_for(0.1)
     if case.states and math.isnan(outcome.shown_s):
-        outcome.problems.append(
-            f"never one of {', '.join(sorted(case.states))} with a reason that names {case.names!r}"
-        )
+        outcome.problems.append(f"never {' or '.join(sorted(case.states))} with a reason that names {case.names!r}")
 
 
 def _leave(machine: InjectedMachine, case: Case, outcome: Outcome, watcher: Watcher, end_s: float) -> None:
@@ -175,4 +174,5 @@ def _judge(
 
 
 def _named(case: Case, seen: Seen) -> bool:
-    return case.names in (seen.setpoint.get("reason") or "")
+    """A gauge may be called by its name in the configuration, or in words: scale_1, scale 1."""
+    return case.names.replace("_", " ") in (seen.setpoint.get("reason") or "").replace("_", " ")
