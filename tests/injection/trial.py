@@ -13,6 +13,7 @@ from compd.errors import DaemonError
 from compd.live.loop.states import State
 from tests.injection.beginnings import REST_MM
 from tests.injection.case import Case, Way
+from tests.injection.cases_of_processes import CLIENTS
 from tests.injection.rig import InjectedMachine, Verdict
 from tests.support.watching import Seen, Watcher
 
@@ -119,8 +120,22 @@ def _watch_fault(
         if now_s >= begun_s + enough:
             break
         machine.truth.rest_for(0.1)
+        if case.group == CLIENTS and (refusal := _asked_in_vain(machine)):
+            outcome.problems.append(f"nobody is served over the Unix socket: {refusal}")
+            break
     if case.states and math.isnan(outcome.shown_s):
         outcome.problems.append(f"never {' or '.join(sorted(case.states))} with a reason that names {case.names!r}")
+
+
+def _asked_in_vain(machine: InjectedMachine) -> str:
+    """Why STATUS and MODEL cannot be asked over the Unix socket; "" where they can."""
+    try:
+        with machine.daemon.connected() as client:
+            client.status()
+            client.model()
+    except DaemonError as error:
+        return str(error)
+    return ""
 
 
 def _leave(machine: InjectedMachine, case: Case, outcome: Outcome, watcher: Watcher, end_s: float) -> None:
