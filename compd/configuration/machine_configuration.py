@@ -184,6 +184,24 @@ _LATER_OPTIONS: Mapping[str, Any] = {
 }
 
 
+# Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
+_FORMER_SPEED_LIMITS: Mapping[str, float] = {
+    "heidenhain_nd28x": 200.0,
+    **dict.fromkeys(
+        (
+            "keyence_gt2_dlrs1a",
+            "keyence_dlen1",
+            "mahr_c1202",
+            "serial_ascii",
+            "serial_frame",
+            "sylvac_optors",
+            "tesa_tt80",
+        ),
+        0.5,
+    ),
+}
+
+
 def load(path: Path) -> Configuration:
     """Read and check a configuration.
 
@@ -257,9 +275,12 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
     return gauges, drivers
 
 
-def _says(key: str, value: Any) -> bool:
-    """Whether an option says anything: one that a later release has brought, and that is left out, changes no hash."""
-    return key not in _LATER_OPTIONS or value != _LATER_OPTIONS[key]
+def _said(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
+    said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if (driver := said.get("driver")) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
+        said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
+    return said
 
 
 def _line_number(where: str) -> int:
@@ -273,7 +294,7 @@ def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[
 
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            value = {k: v for k, v in value.model_dump(mode="json").items() if _says(k, v)}
+            value = _said(value.model_dump(mode="json"))
         if isinstance(value, Mapping):
             return {k: plain(v) for k, v in value.items() if k not in without}
         return [plain(v) for v in value] if isinstance(value, list) else value

@@ -21,12 +21,14 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.length_trust import length_memory, length_trust
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.shared_ring import SharedRing
+from compd.live.memory.trust_memory import TrustMemory
 from compd.live.pipeline import build_pipeline
 from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
@@ -52,7 +54,7 @@ class Daemon:
 
     Attributes
     ----------
-    configuration, latest, commands, setpoints, control : as their names say.
+    configuration, latest, trust, commands, setpoints, control : as their names say.
     loop_process, acquisition, service : what each process does.
     period_s : of the loop.
     """
@@ -105,6 +107,7 @@ class Daemon:
             self.control,
             clock,
         )
+        self.trust = self._trust(before)
         self.acquisition = self._acquisition(gauges, clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
@@ -190,6 +193,7 @@ class Daemon:
     def _acquisition(self, gauges: dict[str, Any], clock: Clock) -> list[AcquisitionProcess]:
         """One process for all lines but those that have one of their own."""
         configuration = self.configuration
+        trust = length_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
         lines = {
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
@@ -199,7 +203,7 @@ class Daemon:
         return [
             AcquisitionProcess(
                 name,
-                partial(Acquisition, {line: lines[line] for line in group}, self.latest, clock),
+                partial(Acquisition, {line: lines[line] for line in group}, self.latest, clock, trust=trust),
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
@@ -207,6 +211,14 @@ class Daemon:
             for name, group in groups.items()
             if group
         ]
+
+    def _trust(self, before: Daemon | None) -> TrustMemory:
+        """What is known of the length gauges: that of the daemon whose place this one takes, where it has the same."""
+        memory = length_memory(self.configuration, self._wires)
+        if before is not None and before.configuration.zero_hash == self.configuration.zero_hash:
+            before.trust.tolerance_mm[:] = memory.tolerance_mm
+            return before.trust
+        return memory
 
     def _lines_status(self) -> dict[str, Any]:
         """Every line's part of STATUS, by its name."""

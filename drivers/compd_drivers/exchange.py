@@ -11,18 +11,7 @@ from compd.gauge import ByteLine, GaugeOptions, LineFault, Quality
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class WithoutChecksumOptions(GaugeOptions):
-    """Options where nothing but its shape guards a reply."""
-
-    fastest_mm_per_s: float = Field(
-        default=0.5,
-        gt=0,
-        allow_inf_nan=False,
-        description="the fastest that what is measured ever moves; a value that moved faster is asked for again",
-    )
-
-
-class ExchangeOptions(WithoutChecksumOptions):
+class ExchangeOptions(GaugeOptions):
     """Options of every described gauge on a line of bytes (StreamDevice's names and meanings)."""
 
     reply_timeout_s: Seconds | None = Field(default=None, description="to the first byte; the line's own if left out")

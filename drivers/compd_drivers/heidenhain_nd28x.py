@@ -21,7 +21,6 @@ from typing import Literal
 from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
-from compd_drivers.continuity import Continuity
 
 STX = b"\x02"
 REPLY_LENGTH = 17
@@ -37,12 +36,6 @@ class HeidenhainNd28xOptions(GaugeOptions):
     unit: Literal["mm", "inch"] = Field(
         default="mm", description="what the display shows; the other one is refused, so that nobody switches it unseen"
     )
-    fastest_mm_per_s: float = Field(
-        default=200.0,
-        gt=0,
-        allow_inf_nan=False,
-        description="the fastest that the link ever moves; a position that moved faster is asked for again",
-    )
 
 
 class HeidenhainNd28x(Gauge[ByteLine]):
@@ -56,7 +49,6 @@ class HeidenhainNd28x(Gauge[ByteLine]):
         super().__init__(options)
         self._unit = _UNITS[options.unit]
         self._mm = MM_PER_INCH if options.unit == "inch" else 1.0
-        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -67,9 +59,6 @@ class HeidenhainNd28x(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: MISMATCH for anything but a whole reply in the configured unit."""
-        return self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(STX)
         reply = line.receive(REPLY_LENGTH)
         match = _REPLY.fullmatch(reply)

@@ -23,9 +23,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
-from compd_drivers.continuity import Continuity
-from compd_drivers.exchange import WithoutChecksumOptions
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 
 MOST_HEADS = 15
 END = b"\r\n"
@@ -44,7 +42,7 @@ LARGEST = 99_999_997  # beyond it every number is a code
 ERRORS = {b"031": "starting its communication", b"254": "system error, or starting", b"255": "format"}
 
 
-class KeyenceDlEn1Options(WithoutChecksumOptions):
+class KeyenceDlEn1Options(GaugeOptions):
     """Options of a DL-EN1."""
 
     heads: int = Field(ge=1, le=MOST_HEADS, description="how many heads hang on the unit; channels are named 1, 2 ...")
@@ -63,7 +61,6 @@ class KeyenceDlEn1(Gauge[ByteLine]):
         self._steps_per_mm = 10**options.decimals
         self._limit = max(4 + options.heads * _FIELDS_LENGTH, len("ER,MS,254\r\n"))
         self._channels = tuple(Channel(str(head + 1)) for head in range(options.heads))
-        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -74,9 +71,6 @@ class KeyenceDlEn1(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but two fields per head."""
-        return self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(b"MS" + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         if error := _ERROR.fullmatch(reply):

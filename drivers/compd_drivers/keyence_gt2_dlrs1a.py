@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
-from compd_drivers.continuity import Continuity
 
 MOST_HEADS = 15
 NO_VALUE_MM = 199.999  # from here on the number is a code, not a length
@@ -35,12 +34,6 @@ class KeyenceGt2DlRs1aOptions(GaugeOptions):
     request: Literal["M0", "MS"] = Field(
         default="M0", description="M0: values; MS: values with each head's status, for units that want it"
     )
-    fastest_mm_per_s: float = Field(
-        default=0.5,
-        gt=0,
-        allow_inf_nan=False,
-        description="the fastest that a head's target ever moves; a value that moved faster is asked for again",
-    )
 
 
 class KeyenceGt2DlRs1a(Gauge[ByteLine]):
@@ -57,7 +50,6 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
         self._with_status = options.request == "MS"
         self._limit = 4 + options.heads * (_FIELD_LENGTH + _STATUS_LENGTH * self._with_status)
         self._channels = tuple(Channel(str(head + 1)) for head in range(options.heads))
-        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -68,9 +60,6 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but one field per head."""
-        return self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._name + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         name, *fields = reply.split(b",")

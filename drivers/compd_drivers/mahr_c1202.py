@@ -23,9 +23,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
-from compd_drivers.continuity import Continuity
-from compd_drivers.exchange import MenuSilence, WithoutChecksumOptions, receive_line
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd_drivers.exchange import MenuSilence, receive_line
 
 CR = b"\r"
 LONGEST_REPLY = 80  # three features of at most 26 characters
@@ -35,7 +34,7 @@ _ERROR = re.compile(rb"([123]) ERR(\d)")
 FEATURE_OFF = b"6"
 
 
-class MahrC1202Options(WithoutChecksumOptions):
+class MahrC1202Options(GaugeOptions):
     """Options of a C1202."""
 
     features: Annotated[tuple[Literal[1, 2, 3], ...], Field(min_length=1)] = Field(
@@ -69,7 +68,6 @@ class MahrC1202(Gauge[ByteLine]):
             rb"([123]) ([+-]\d{%d}\.\d{%d}) (mm|um|inch)(?: [<=>]){0,2}" % (options.digits, options.decimals)
         )
         self._silence = MenuSilence()
-        self._continuity = Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -81,9 +79,6 @@ class MahrC1202(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH for anything but the features that were asked."""
-        return self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         try:
             reply = receive_line(line, CR, LONGEST_REPLY)

@@ -45,8 +45,8 @@ Devices that fall silent by design (in their menu) get `silent_in_menu: true`: a
 the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
 and the detail says so; both are without a value.
 
-Without a checksum in `in` a damaged digit is still a digit: a length that moved faster than `fastest_mm_per_s` is
-asked for a second time. Other quantities are not: set a parity on the line.
+Without a checksum in `in` a damaged digit is still a digit: a length that is not where the last ones lead is asked for
+a second time, as those of all gauges are. Other quantities are not: set a parity on the line.
 """
 
 from __future__ import annotations
@@ -56,7 +56,6 @@ from typing import Any, ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.ascii_description import Description, ErrorReply, SerialAsciiOptions
-from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import MenuSilence, nothing_behind, receive, receive_line
 from compd_drivers.reply_format import ReplyFormat, unescape
 
@@ -97,9 +96,6 @@ class SerialAscii(Gauge[ByteLine]):
         self._ready_on: ByteLine | None = None  # the connection on which `init` was said
         self._until_echo = 0
         self._silence = MenuSilence()
-        lengths_only = all(channel.unit == "mm" for channel in self._channels)
-        checked = self._description.reply.has_checksum or not lengths_only
-        self._continuity = None if checked else Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -114,9 +110,6 @@ class SerialAscii(Gauge[ByteLine]):
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, MISMATCH for a reply of another form, CRC for a wrong checksum,
         DEVICE_ERROR and others for the described error replies, SILENT."""
-        return self._ask(line) if self._continuity is None else self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         try:
             readings = self._readings(line)
         except LineFault as fault:

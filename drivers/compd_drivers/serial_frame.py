@@ -12,9 +12,9 @@ Micro-Epsilon MSC7401, appendix 4.4.4:
     channels:
       - {name: gap, at: 11, type: float32, byte_order: little, unit: mm, invalid: {0: device_error}}
 
-A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise; its lengths are asked for
-twice where they moved faster than `fastest_mm_per_s`. `errors` are frames that
-stand for the whole poll; they may be shorter than the reply.
+A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise. Its lengths are asked for a
+second time where they are not where the last ones lead, as those of all gauges are. `errors` are frames that stand for
+the whole poll; they may be shorter than the reply.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from pydantic import Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
-from compd_drivers.continuity import Continuity
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 
@@ -198,9 +197,6 @@ class SerialFrame(Gauge[ByteLine]):
             ((FrameLayout.of(e.frame), e) for e in options.errors), key=lambda pair: len(pair[0].fixed)
         )
         self._channels = tuple(channel.channel for channel in options.channels)
-        lengths_only = all(channel.unit == "mm" for channel in self._channels)
-        checked = options.checksum is not None or not lengths_only
-        self._continuity = None if checked else Continuity(options.fastest_mm_per_s)
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -211,9 +207,6 @@ class SerialFrame(Gauge[ByteLine]):
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, CRC for a wrong checksum, MISMATCH for other fixed bytes."""
-        return self._ask(line) if self._continuity is None else self._continuity.read(lambda: self._ask(line))
-
-    def _ask(self, line: ByteLine) -> Sequence[Reading]:
         time_s = line.send(self._request)
         data, error = self._receive(line)
         nothing_behind(line, self._protocol, data)

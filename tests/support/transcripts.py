@@ -78,7 +78,7 @@ def parse(path: Path) -> Transcript:
         if mark == "line":
             over_tcp = rest == "modbus_tcp"
             continue
-        if mark in {">", "again"} and ended:
+        if mark == ">" and ended:
             polls.append(Poll(number))
         ended = mark in {"=", "!"}
         poll = polls[-1]
@@ -88,8 +88,6 @@ def parse(path: Path) -> Transcript:
             case "<" | "<*":
                 poll.exchanges[-1].received += octets(rest)
                 poll.exchanges[-1].simulated = mark == "<*"
-            case "again":
-                poll.exchanges.append(poll.exchanges[-1])
             case "~":
                 poll.drained = octets(rest)
             case "=":

@@ -19,11 +19,13 @@ from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
 
 log = structlog.get_logger()
 
+_NO_TRUST: Mapping[str, ReadingTrust] = {}
 # Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
 # take the interpreter from the other lines, and a processor from everybody.
 FASTEST_ROUND_S = 2e-3
@@ -69,15 +71,21 @@ class LineThread:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
-        """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel"."""
+        """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel".
+
+        trust : judges the readings of each length channel that is wired, by "gauge.channel".
+        """
         self.name = name
         self.state = "opening"
         self.detail = ""
         self.opened = 0
         self.lost = 0
         self.round_s = math.nan
-        self.gauges = [PolledGauge(gauge, driver, latest, settings.back_off_s) for gauge, driver in gauges]
+        self.gauges = [
+            PolledGauge(gauge, driver, latest, settings.back_off_s, clock, trust) for gauge, driver in gauges
+        ]
         self._settings = settings
         self._clock = clock
         self._opener = opener
@@ -160,7 +168,7 @@ class LineThread:
 
     def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
         try:
-            gauge.put(gauge.driver.read(line), self._clock.monotonic())
+            gauge.put(gauge.read(line), self._clock.monotonic())
             self._back_off.succeeded()
         except LineFault as fault:
             if fault.quality is Quality.LINE_LOST:
@@ -187,10 +195,12 @@ class Acquisition:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
-        """`lines`: settings of each line and its gauges as (name, driver), by name of the line."""
+        """`lines`: settings of each line and its gauges as (name, driver), by name of the line; `trust`: see
+        `LineThread`."""
         self.lines = {
-            name: LineThread(name, settings, gauges, latest, clock, opener)
+            name: LineThread(name, settings, gauges, latest, clock, opener, trust)
             for name, (settings, gauges) in lines.items()
         }
 

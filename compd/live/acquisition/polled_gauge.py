@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import structlog
 
+from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
+from compd.live.acquisition.gauge_trust import GaugeTrust
+from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.memory.latest import LONGEST_DETAIL, Latest
 
 log = structlog.get_logger()
 
+_NO_TRUST: Mapping[str, ReadingTrust] = {}
 # How far ahead of now, s, the time of a reading may be: `send` returns when the last bit will have left. One further
 # ahead is of another clock.
 AHEAD_S = 0.05
@@ -50,7 +54,16 @@ class PolledGauge:
     reported : whether an exception of its driver is in the log already.
     """
 
-    def __init__(self, name: str, driver: Gauge[Any], latest: Latest, back_off_s: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        name: str,
+        driver: Gauge[Any],
+        latest: Latest,
+        back_off_s: tuple[float, float],
+        clock: Clock,
+        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+    ) -> None:
+        """`trust`: judges the readings of each length channel that is wired, by "gauge.channel"."""
         self.name = name
         self.driver = driver
         self.polls = 0
@@ -66,7 +79,13 @@ class PolledGauge:
         self._failures = 0
         self._back_off = BackOff(*back_off_s)
         self._latest = latest
-        self._slots = [latest.index[f"{name}.{channel.name}"] for channel in driver.channels]
+        channels = [f"{name}.{channel.name}" for channel in driver.channels]
+        self._slots = [latest.index[channel] for channel in channels]
+        self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
+
+    def read(self, line: Any) -> Sequence[Reading]:
+        """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises."""
+        return self._trust.read(lambda: self.driver.read(line))
 
     def put(self, readings: Sequence[Reading], now_s: float) -> None:
         """Publish the readings of one poll, one per channel in order, and count the poll.
@@ -83,8 +102,11 @@ class PolledGauge:
                 faulty = reading
             elif not math.isfinite(reading.value):
                 raise ValueError(f"{reading.value} given as ok")
+        readings = self._trust.judge(readings, now_s)
+        faulty = next((reading for reading in reversed(readings) if not reading.ok), None)
         for slot, reading in zip(self._slots, readings, strict=True):
-            self._latest.put(slot, reading)
+            if reading.quality is not Quality.MISMATCH:
+                self._latest.put(slot, reading)
         self.polls += 1
         if faulty is None:
             self.ok += 1
@@ -110,6 +132,7 @@ class PolledGauge:
 
     def lose(self, quality: Quality, detail: str, now_s: float) -> None:
         """Give every channel `quality`; with LINE_LOST also without a poll."""
+        self._trust.fail(quality, now_s)
         for slot in self._slots:
             self._latest.put(slot, bad(now_s, quality, detail))
         self.faults[quality] += 1

@@ -49,7 +49,6 @@ sample: {unit: mm}
 # page 7: sign, one digit, point, five digits
 > "?\r"
 <* "+0.05000\r"
-again
 = 1.27 mm
 > "?\r"
 <* "E1\r"

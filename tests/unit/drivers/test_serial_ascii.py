@@ -233,15 +233,6 @@ def test_a_babbling_line_is_cut_off() -> None:
     assert fault(gauge(**{"in": "%+07.3f"}), b"1" * 500) is Quality.MISMATCH
 
 
-def test_a_jump_is_asked_for_twice_and_a_temperature_is_not() -> None:
-    line, port = line_with(device=lambda request: b"+1.5\r\n")
-    gauge(**{"in": "%f"}).read(line)
-    assert port.written == [b"?\r"] * 2
-    line, port = line_with(device=lambda request: b"+21.5\r\n")
-    gauge(**{"in": "%f", "channels": [{"name": "t", "unit": "degC"}]}).read(line)
-    assert port.written == [b"?\r"]
-
-
 def test_one_behind_is_found_by_the_echo() -> None:
     """Every reply is the answer to the request before: without the echo all would pass."""
     pending = [b"+20.0\r\n"]

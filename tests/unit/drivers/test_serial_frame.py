@@ -131,17 +131,6 @@ def test_part_of_the_frame_under_its_checksum() -> None:
     assert poll(device, bytes.fromhex("5A FF 9C 9B 01"))[0].value == pytest.approx(-0.1)
 
 
-def test_without_a_checksum_a_jump_is_asked_for_twice() -> None:
-    device = gauge(frame="5A 01 .. ..", checksum=None)
-    clock = InstantClock()
-    answers = [bytes.fromhex(answer) for answer in ("5A01FF9C", "5A01FF9C", "5A017F9C", "5A01FF9C")]
-    port = ScriptedPort(clock, device=lambda request: answers.pop(0))
-    line = StreamLine(port, 0.1, 0.002, clock)
-    values = [device.read(line)[0].value for _ in range(2)]
-    assert values == [pytest.approx(-0.1), pytest.approx(-0.1)], "the damaged one did not pass"
-    assert answers == []
-
-
 @pytest.mark.parametrize(
     ("options", "why"),
     [

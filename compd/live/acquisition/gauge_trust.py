@@ -1,0 +1,61 @@
+"""The judgement of one gauge's readings: which polls are asked twice, and what of them is published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from compd.clock import Clock
+from compd.gauge import Quality, Reading
+from compd.live.acquisition.possible_motion import Sample
+from compd.live.acquisition.reading_trust import ReadingTrust
+
+
+class GaugeTrust:
+    """Judges the readings of one gauge, channel by channel; used by its line's thread."""
+
+    def __init__(self, channels: Sequence[ReadingTrust | None], clock: Clock) -> None:
+        """`channels`: the judge of each channel, in their order; None for one that is no length or is not wired."""
+        self._channels = tuple(channels)
+        self._clock = clock
+        self._first: Sequence[Reading | None] = ()
+        self._window_s = 0.0
+
+    def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
+        """The readings of one poll by `ask`, or of a second one where a length is not where its last readings lead.
+
+        They are not judged yet. Raises what `ask` raises.
+        """
+        self._first = ()
+        start_s = self._clock.monotonic()
+        readings = ask()
+        now_s = self._clock.monotonic()
+        self._window_s = now_s - start_s
+        if len(readings) == len(self._channels) and any(map(self._surprises, self._channels, readings)):
+            self._first = [reading if reading.ok else None for reading in readings]
+            readings = ask()
+            self._window_s = max(self._window_s, self._clock.monotonic() - now_s)
+        return readings
+
+    def judge(self, readings: Sequence[Reading], now_s: float) -> list[Reading]:
+        """The readings of the last poll, one per channel, as they may be published."""
+        firsts = self._first or [None] * len(readings)
+        judged = []
+        for channel, reading, first in zip(self._channels, readings, firsts, strict=True):
+            if channel is not None and reading.ok:
+                judged.append(channel.judge(reading, self._window_s, first))
+                continue
+            if channel is not None:
+                channel.fail(reading.quality, now_s)
+            judged.append(reading)
+        return judged
+
+    def fail(self, quality: Quality, now_s: float) -> None:
+        """Note that a poll has failed as a whole."""
+        for channel in self._channels:
+            if channel is not None:
+                channel.fail(quality, now_s)
+
+    def _surprises(self, channel: ReadingTrust | None, reading: Reading) -> bool:
+        if channel is None or not reading.ok:
+            return False
+        return channel.surprises(Sample(reading.value, reading.time_s, self._window_s))

@@ -1,0 +1,293 @@
+"""Whether the readings of one length channel are believed: they must not jump, nor come back with another value.
+
+A reading that is not where the last ones lead is asked for once more. If the second answer is where they lead, the
+first one was damaged. If it agrees with the first, the measured part has moved, where its acceleration and speed allow
+that; else the gauge has jumped, and is not believed before a person accepts it.
+
+A gauge that was away (its line was lost, or it did not answer until its last reading was stale) may count anew. It is
+believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it. One that
+is absolute, or goes on counting while its cable is out, is believed at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.gauge import Quality, Reading, bad
+from compd.live.acquisition.possible_motion import (
+    BASE_S,
+    Interval,
+    MotionLimits,
+    Sample,
+    is_possible,
+    mean_speed,
+)
+from compd.live.memory.trust_memory import Doubt, TrustMemory
+
+# Last digit of a display that stands still, mm, where no noise is declared.
+UNREST_MM = 0.001
+# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
+_SIGMAS = 6 * math.sqrt(2)
+# A gauge that was not asked for longer, s, may have been switched off: it was away.
+LONGEST_OWN_GAP_S = 10.0
+# Where all gauges were away, s, until those that are back are compared without those that are not.
+_WAIT_FOR_OTHERS_S = 2.0
+# Samples of motion that are kept.
+_HISTORY = 32
+# Two answers show the same value where they differ by less than this share of the jump that they show.
+_AGREEMENT = 0.2
+# From one poll to the next a speed changes by at most this factor, where no limit of acceleration is given.
+_SPEED_RATIO = 5.0
+# Faster than any machine tool, mm/s: two answers that would need more do not agree.
+_FASTEST_MM_PER_S = 1000.0
+# How much of the acceleration that is there already is no surprise.
+_ACCELERATION_MARGIN = 2.0
+
+
+def tolerance_mm(noise_um: float | None) -> float:
+    """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
+    return UNREST_MM if noise_um is None else max(UNREST_MM, _SIGMAS * noise_um * 1e-3)
+
+
+@dataclass(frozen=True)
+class TrustSettings:
+    """How far the readings of a channel are believed.
+
+    limits : what the measured part can do. returns_by_itself : the device shows the same value again when it is back.
+    stale_after_s : age from which a last reading is lost.
+    """
+
+    limits: MotionLimits
+    returns_by_itself: bool
+    stale_after_s: float
+
+
+class ReadingTrust:
+    """Judges the readings of one channel; used by its line's thread.
+
+    Attributes
+    ----------
+    damaged : how many readings a second answer has shown to be damaged.
+    """
+
+    def __init__(self, memory: TrustMemory, channel: str, settings: TrustSettings) -> None:
+        self.damaged = 0
+        self._memory = memory
+        self._i = memory.index[channel]
+        self._tolerance_mm = float(memory.tolerance_mm[self._i])
+        self._settings = settings
+        self._history: deque[Sample] = deque(maxlen=_HISTORY)
+
+    def surprises(self, sample: Sample) -> bool:
+        """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
+        memory, i = self._memory, self._i
+        if memory.accepted[i] != memory.obeyed[i]:
+            return True
+        doubt = Doubt(int(memory.doubt[i]))
+        return not doubt.until_accepted and (doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample))
+
+    def fail(self, quality: Quality, now_s: float) -> None:
+        """Note a poll without a value, at `now_s` (s)."""
+        memory, i = self._memory, self._i
+        if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
+            memory.lose(i, now_s)
+
+    def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
+        """The reading as it may be published: itself, the first answer, or one without a value.
+
+        Parameters
+        ----------
+        reading : good, and the last answer of the poll.
+        window_s : how long a reply took, s.
+        first : the first answer of a poll that was asked twice, where that is good too.
+        """
+        memory, i = self._memory, self._i
+        sample = Sample(reading.value, reading.time_s, window_s)
+        self._count(sample.value)
+        memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
+        if memory.accepted[i] != memory.obeyed[i]:
+            memory.obeyed[i] = memory.accepted[i]
+            memory.heard[i] = memory.voted[i]
+            return self._begin(reading, sample, first)
+        if memory.voted[i] != memory.heard[i]:
+            memory.heard[i] = memory.voted[i]
+            memory.distrust(i, Doubt.VOTED, math.nan)
+        if memory.doubt[i] == Doubt.NONE and sample.time_s - memory.time_s[i] > LONGEST_OWN_GAP_S:
+            memory.lose(i, float(memory.time_s[i]))
+        doubt = Doubt(int(memory.doubt[i]))
+        if doubt.until_accepted:
+            return self._refused(reading)
+        if doubt is Doubt.LOST:
+            return self._returned(reading, sample, first)
+        if not self._recall():
+            return self._begin(reading, sample, first)
+        return self._continued(reading, sample, first)
+
+    def _recall(self) -> bool:
+        """Whether there is a reading that the next one follows; that of another process counts, too."""
+        memory, i = self._memory, self._i
+        if not self._history and not math.isnan(memory.value[i]):
+            self._history.append(Sample(float(memory.value[i]), float(memory.time_s[i]), 0.0))
+        return bool(self._history)
+
+    def _begin(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
+        """Believe a reading whatever was before it, where two answers agree."""
+        if first is None:
+            return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
+        fastest = min(self._settings.limits.speed, _FASTEST_MM_PER_S)
+        apart_mm = abs(sample.value - first.value)
+        if apart_mm > self._tolerance_mm + fastest * (sample.time_s - first.time_s + sample.window_s):
+            return bad(
+                reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
+            )
+        self._history.clear()
+        return self._believed(reading, sample)
+
+    def _believed(self, reading: Reading, sample: Sample) -> Reading:
+        self._history.append(sample)
+        self._memory.believe(self._i, sample.value, sample.time_s)
+        return reading
+
+    def _refused(self, reading: Reading) -> Reading:
+        return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))
+
+    def _returned(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
+        """The first readings of a gauge that was away."""
+        memory, i = self._memory, self._i
+        if self._settings.returns_by_itself or math.isnan(memory.value[i]):
+            return self._begin(reading, sample, first)
+        away_mm = sample.value - float(memory.value[i])
+        if first is not None and abs(first.value - sample.value) > self._tolerance_mm:
+            return bad(
+                reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
+            )
+        if abs(away_mm) > self._tolerance_mm:
+            memory.distrust(i, Doubt.RETURNED, away_mm)
+            return self._refused(reading)
+        moved, compared = self._moved_meanwhile(sample.time_s)
+        if not compared:
+            return bad(reading.time_s, Quality.STALE, "is back; the other gauges are not yet")
+        if moved is not None:
+            memory.distrust(i, Doubt.MOVED_MEANWHILE, moved)
+            return self._refused(reading)
+        return self._begin(reading, sample, first)
+
+    def _moved_meanwhile(self, now_s: float) -> tuple[int | None, bool]:
+        """Number of a channel that has moved since this one was lost, and whether enough could be compared.
+
+        What counts are the channels that have been good all the time. Where there are none, because everything was off,
+        half of those that are back are enough to say that the machine has stood still.
+        """
+        memory, i = self._memory, self._i
+        n = len(memory.channels)
+        others = np.arange(n) != i
+        witness = memory.witness[i]
+        tolerance = memory.tolerance_mm
+        lost_s = float(memory.lost_s[i])
+        stayed = others & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(witness)
+        if stayed.any():
+            moved = stayed & (np.abs(memory.value[:n] - witness) > tolerance)
+            return (int(np.flatnonzero(moved)[0]) if moved.any() else None), True
+        known = others & ~np.isnan(witness)
+        back = known & (memory.shown_s[:n] > lost_s)
+        if back.sum() < known.sum() and now_s - memory.shown_s[:n][back | ~others].min() < _WAIT_FOR_OTHERS_S:
+            return None, False
+        moved = back & (np.abs(memory.shown[:n] - witness) > tolerance)
+        if 2 * moved.sum() > back.sum():
+            return int(np.flatnonzero(moved)[0]), True
+        return None, True
+
+    def _continued(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
+        """A reading that follows others, of a gauge that was never away."""
+        earlier = None if first is None else Sample(first.value, first.time_s, sample.window_s)
+        if self._is_expected(sample):
+            self.damaged += earlier is not None and not self._is_expected(earlier)
+            return self._believed(reading, sample)
+        if first is None or earlier is None:
+            return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
+        if self._is_expected(earlier):
+            return self._believed(first, earlier)
+        last = self._history[-1]
+        stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
+        limits = self._settings.limits
+        before, base_s = self._speed_before()
+        if is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits) and (
+            stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)
+        ):
+            self._history.append(earlier)
+            return self._believed(reading, sample)
+        if stays:
+            self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)
+            return self._refused(reading)
+        values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
+        return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm")
+
+    def _goes_on(self, last: Sample, first: Sample, second: Sample) -> bool:
+        """Whether the second answer continues the motion that the first one shows; without a limit of acceleration."""
+        then = mean_speed(first, second, self._tolerance_mm)
+        now = mean_speed(last, first, self._tolerance_mm)
+        sign = math.copysign(1.0, first.value - last.value)
+        slowest, fastest = sorted((sign * now.low / _SPEED_RATIO, sign * now.high * _SPEED_RATIO))
+        low, high = sorted((sign * then.low, sign * then.high))
+        return max(low, slowest) <= min(high, fastest)
+
+    def _is_expected(self, sample: Sample) -> bool:
+        """Whether the reading is where the last ones lead, as far as noise and the acceleration that is there allow."""
+        last = self._history[-1]
+        before, base_s = self._speed_before()
+        passed_s = sample.time_s - last.time_s
+        speed, acceleration = 0.0, 0.0
+        tolerance_mm = self._tolerance_mm
+        if math.isfinite(before.low) and math.isfinite(before.high) and (before.low > 0 or before.high < 0):
+            speed = (before.low + before.high) / 2
+            tolerance_mm += (before.high - before.low) / 2 * passed_s
+            acceleration = self._acceleration(speed, base_s)
+        slack_mm = tolerance_mm + abs(speed) * (sample.window_s + last.window_s)
+        slack_mm += _ACCELERATION_MARGIN * acceleration * passed_s * (passed_s + base_s) / 2
+        return abs(sample.value - last.value - speed * passed_s) <= slack_mm
+
+    def _base(self, end: int) -> int | None:
+        """Index of the sample from which the speed until sample `end` (from the last, negative) is measured."""
+        history = self._history
+        latest_s = history[end].time_s - max(BASE_S, 4 * history[end].window_s)
+        for k in range(len(history) + end - 1, -1, -1):
+            if history[k].time_s <= latest_s:
+                return k
+        return None
+
+    def _speed_before(self) -> tuple[Interval, float]:
+        """Mean speed (mm/s) until the last sample, and over how long (s); without bounds where it is not known."""
+        base = self._base(-1)
+        if base is None:
+            first_s = self._history[-1].time_s - self._history[0].time_s
+            return Interval(-math.inf, math.inf), max(first_s, 0.0)
+        start, last = self._history[base], self._history[-1]
+        return mean_speed(start, last, self._tolerance_mm), last.time_s - start.time_s
+
+    def _acceleration(self, speed: float, base_s: float) -> float:
+        """Size of the acceleration that the samples show, mm/s2: from the speed before to `speed`, over `base_s`."""
+        base = self._base(-1)
+        if base is None or base == 0:
+            return 0.0
+        middle = self._history[base]
+        for k in range(base - 1, -1, -1):
+            start = self._history[k]
+            if middle.time_s - start.time_s >= BASE_S:
+                earlier = (middle.value - start.value) / (middle.time_s - start.time_s)
+                return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
+        return 0.0
+
+    def _count(self, value: float) -> None:
+        """Count how often the very same value comes, for the vote on gauges that are stuck."""
+        memory, i = self._memory, self._i
+        change_mm = abs(value - float(memory.shown[i]))
+        if change_mm == 0.0:
+            memory.repeats[i] += 1
+        elif change_mm > 0.0:
+            memory.repeats[i] = 0
+            memory.changes[i] += 1
+            memory.step_mm[i] = min(float(memory.step_mm[i]), change_mm)

@@ -1,0 +1,131 @@
+"""What is known of every length channel beyond its newest reading: the last one that was believed, and since when not.
+
+The readings themselves are in `Latest`. This outlives a process that polls gauges, so that a gauge which came back with
+another value is not believed only because that process was started anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from compd.live.memory.shared_array import shared_counters, shared_floats
+from compd.live.memory.shared_message import SharedMessage
+
+
+class Doubt(IntEnum):
+    """Why a channel's next reading is not simply believed."""
+
+    NONE = 0
+    LOST = 1
+    """The gauge was away: what it shows next must be what it showed last."""
+    RETURNED = 2
+    """It came back with another value, `amount` mm away."""
+    MOVED_MEANWHILE = 3
+    """It came back with the same value, but another gauge, number `amount`, has moved meanwhile."""
+    JUMPED = 4
+    """It jumped by `amount` mm, further than what is measured can move."""
+    VOTED = 5
+    """Other gauges contradict it; `TrustMemory.evidence` says how."""
+
+    @property
+    def until_accepted(self) -> bool:
+        """Whether it lasts until a person accepts the gauge."""
+        return self > Doubt.LOST
+
+
+class TrustMemory:
+    """Shared by the processes that are forked from now on. A channel's numbers have one writer, its line's thread, but
+    for `accepted`, which the service writes, and `voted`, which the votes write.
+
+    Attributes
+    ----------
+    channels : "gauge.channel" of every length channel. index : of each in the arrays, all (n,).
+    value, time_s : the last reading that was believed, mm, and its monotonic time, s; nan before the first.
+    shown, shown_s : the last value that the gauge gave, believed or not, mm, and its time, s; nan before the first.
+    tolerance_mm : by which a reading may differ from another one of the same value.
+    witness : (n, n), row i: the values of all channels when channel i was lost, mm.
+    lost_s : monotonic time at which the channel was lost, s.
+    doubt : a `Doubt`. amount : what it says of it.
+    repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
+    step_mm : the smallest change seen; inf before the first.
+    accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
+    voted, heard : how often a vote has named the channel, and how often its thread has followed.
+    evidence : of the votes, by channel.
+    """
+
+    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float]) -> None:
+        self.channels = tuple(channels)
+        self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
+        n = len(self.channels)
+        self.tolerance_mm = np.array(tolerance_mm, dtype=float)
+        self.value, self.time_s, self.shown, self.shown_s, self.lost_s = (shared_floats(max(n, 1)) for _ in range(5))
+        for array in (self.value, self.time_s, self.shown, self.shown_s, self.lost_s):
+            array[:] = math.nan
+        self.witness = shared_floats(max(n * n, 1))[: n * n].reshape(n, n)
+        self.doubt, self.amount, self.repeats, self.changes, self.step_mm = (shared_floats(max(n, 1)) for _ in range(5))
+        self.step_mm[:] = math.inf
+        self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
+        self.evidence = SharedMessage()
+
+    def lose(self, i: int, now_s: float) -> None:
+        """Note that channel `i` is away from now on (s), with what the others show."""
+        if self.doubt[i] == Doubt.NONE:
+            self.witness[i] = self.value[: len(self.channels)]
+            self.lost_s[i] = now_s
+            self.doubt[i] = Doubt.LOST
+
+    def distrust(self, i: int, doubt: Doubt, amount: float) -> None:
+        """Believe channel `i` no more until a person accepts it."""
+        self.amount[i] = amount
+        self.doubt[i] = doubt
+
+    def believe(self, i: int, value: float, time_s: float) -> None:
+        """Note a reading of channel `i` (mm, s) that is believed."""
+        self.value[i], self.time_s[i] = value, time_s
+        self.doubt[i] = Doubt.NONE
+
+    def accept(self, name: str) -> list[str]:
+        """Believe what the channels of `name` show from now on, and return those that were not believed.
+
+        name : a gauge, a "gauge.channel", or "all". Raises ValueError where there is no such length gauge.
+        """
+        channels = [c for c in self.channels if name in ("all", c, c.partition(".")[0])]
+        if not channels:
+            gauges = dict.fromkeys(channel.partition(".")[0] for channel in self.channels)
+            raise ValueError(f"no length gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
+        doubted = [c for c in channels if Doubt(int(self.doubt[self.index[c]])).until_accepted]
+        for channel in channels:
+            self.accepted[self.index[channel]] += 1
+        return doubted
+
+    def vote(self, evidence: Mapping[str, str]) -> None:
+        """Name channels that other gauges contradict, each with the evidence."""
+        self.evidence.write({**(self.evidence.read() or {}), **evidence})
+        for channel in evidence:
+            self.voted[self.index[channel]] += 1
+
+    def short_name(self, i: int) -> str:
+        """What `compd accept` is given: the gauge alone where it has one length channel."""
+        gauge = self.channels[i].partition(".")[0]
+        alone = sum(channel.partition(".")[0] == gauge for channel in self.channels) == 1
+        return gauge if alone else self.channels[i]
+
+    def explanation(self, i: int) -> str:
+        """Why channel `i` is not believed, and what to do; "" where it is."""
+        doubt, amount = Doubt(int(self.doubt[i])), float(self.amount[i])
+        accept = f"then `compd accept {self.short_name(i)}`"
+        match doubt:
+            case Doubt.RETURNED:
+                return f"came back {amount:.3f} mm away: reference it, {accept}"
+            case Doubt.MOVED_MEANWHILE:
+                return f"came back, but {self.short_name(int(amount))} has moved meanwhile: reference it, {accept}"
+            case Doubt.JUMPED:
+                return f"jumped by {amount:.3f} mm: reference it, {accept}"
+            case Doubt.VOTED:
+                evidence = (self.evidence.read() or {}).get(self.channels[i], "other gauges contradict it")
+                return f"{evidence}: look at it, {accept}"
+        return ""

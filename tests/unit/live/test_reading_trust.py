@@ -1,0 +1,283 @@
+"""Readings of a length that are believed, and those that are not: damage, jumps, gauges that come back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from compd.gauge import Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, good
+from compd.live.acquisition.polled_gauge import PolledGauge
+from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
+from compd.live.acquisition.reading_trust import LONGEST_OWN_GAP_S, ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.memory.latest import Latest
+from compd.live.memory.trust_memory import TrustMemory
+
+NOISE_UM = 0.1
+POLL_S = 0.005
+REPLY_S = 0.003
+STALE_AFTER_S = 0.5
+LIMITS = MotionLimits(speed=60.0, acceleration=400.0)
+GAUGES = ("scale_1", "scale_2", "scale_3")
+
+
+class Shop:
+    """Three scales on lines of their own, polled in turn in simulated time; what they show is set by the test."""
+
+    def __init__(self, limits: MotionLimits = LIMITS, returns_by_itself: bool = False) -> None:
+        self.now_s = 1000.0
+        self.shows: dict[str, Callable[[float], float]] = {name: lambda _: 0.0 for name in GAUGES}
+        self.damage: dict[str, list[float | LineFault]] = {name: [] for name in GAUGES}
+        self.asked = dict.fromkeys(GAUGES, 0)
+        self.latest = Latest([f"{name}.value" for name in GAUGES])
+        self.memory = TrustMemory(self.latest.channels, [tolerance_mm(NOISE_UM)] * len(GAUGES))
+        self._settings = TrustSettings(limits, returns_by_itself, STALE_AFTER_S)
+        self._random = np.random.default_rng(5)
+        self.start_acquisition()
+
+    def start_acquisition(self) -> None:
+        """As a new process would."""
+        self.gauges = {}
+        for name in GAUGES:
+            trust = {f"{name}.value": ReadingTrust(self.memory, f"{name}.value", self._settings)}
+            self.gauges[name] = PolledGauge(name, Scale(self, name), self.latest, (0.5, 1.0), self, trust)
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def wait(self, event: object, timeout_s: float) -> bool:
+        raise AssertionError("nothing waits here")
+
+    def ask(self, name: str) -> Reading:
+        self.asked[name] += 1
+        time_s = self.now_s
+        self.now_s += REPLY_S
+        value = self.shows[name](time_s) + NOISE_UM * 1e-3 * self._random.standard_normal()
+        damage = self.damage[name].pop(0) if self.damage[name] else 0.0
+        if isinstance(damage, LineFault):
+            raise damage
+        return good(value + damage, time_s)
+
+    def poll(self, rounds: int = 1, without: Sequence[str] = ()) -> None:
+        for _ in range(rounds):
+            for name, gauge in self.gauges.items():
+                if name in without:
+                    continue
+                try:
+                    gauge.put(gauge.read(None), self.now_s)
+                except LineFault as fault:
+                    gauge.fail(fault.quality, fault.detail, self.now_s)
+            self.now_s += POLL_S
+
+    def lose(self, *names: str) -> None:
+        """As the thread of a lost line does."""
+        for name in names:
+            self.gauges[name].lose(Quality.LINE_LOST, "unplugged", self.now_s)
+
+    def reading(self, name: str) -> Reading:
+        return self.latest.snapshot(self.now_s).readings[GAUGES.index(name)]
+
+    def away_s(self, duration_s: float, *names: str) -> None:
+        """Lose lines, and poll the others meanwhile."""
+        self.lose(*names)
+        end_s = self.now_s + duration_s
+        while self.now_s < end_s:
+            self.poll(without=names)
+
+
+class Scale(Gauge):
+    def __init__(self, shop: Shop, name: str) -> None:
+        super().__init__(GaugeOptions(driver="test", line=name))
+        self._shop, self._name = shop, name
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return [Channel("value")]
+
+    def read(self, line: object) -> Sequence[Reading]:
+        return [self._shop.ask(self._name)]
+
+
+@pytest.fixture
+def shop() -> Shop:
+    shop = Shop()
+    shop.poll(20)
+    assert all(shop.reading(name).ok for name in GAUGES)
+    return shop
+
+
+def driven(start_s: float, way_mm: float, speed: float = 50.0, acceleration: float = 250.0) -> Callable[[float], float]:
+    """A position over time: from 0 to `way_mm`, with a trapezoidal speed, from `start_s` on."""
+    ramp_s = min(speed / acceleration, math.sqrt(abs(way_mm) / acceleration))
+    duration_s = ramp_s + abs(way_mm) / (acceleration * ramp_s)
+
+    def position_mm(time_s: float) -> float:
+        t = min(max(time_s - start_s, 0.0), duration_s)
+        if t < ramp_s:
+            way = acceleration * t**2 / 2
+        elif t > duration_s - ramp_s:
+            way = abs(way_mm) - acceleration * (duration_s - t) ** 2 / 2
+        else:
+            way = acceleration * ramp_s * (t - ramp_s / 2)
+        return math.copysign(way, way_mm)
+
+    return position_mm
+
+
+@pytest.mark.parametrize("error_mm", [0.002, 0.05, -1.0, 700.0])
+def test_one_damaged_reading_is_never_published(shop, error_mm):
+    shop.damage["scale_1"] = [error_mm]
+    for _ in range(5):
+        shop.poll()
+        assert shop.reading("scale_1").value == pytest.approx(0.0, abs=0.001)
+    assert shop.gauges["scale_1"].quality is Quality.OK
+
+
+def test_two_damaged_readings_that_disagree_leave_the_last_good_one(shop):
+    before = shop.reading("scale_1")
+    shop.damage["scale_1"] = [1.0, -3.0]
+    shop.poll()
+    assert shop.reading("scale_1") == before
+    assert shop.gauges["scale_1"].quality is Quality.MISMATCH
+    shop.poll()
+    assert shop.gauges["scale_1"].quality is Quality.OK
+
+
+@pytest.mark.parametrize("jump_mm", [0.5, 1.0, -5.0])
+def test_a_jump_that_the_next_answer_confirms_is_not_believed_until_a_person_accepts_it(shop, jump_mm):
+    shop.shows["scale_1"] = lambda _: jump_mm
+    shop.poll(10)
+    reading = shop.reading("scale_1")
+    assert reading.quality is Quality.DISTRUSTED
+    assert f"jumped by {jump_mm:.3f} mm" in reading.detail
+    assert "`compd accept scale_1`" in reading.detail
+    shop.shows["scale_1"] = lambda _: 0.0
+    shop.poll(10)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED, "not by itself"
+    assert shop.memory.accept("scale_1") == ["scale_1.value"]
+    shop.poll()
+    assert shop.reading("scale_1").ok
+
+
+def test_without_limits_a_jump_that_two_answers_agree_on_is_believed():
+    shop = Shop(MotionLimits())
+    shop.poll(20)
+    shop.shows["scale_1"] = lambda _: 1.0
+    shop.poll()
+    assert shop.reading("scale_1").value == pytest.approx(1.0, abs=0.001)
+
+
+@pytest.mark.parametrize("way_mm", [0.01, 0.3, -20.0])
+@pytest.mark.parametrize("poll_s", [0.0005, 0.005, 0.05])
+def test_a_machine_that_drives_is_believed_all_the_way(way_mm, poll_s, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.POLL_S", poll_s)
+    shop = Shop()
+    shop.poll(20)
+    shop.shows["scale_1"] = position = driven(shop.now_s + 0.01, way_mm)
+    end_s = shop.now_s + 3.0
+    while shop.now_s < end_s:
+        shop.poll()
+        reading = shop.reading("scale_1")
+        assert reading.ok, reading
+        assert reading.value == pytest.approx(position(reading.time_s), abs=0.001)
+        assert shop.now_s - reading.time_s < 2 * (poll_s + 6 * REPLY_S)
+    assert shop.asked["scale_1"] < 1.5 * shop.gauges["scale_1"].polls + 10
+
+
+def test_a_gap_in_a_move_is_no_jump(shop):
+    shop.shows["scale_1"] = driven(shop.now_s, 20.0)
+    shop.poll(5)
+    shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)] * 10
+    shop.poll(60)
+    assert shop.reading("scale_1").ok
+
+
+@pytest.mark.parametrize("away_mm", [5.0, -0.01])
+def test_a_scale_that_comes_back_with_another_value_is_not_believed(shop, away_mm):
+    shop.away_s(2.0, "scale_1")
+    shop.shows["scale_1"] = lambda _: away_mm
+    shop.poll(100)
+    reading = shop.reading("scale_1")
+    assert reading.quality is Quality.DISTRUSTED
+    assert reading.detail == f"came back {away_mm:.3f} mm away: reference it, then `compd accept scale_1`"
+    shop.memory.accept("scale_1")
+    shop.poll()
+    assert shop.reading("scale_1").value == pytest.approx(away_mm, abs=0.001)
+
+
+def test_a_scale_that_comes_back_with_its_value_is_believed_where_nothing_has_moved(shop):
+    shop.away_s(2.0, "scale_1")
+    shop.poll(2)
+    assert shop.reading("scale_1").ok
+
+
+def test_a_scale_that_comes_back_with_its_value_is_not_believed_where_another_one_has_moved(shop):
+    shop.shows["scale_2"] = driven(shop.now_s, 3.0)
+    shop.away_s(2.0, "scale_1")
+    shop.poll(2)
+    assert "scale_2 has moved meanwhile" in shop.reading("scale_1").detail
+
+
+def test_silence_until_the_last_reading_is_stale_is_a_loss(shop):
+    shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)] * int(2 * STALE_AFTER_S / POLL_S)
+    shop.poll(int(2 * STALE_AFTER_S / POLL_S))
+    shop.shows["scale_1"] = lambda _: 0.02
+    shop.poll(2)
+    assert "came back 0.020 mm away" in shop.reading("scale_1").detail
+
+
+def test_an_absolute_gauge_needs_no_acceptance():
+    shop = Shop(returns_by_itself=True)
+    shop.poll(20)
+    shop.away_s(2.0, "scale_1")
+    shop.shows["scale_1"] = lambda _: 0.03
+    shop.poll(2)
+    assert shop.reading("scale_1").value == pytest.approx(0.03, abs=0.001)
+
+
+def test_after_a_power_cut_of_everything_the_gauges_that_show_what_they_showed_are_believed(shop):
+    shop.away_s(2.0, *GAUGES)
+    shop.shows["scale_3"] = lambda _: 0.4
+    shop.poll(5)
+    assert [shop.reading(name).quality for name in GAUGES] == [Quality.OK, Quality.OK, Quality.DISTRUSTED]
+
+
+def test_what_is_not_believed_outlives_the_process_that_polls(shop):
+    shop.away_s(2.0, "scale_1")
+    shop.shows["scale_1"] = lambda _: 5.0
+    shop.poll(2)
+    shop.start_acquisition()
+    shop.poll(2)
+    assert "came back 5.000 mm away" in shop.reading("scale_1").detail
+
+
+def test_a_process_that_was_not_there_for_a_moment_is_no_loss_but_one_that_was_away_for_longer_is(shop):
+    shop.shows["scale_1"] = lambda _: 2.0
+    shop.now_s += 1.0
+    shop.start_acquisition()
+    shop.poll(2)
+    assert shop.reading("scale_1").ok, "the machine may have been driven there"
+    shop.now_s += LONGEST_OWN_GAP_S + 1.0
+    shop.shows["scale_1"] = lambda _: 2.1
+    shop.poll(2)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+
+
+def test_a_vote_is_heard_and_an_unknown_name_is_refused(shop):
+    shop.memory.vote({"scale_2.value": "scale_2 stands while all others move"})
+    shop.poll()
+    assert "stands while all others move: look at it, then `compd accept scale_2`" in shop.reading("scale_2").detail
+    with pytest.raises(ValueError, match="allowed: all, scale_1"):
+        shop.memory.accept("scale_7")
+    assert shop.memory.accept("all") == ["scale_2.value"]
+    shop.poll()
+    assert shop.reading("scale_2").ok
+
+
+def test_the_jump_that_can_be_feigned_is_what_is_told(shop):
+    told_mm = unseen_jump_mm(LIMITS, POLL_S + 3 * REPLY_S, tolerance_mm(NOISE_UM))
+    shop.shows["scale_1"] = lambda _: 1.2 * told_mm
+    shop.poll(3)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
