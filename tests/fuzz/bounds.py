@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from datetime import timedelta
 
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 from compd.errors import CompdError
 
@@ -22,6 +22,8 @@ def examples(count: int) -> settings:
         derandomize=not FACTOR,
         database=None,
         deadline=DEADLINE,
+        # a smaller example of a file is seldom worth its minutes
+        phases=(Phase.explicit, Phase.generate),
         suppress_health_check=list(HealthCheck),
     )
 

@@ -14,7 +14,7 @@ from compd.model.library.effects_file import load_effects
 from compd.model_file import read_model_file
 from compd.recording.reader import read_recording
 from tests.fuzz.bounds import examples, is_told, refusal
-from tests.fuzz.mutations import BOMBS, changed_bytes
+from tests.fuzz.mutations import ALIASES, BOMBS, changed_bytes
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
 from tests.support.recordings import SIDECAR, csv_text
@@ -33,7 +33,7 @@ def model_text(folder: Path) -> str:
     return file_with(folder / "whole.yaml", "link_zero", "tool_offset").read_text()
 
 
-@pytest.mark.parametrize("bomb", BOMBS, ids=lambda bomb: repr(bomb[:20]))
+@pytest.mark.parametrize("bomb", [*BOMBS, ALIASES], ids=lambda bomb: repr(bomb[:20]))
 def test_a_file_that_breaks_parsers_is_no_configuration(folder: Path, bomb: str) -> None:
     path = folder / "bomb.yaml"
     path.write_bytes(bomb.encode("utf-8", "surrogateescape"))
