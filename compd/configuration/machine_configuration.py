@@ -22,6 +22,7 @@ from compd.configuration.operation import (
     LoopSettings,
     SocketSettings,
     StateSettings,
+    VoteSettings,
     Wiring,
 )
 from compd.configuration.section import unknown_key, validate, validation_problems
@@ -43,12 +44,13 @@ SECTIONS: Mapping[str, Any] = {
     "wiring": Wiring,
     "loop": LoopSettings,
     "acquisition": AcquisitionSettings,
+    "votes": VoteSettings,
     "limits": LimitSettings,
     "sockets": SocketSettings,
     "state": StateSettings,
 }
 # What stands for a section that the file does not have.
-OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings()}
+OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,6 +83,8 @@ class Configuration:
         What the daemon keeps across restarts.
     acquisition : AcquisitionSettings
         Which lines are polled in processes of their own.
+    votes : VoteSettings
+        What the gauges say of each other.
     warnings : tuple of Problem
         What can be used but is probably a mistake or a risk.
     """
@@ -97,6 +101,7 @@ class Configuration:
     sockets: SocketSettings
     state: StateSettings
     acquisition: AcquisitionSettings = OPTIONAL_SECTIONS["acquisition"]
+    votes: VoteSettings = OPTIONAL_SECTIONS["votes"]
     warnings: tuple[Problem, ...] = ()
 
     def gauge_objects(self) -> dict[str, Gauge[Any]]:
@@ -278,7 +283,7 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
 def _said(options: Mapping[str, Any]) -> dict[str, Any]:
     """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
     said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
-    if (driver := said.get("driver")) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
+    if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
         said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
     return said
 

@@ -78,9 +78,10 @@ class LoopSettings(Section):
 
     rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)] = Field(description="cycles per second")
     stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
-    on_stale: Literal["hold", "fade", "stop"] = Field(
+    on_stale: Literal["hold", "fade", "degrade", "stop"] = Field(
         description="hold: compute with the last good comparators for hold_s, then stop; fade: let them count less and "
-        "less over hold_s, then stop; stop: invalid at once"
+        "less over hold_s, then stop; degrade: let joints, frame or effects alone fade, then go on without them; stop: "
+        "invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
     priority: Annotated[int, Field(ge=1, le=98)] = Field(
@@ -111,6 +112,44 @@ class LimitSettings(Section):
     on_limit: Literal["clamp", "refuse"] = Field(
         description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
     )
+
+
+class FrameVote(Section):
+    """Frame comparators against a thermometer of the frame."""
+
+    temperature: str = Field(description="name of the quantity, under `wiring: quantities:`")
+    expansion_ppm_per_K: Annotated[float, Field(gt=-50, lt=50, allow_inf_nan=False)] = Field(
+        description="growth of the frame against the comparators' rods, 1e-6 per kelvin: steel on Super-Invar 11"
+    )
+    tolerance_um: Positive = Field(description="how far a distance may be from what the temperature says, um")
+
+
+class VoteSettings(Section):
+    """What the gauges say of each other; the section may be left out. A gauge that others contradict is not believed
+    until a person accepts it."""
+
+    repeated_digits: bool = Field(
+        default=True,
+        description="a length gauge that repeats the very same digits while others scatter is stuck; for gauges whose "
+        "`noise_um` is larger than their resolution",
+    )
+    standing_scale_mm: Positive | None = Field(
+        default=2.0,
+        description="a scale that stands while all others move by this much is stuck; null: not looked at",
+    )
+    following_mm: Positive | None = Field(
+        default=None,
+        description="machine-tool mode: a scale that is further from the setpoint for 1 s does not follow; left out: "
+        "not looked at",
+    )
+    joint_pair_um: Positive | None = Field(
+        default=None,
+        description="the two ball shanks of one revolute joint (Ra, Rb) differ by no more, um; left out: not looked at",
+    )
+    tip_mm_per_s: Positive | None = Field(
+        default=None, description="CMM mode: the tip never moves faster; left out: not looked at"
+    )
+    frame: FrameVote | None = Field(default=None, description="frame comparators against a thermometer")
 
 
 class TcpSocket(Section):

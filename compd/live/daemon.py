@@ -11,6 +11,7 @@ Readings, setpoints and commands pass through shared memory, and nobody waits fo
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,13 @@ from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
-from compd.live.length_trust import length_memory, length_trust
+from compd.live.acquisition.votes.votes import Votes
+from compd.live.length_trust import length_memory, length_trust, wired_lengths
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
+from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.memory.trust_memory import TrustMemory
@@ -44,6 +47,7 @@ from compd.live.service.requests import Requests, TargetKeys
 from compd.live.service.status_message import StatusReport
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
+from compd.model.machine import MachineModel
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -108,7 +112,7 @@ class Daemon:
             clock,
         )
         self.trust = self._trust(before)
-        self.acquisition = self._acquisition(gauges, clock)
+        self.acquisition = self._acquisition(gauges, self._votes(pipeline.settings.model), clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
         observers = [StateLog(self.control).note]
@@ -190,8 +194,8 @@ class Daemon:
         self.loop_process.cycles.close()
         self.control.close()
 
-    def _acquisition(self, gauges: dict[str, Any], clock: Clock) -> list[AcquisitionProcess]:
-        """One process for all lines but those that have one of their own."""
+    def _acquisition(self, gauges: dict[str, Any], votes: Votes, clock: Clock) -> list[AcquisitionProcess]:
+        """One process for all lines but those that have one of their own; the first one looks at the votes."""
         configuration = self.configuration
         trust = length_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
@@ -200,6 +204,8 @@ class Daemon:
             for line, settings in configuration.lines.items()
         }
         groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
+        groups = {name: group for name, group in groups.items() if group}
+        first = next(iter(groups))
         return [
             AcquisitionProcess(
                 name,
@@ -207,10 +213,33 @@ class Daemon:
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
+                *([votes.look] if name == first else []),
             )
             for name, group in groups.items()
-            if group
         ]
+
+    def _votes(self, model: MachineModel) -> Votes:
+        """What the gauges say of each other."""
+        configuration = self.configuration
+
+        def zero_mm() -> Mapping[str, float] | None:
+            zero = self.commands.zero
+            return zero.readings_mm if isinstance(zero, MachineZero) else None
+
+        def setpoint_line() -> bytes | None:
+            count = self.setpoints.count
+            content = self.setpoints.get(count - 1) if count else None
+            return None if content is None else SentSetpoint.unpack(content).line
+
+        return Votes(
+            configuration.votes,
+            self.trust,
+            wired_lengths(configuration, self._wires, model),
+            self._wires.quantity_channels,
+            self.latest,
+            zero_mm,
+            setpoint_line,
+        )
 
     def _trust(self, before: Daemon | None) -> TrustMemory:
         """What is known of the length gauges: that of the daemon whose place this one takes, where it has the same."""

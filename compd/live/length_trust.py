@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from compd.configuration import Configuration
+from compd.configuration.operation import FRAME_DISTANCES
+from compd.gauge import GaugeOptions
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.votes.machine_view import WiredLength
 from compd.live.loop.wiring import MachineWires, Wire
 from compd.live.memory.trust_memory import TrustMemory
+from compd.model.machine import MachineModel
 
 
 def length_memory(configuration: Configuration, wires: MachineWires) -> TrustMemory:
@@ -23,6 +28,26 @@ def length_trust(configuration: Configuration, wires: MachineWires, memory: Trus
     return {
         wire.channel: ReadingTrust(memory, wire.channel, _settings(configuration, wire)) for wire in wires.length_wires
     }
+
+
+def wired_lengths(configuration: Configuration, wires: MachineWires, model: MachineModel) -> list[WiredLength]:
+    """What each length channel measures, for the votes."""
+    wiring, gauges = configuration.wiring, configuration.gauges
+    distance_mm = dict(zip(FRAME_DISTANCES, model.zero.distances_mm.tolist(), strict=True))
+    unknown = math.nan
+    parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
+        *(("scale", link, "", unknown) for link in range(1, len(wiring.scale) + 1)),
+        *(("joint", joint.link, joint.role, unknown) for joint in wiring.joint),
+        *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES),
+    ]
+    return [
+        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, _noise_um(gauges[wire.channel.split(".")[0]]))
+        for wire, (kind, link, role, length_mm) in zip(wires.length_wires, parts, strict=True)
+    ]
+
+
+def _noise_um(options: GaugeOptions) -> float:
+    return math.nan if options.noise_um is None else options.noise_um
 
 
 def _settings(configuration: Configuration, wire: Wire) -> TrustSettings:

@@ -45,5 +45,6 @@ def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]
         valid_for_s=configuration.sockets.valid_for_s,
         stroke_mm=configuration.geometry.link_length_mm,
         noise=declared_noise(configuration),
+        scales_checked=configuration.votes.following_mm is not None,
     )
     return Pipeline(latest, settings, loader)

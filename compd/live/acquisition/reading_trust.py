@@ -288,6 +288,7 @@ class ReadingTrust:
         if change_mm == 0.0:
             memory.repeats[i] += 1
         elif change_mm > 0.0:
-            memory.repeats[i] = 0
+            memory.same[i] += memory.repeats[i]
             memory.changes[i] += 1
+            memory.repeats[i] = 0
             memory.step_mm[i] = min(float(memory.step_mm[i]), change_mm)

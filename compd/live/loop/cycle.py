@@ -17,17 +17,22 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
 from compd.errors import StateError
+from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
-from compd.live.loop.limits import limit_correction, stroke_problem
+from compd.live.loop.degraded import GroupReadings, degraded_comparators
+from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
+from compd.live.loop.reasons import shortened
+from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
-from compd.live.loop.tip_uncertainty import uncertainty_um
-from compd.live.loop.wiring import MachineWires
+from compd.live.loop.tip_uncertainty import uncertainty_um, with_absent
+from compd.live.loop.wiring import MachineWires, Wires
 from compd.live.memory.latest import Snapshot
+from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 
 
@@ -63,6 +68,8 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
     if models is not state.models:
         state = adopt_models(state, models)
     outcome, next_state = _compute(state, inputs, models, settings)
+    if outcome.values is None and next_state.tip_correction_mm is not None:
+        next_state = next_state._replace(tip_correction_mm=None)
     now_s = inputs.snapshot.time_s
     valid_until_s = now_s if outcome.values is None else min(now_s + settings.valid_for_s, outcome.expires_s)
     mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
@@ -74,7 +81,7 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         valid_until_s,
         age_s,
         outcome.state,
-        outcome.reason,
+        shortened(outcome.reason),
         mode,
         outcome.values,
         models.applied.hash,
@@ -104,29 +111,25 @@ def _compute(
         return _Outcome(usable.state, usable.reason), state
     last_good = state.last_good if live is None else live
 
-    scale_mm, oldest_s = settings.unread_scales_mm, comparators.oldest_s
-    if target is None:
-        scales = wires.scale.read(snapshot, zero_vectors.scale_mm)
-        if scales.lost:
-            # no policy replaces a scale: without it the tip is not known
-            lost_state = State.STOP if state.scales_seen else State.STARTING
-            return _Outcome(lost_state, f"the tip is not known: {scales.lost}"), state._replace(last_good=last_good)
-        scale_mm, oldest_s = scales.values, min(oldest_s, scales.oldest_s)
+    scales = _scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
+    if scales.state is not None and not scales.state.valid:
+        reason = "; ".join(filter(None, (scales.reason, usable.reason)))
+        return _Outcome(scales.state, reason), state._replace(last_good=last_good)
+    scale_mm, oldest_s = scales.values, min(comparators.oldest_s, scales.oldest_s)
 
     change_mm, joints = comparators.change_mm, wires.joints
     values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
-    compensation, warm_start = compensate(machine, values, target, state.warm_start)
+    started = state.warm_start
+    compensation, warm_start = compensate(machine, values, target, started)
     scales_seen = state.scales_seen or target is None
     if code := int(compensation.reason):
         # a warm start that failed once may fail for ever: the next cycle starts from machine zero
         warm_start = WarmStart.at_zero(settings.model)._replace(effects=warm_start.effects)
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
-        what = "this pose" if target is None else "this target"
-        return _Outcome(State.REFUSED, f"{what} cannot be computed: {MEANING[Reason(code)]}"), state
+        return _Outcome(State.REFUSED, _refusal(code, machine, values, target, started, wires)), state
 
-    correction_mm = compensation.correction_mm
-    limited = limit_correction(correction_mm, state.correction_mm, settings.period_s, settings.limits)
+    limited = limit_correction(compensation.correction_mm, state.correction_mm, settings.period_s, settings.limits)
     refusal = limited.reason if limited.state is State.REFUSED else ""
     if target is not None and (problem := stroke_problem(compensation.link_length_mm, settings.stroke_mm)):
         refusal = f"this target is out of reach: {problem}"
@@ -135,9 +138,11 @@ def _compute(
         return _Outcome(State.REFUSED, refusal), state
     correction_mm = limited.applied_mm
 
-    u_tip_um, scale_setpoint_mm = state.u_tip_um, compensation.scale_setpoint_mm
-    if settings.noise is not None and (u_tip_um is None or tick % settings.uncertainty_every == 0):
-        u_tip_um = uncertainty_um(machine, settings.noise, values, scale_setpoint_mm, warm_start.effects)
+    u_tip_um = state.u_tip_um
+    if _uncertainty_is_due(tick, u_tip_um, usable, settings):
+        noise = settings.noise if usable.absent_mm is None else with_absent(settings.noise, usable.absent_mm)
+        setpoint_mm = compensation.scale_setpoint_mm
+        u_tip_um = None if noise is None else uncertainty_um(machine, noise, values, setpoint_mm, warm_start.effects)
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
@@ -145,17 +150,44 @@ def _compute(
         )
 
     adopting = state.adopting and limited.state is not State.OK
-    next_state = CycleState(
-        zero, warm_start, correction_mm, last_good, scales_seen, shadow_memory, adopting, u_tip_um, zero_vectors, models
+    tip_correction_mm = (
+        None if target is not None else _tip_correction(compensation.correction_mm, limited, state, settings)
     )
-    if target is None and (limited.state is State.CLAMPED or (adopting and limited.state is State.SLEWING)):
-        compensation = _with_tip_as_applied(compensation, scale_mm, correction_mm, warm_start, settings)
+    next_state = CycleState(
+        zero,
+        warm_start,
+        correction_mm,
+        last_good,
+        scales_seen,
+        shadow_memory,
+        adopting,
+        u_tip_um,
+        tip_correction_mm,
+        zero_vectors,
+        models,
+    )
+    if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
+        compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
-    reported = limited.state if limited.state.rank >= usable.state.rank else usable.state
-    reason = "; ".join(filter(None, (usable.reason, limited.reason)))
+    reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
+    reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
     setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), next_state
+
+
+def _refusal(
+    code: int,
+    machine: MachineModel,
+    values: GaugeValues,
+    target: Target | None,
+    warm_start: WarmStart,
+    wires: MachineWires,
+) -> str:
+    """Why the compensation cannot be computed, with the gauge or effect to which it is due."""
+    what = "this pose" if target is None else "this target"
+    cause = refusal_cause(machine, values, target, warm_start, wires)
+    return f"{what} cannot be computed: {MEANING[Reason(code)]}" + (f"; {cause}" if cause else "")
 
 
 def _explanation(error: StateError) -> str:
@@ -169,7 +201,49 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
     if zero is state.zero:
         return state._replace(zero_vectors=zero_vectors)
     warm_start = WarmStart.at_zero(settings.model)
-    return state._replace(zero=zero, zero_vectors=zero_vectors, last_good=None, warm_start=warm_start)
+    return state._replace(
+        zero=zero, zero_vectors=zero_vectors, last_good=None, warm_start=warm_start, tip_correction_mm=None
+    )
+
+
+class _Scales(NamedTuple):
+    """The scales of a cycle: values (n) in mm since machine zero, and the time of the oldest reading.
+
+    state, reason : where they make the setpoint invalid or worse than it were; None and "" otherwise.
+    """
+
+    values: FloatArray
+    oldest_s: float
+    state: State | None = None
+    reason: str = ""
+
+
+def _scales(
+    snapshot: Snapshot, zero_mm: FloatArray, target: Target | None, seen: bool, settings: CycleSettings
+) -> _Scales:
+    """The scales in CMM mode. In machine-tool mode they are not used, but they may be compared with the setpoints."""
+    wires = settings.wires.scale
+    if target is not None:
+        unread = _Scales(settings.unread_scales_mm, math.inf)
+        if not (settings.scales_checked and (lost := wires.lost(snapshot))):
+            return unread
+        state = State.FAULT if lost.distrusted else State.DEGRADED
+        return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
+    values, oldest_s, lost = wires.read(snapshot, zero_mm)
+    if not lost:
+        return _Scales(values, oldest_s)
+    # no policy replaces a scale: without it the tip is not known
+    state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
+    return _Scales(values, oldest_s, state, f"the tip is not known: {lost}")
+
+
+def _uncertainty_is_due(
+    tick: int, u_tip_um: FloatArray | None, usable: UsableComparators, settings: CycleSettings
+) -> bool:
+    """Whether to compute the tip's uncertainty anew: it changes slowly, but for a correction that fades."""
+    if settings.noise is None:
+        return False
+    return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
 
 
 def _comparators(
@@ -181,30 +255,55 @@ def _comparators(
 ) -> tuple[ComparatorSet | None, UsableComparators]:
     """The live set of this cycle, and the comparators with which to compute."""
     snapshot = inputs.snapshot
+    now_s = snapshot.time_s
     if inputs.ending:
-        return None, held_comparators(last_good, inputs.ending, snapshot.time_s, settings.loop)
-    live, lost = _live_comparators(snapshot, zero_mm, applied, settings.wires)
-    return live, usable_comparators(live, last_good, lost, snapshot.time_s, settings.loop)
-
-
-def _live_comparators(
-    snapshot: Snapshot, zero_mm: FloatArray, applied: LiveModel, wires: MachineWires
-) -> tuple[ComparatorSet | None, str]:
-    """Joint and frame comparators with the quantities that the effects need, as a set.
-
-    None where one of them cannot be used; the text then says which, and why.
-    """
+        return None, held_comparators(last_good, inputs.ending, now_s, settings.loop)
+    wires = settings.wires
     lengths = wires.comparators.read(snapshot, zero_mm)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
     if applied.quantities:
         needed = applied.read(snapshot)
-        lost = ", ".join(filter(None, (lost, needed.lost)))
+        lost = lost.and_also(needed.lost)
         oldest_s = min(oldest_s, needed.oldest_s)
         quantities = applied.by_name(needed)
-    if lost:
-        return None, lost
-    return ComparatorSet(lengths.values, snapshot.time_s, oldest_s, quantities), ""
+    if not lost:
+        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities)
+        return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
+    if settings.loop.on_stale == "degrade":
+        groups = (
+            _group(wires.joint, snapshot, zero_mm[: wires.joints]),
+            _group(wires.frame, snapshot, zero_mm[wires.joints :]),
+            _quantity_group(applied, snapshot),
+        )
+        return degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
+    return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
+
+
+def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray) -> GroupReadings:
+    values, oldest_s, lost = wires.read(snapshot, zero_mm)
+    return GroupReadings(values, lost, oldest_s)
+
+
+def _quantity_group(applied: LiveModel, snapshot: Snapshot) -> GroupReadings:
+    needed = applied.read(snapshot)
+    return GroupReadings(needed.values, needed.lost, needed.oldest_s)
+
+
+def _tip_correction(
+    wanted_mm: FloatArray, limited: LimitedCorrection, state: CycleState, settings: CycleSettings
+) -> FloatArray:
+    """The correction (n) with which the tip is computed in CMM mode: `wanted_mm` itself, or as far as it may go.
+
+    The tip jumps as little as the correction does: from one valid setpoint to the next its correction slews. After an
+    invalid one there is nothing to jump from, and the tip is the right one at once. While the correction is clamped, or
+    slews to a newly adopted model, the tip belongs to what is applied.
+    """
+    if limited.state is State.CLAMPED or (state.adopting and limited.state is State.SLEWING):
+        return limited.applied_mm
+    if state.tip_correction_mm is None:
+        return wanted_mm
+    return slewed(wanted_mm, state.tip_correction_mm, settings.period_s, settings.limits)
 
 
 def _with_tip_as_applied(

@@ -50,6 +50,8 @@ class CycleState(NamedTuple):
     shadow_memory : memory of the shadow model's effects.
     adopting : whether the correction is still slewing towards that of a newly adopted model.
     u_tip_um : (3), standard uncertainty of the tip; None where it has not been computed.
+    tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
+        setpoint was invalid or in the other mode.
     zero_vectors : the readings of `zero`; None where they have yet to be read from it.
     models : those of the last cycle; None before the first.
     """
@@ -62,6 +64,7 @@ class CycleState(NamedTuple):
     shadow_memory: EffectMemory = EffectMemory()
     adopting: bool = False
     u_tip_um: FloatArray | None = None
+    tip_correction_mm: FloatArray | None = None
     zero_vectors: ZeroVectors | None = None
     models: Models | None = None
 
@@ -95,6 +98,7 @@ class CycleSettings:
     valid_for_s : how long a setpoint may be used.
     stroke_mm : shortest and longest link; None where the configuration does not give them.
     noise : standard deviations of the gauges; None where one of them is not given: no uncertainty is computed then.
+    scales_checked : whether machine-tool mode compares the scales with the setpoints (`votes.following_mm`).
     """
 
     without_effects: Models
@@ -104,6 +108,7 @@ class CycleSettings:
     valid_for_s: float
     stroke_mm: tuple[float, float] | None = None
     noise: GaugeNoise | None = None
+    scales_checked: bool = False
 
     @cached_property
     def model(self) -> MachineModel:

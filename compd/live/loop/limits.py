@@ -59,6 +59,14 @@ def limit_correction(
     return LimitedCorrection(wanted_mm, State.OK, "")
 
 
+def slewed(wanted_mm: FloatArray, previous_mm: FloatArray, period_s: float, limits: LimitSettings) -> FloatArray:
+    """The correction (n) that a tip may have one period after one of `previous_mm`; `wanted_mm` itself where it is
+    reached."""
+    step = limits.slew_mm_per_s * period_s
+    allowed_mm = np.clip(wanted_mm, previous_mm - step, previous_mm + step)
+    return wanted_mm if np.abs(allowed_mm - wanted_mm).max() <= _ROUNDING_MM else allowed_mm
+
+
 def stroke_problem(length_mm: FloatArray, stroke_mm: tuple[float, float] | None) -> str:
     """Text that names the links (n) outside the stroke (shortest, longest); "" where none is, or no stroke is known."""
     if stroke_mm is None:

@@ -1,4 +1,7 @@
-"""The stale policy: what replaces the comparators when one is lost (`loop.on_stale`: hold, fade or stop)."""
+"""The stale policy: what replaces the comparators when one is lost (`loop.on_stale`: hold, fade or stop).
+
+`degrade`, which replaces them group by group, is in `degraded.py`.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import NamedTuple
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import LoopSettings
+from compd.live.loop.reasons import Lost
 from compd.live.loop.states import State
 
 # How long the correction is held, at most, while the daemon ends.
@@ -23,12 +27,14 @@ class ComparatorSet(NamedTuple):
     time_s : monotonic time of the snapshot.
     oldest_s : monotonic time of the oldest reading in the set.
     quantities : temperatures, forces and the rest that the effects of the applied model need.
+    group_times_s : monotonic times from which joints, frame and quantities are, where they differ; else empty.
     """
 
     change_mm: FloatArray
     time_s: float
     oldest_s: float
     quantities: Mapping[str, FloatArray] = _NO_QUANTITIES
+    group_times_s: tuple[float, ...] = ()
 
 
 class UsableComparators(NamedTuple):
@@ -41,6 +47,8 @@ class UsableComparators(NamedTuple):
     expires_s : monotonic time from which `comparators` must not be used any more; inf where they are live.
     weight : factor between 0 and 1 by which the corrections of the effects are multiplied. `comparators` have been
         multiplied by it already.
+    absent_mm : (k + 9), standard uncertainty of what is taken for each comparator beyond its noise; None for none.
+        Infinite where it is not known.
     """
 
     comparators: ComparatorSet | None
@@ -48,10 +56,11 @@ class UsableComparators(NamedTuple):
     reason: str
     expires_s: float
     weight: float = 1.0
+    absent_mm: FloatArray | None = None
 
 
 def usable_comparators(
-    live: ComparatorSet | None, last_good: ComparatorSet | None, lost: str, now_s: float, settings: LoopSettings
+    live: ComparatorSet | None, last_good: ComparatorSet | None, lost: Lost, now_s: float, settings: LoopSettings
 ) -> UsableComparators:
     """The live set, or what `on_stale` makes of the last good one.
 
@@ -61,20 +70,22 @@ def usable_comparators(
     ----------
     live : the set of this cycle; None when a comparator cannot be used.
     last_good : the newest complete set; None before the first.
-    lost : which comparators cannot be used, and why; "" for a live set.
+    lost : which comparators cannot be used, and why. Where a person has to accept one, the state is `fault` instead of
+        `stop`.
     now_s : monotonic time of the snapshot.
     """
     if live is not None:
         return UsableComparators(live, State.OK, "", float("inf"))
     if last_good is None:
         return UsableComparators(None, State.STARTING, f"no complete set of comparators yet: {lost}", now_s)
+    ended = State.FAULT if lost.distrusted else State.STOP
     elapsed_s = now_s - last_good.time_s
     expires_s = last_good.time_s + settings.hold_s
     if settings.on_stale == "stop":
-        return UsableComparators(None, State.STOP, lost, now_s)
+        return UsableComparators(None, ended, lost.text, now_s)
     if elapsed_s >= settings.hold_s:
         reason = f"{lost}; {settings.on_stale} ended after {settings.hold_s:g} s"
-        return UsableComparators(None, State.STOP, reason, now_s)
+        return UsableComparators(None, ended, reason, now_s)
     if settings.on_stale == "hold":
         return UsableComparators(last_good, State.HOLD, f"{lost}; the last good set is held", expires_s)
     weight = 1.0 - elapsed_s / settings.hold_s
@@ -90,6 +101,6 @@ def held_comparators(
     why : the daemon ends. now_s : monotonic time of the snapshot.
     """
     if last_good is None or now_s - last_good.time_s > _LONGEST_END_S:
-        return usable_comparators(None, last_good, why, now_s, settings)
+        return usable_comparators(None, last_good, Lost(why), now_s, settings)
     expires_s = last_good.time_s + _LONGEST_END_S
     return UsableComparators(last_good, State.HOLD, f"{why}; the last good set is held", expires_s)

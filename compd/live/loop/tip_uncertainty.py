@@ -33,6 +33,16 @@ def declared_noise(configuration: Configuration) -> GaugeNoise | None:
     return GaugeNoise(scale_mm, joint_mm, frame_mm, quantities, "declared in the configuration")
 
 
+def with_absent(noise: GaugeNoise | None, absent_mm: FloatArray) -> GaugeNoise | None:
+    """The noise with what is absent of the comparators (k + 9) as further uncertainty; None where it is not known."""
+    if noise is None or not np.isfinite(absent_mm).all():
+        return None
+    joints = len(noise.joint_mm)
+    return noise._replace(
+        joint_mm=np.hypot(noise.joint_mm, absent_mm[:joints]), frame_mm=np.hypot(noise.frame_mm, absent_mm[joints:])
+    )
+
+
 def uncertainty_um(
     machine: MachineModel, noise: GaugeNoise, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
 ) -> FloatArray:

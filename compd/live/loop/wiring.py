@@ -14,7 +14,10 @@ from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
+from compd.live.loop.reasons import GaugeFault, Lost, lost
 from compd.live.memory.latest import Latest, Snapshot
+
+ALL_GOOD = Lost()
 
 
 class WiredValues(NamedTuple):
@@ -23,12 +26,12 @@ class WiredValues(NamedTuple):
     values : (k), sign * (reading - zero) in the unit of each wire: mm since machine zero for lengths, the gauge's own
         for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
     oldest_s : monotonic time of the oldest reading; inf without wires.
-    lost : which readings cannot be used, and why; "" where all can.
+    lost : which readings cannot be used, and why.
     """
 
     values: FloatArray
     oldest_s: float
-    lost: str
+    lost: Lost
 
 
 class Wire(NamedTuple):
@@ -65,31 +68,35 @@ class Wires:
         oldest_s = min([reading[1] for reading in used], default=math.inf)
         lost = self.lost(snapshot)
         if lost:
-            bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s)]
+            bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s) is not None]
             values[bad] = math.nan
         return WiredValues(values, oldest_s, lost)
 
-    def lost(self, snapshot: Snapshot) -> str:
-        """Which readings are not good or too old, and why; "" where all can be used."""
+    def lost(self, snapshot: Snapshot) -> Lost:
+        """Which readings are not good or too old, and why."""
         now_s, readings = snapshot
         ok = Quality.OK  # in a local variable: the lookup in an Enum costs more than the rest of this loop
         for slot, stale_after_s in self._slots:
             _, time_s, quality, _ = readings[slot]
             if quality is not ok or now_s - time_s > stale_after_s:
                 faults = (_fault(wire, readings[wire.slot], now_s) for wire in self.wires)
-                return ", ".join(fault for fault in faults if fault)
-        return ""
+                return lost(fault for fault in faults if fault is not None)
+        return ALL_GOOD
+
+    def part(self, start: int, end: int) -> Wires:
+        """The wires from index `start` to `end`."""
+        return Wires(self.wires[start:end])
 
 
-def _fault(wire: Wire, reading: Reading, now_s: float) -> str:
-    """ "joint 4 (joints.4): timeout", or "" for a reading that can be used."""
-    name = f"{wire.meaning} ({wire.channel})"
+def _fault(wire: Wire, reading: Reading, now_s: float) -> GaugeFault | None:
+    """Why a reading cannot be used; None where it can."""
     if reading.quality is not Quality.OK:
-        return f"{name}: {reading.quality}" + (f" ({reading.detail})" if reading.detail else "")
+        return GaugeFault(wire.meaning, wire.channel, reading.quality, reading.detail)
     age_s = now_s - reading.time_s
     if age_s > wire.stale_after_s:
-        return f"{name}: {Quality.STALE} ({age_s:.2f} s old, allowed {wire.stale_after_s:g} s)"
-    return ""
+        detail = f"{age_s:.2f} s old, allowed {wire.stale_after_s:g} s"
+        return GaugeFault(wire.meaning, wire.channel, Quality.STALE, detail)
+    return None
 
 
 class MachineWires:
@@ -98,6 +105,7 @@ class MachineWires:
     Attributes
     ----------
     scale : in the order of the links.
+    joint, frame : the two parts of the comparators.
     comparators : first the k = `joints` joint comparators, then t1..t3 and u1..u6 of the frame.
     tool_on_plate : whether the tool stands on the plate and the moving platform carries the work.
     """
@@ -122,6 +130,8 @@ class MachineWires:
             ]
         )
         self.joints = len(wiring.joint)
+        self.joint = self.comparators.part(0, self.joints)
+        self.frame = self.comparators.part(self.joints, len(self.comparators.wires))
         self.tool_on_plate = configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
 
@@ -140,14 +150,19 @@ class MachineWires:
         """Length gauges, then quantities."""
         return (*self.length_wires, *self._quantities.values())
 
-    def lost(self, snapshot: Snapshot) -> str:
-        """Which length gauges cannot be used, and why; "" where all can."""
-        return ", ".join(filter(None, (self.scale.lost(snapshot), self.comparators.lost(snapshot))))
+    def lost(self, snapshot: Snapshot) -> Lost:
+        """Which length gauges cannot be used, and why."""
+        return self.scale.lost(snapshot).and_also(self.comparators.lost(snapshot))
 
     @property
     def quantity_names(self) -> tuple[str, ...]:
         """Names of temperatures, forces and the rest."""
         return tuple(self._quantities)
+
+    @property
+    def quantity_channels(self) -> dict[str, tuple[str, float]]:
+        """Channel and stale limit (s) of each quantity, by name."""
+        return {name: (wire.channel, wire.stale_after_s) for name, wire in self._quantities.items()}
 
     def quantity_wires(self, names: Sequence[str]) -> Wires:
         """The wires of these quantities, in this order. Raises KeyError for one that is not wired."""

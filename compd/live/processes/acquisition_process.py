@@ -12,11 +12,11 @@ from typing import Any
 
 from compd.clock import Clock
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition.votes.votes import LOOK_EVERY_S
 from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
 from compd.live.processes.control import Control, Phase
 
-_TELL_EVERY_S = 0.1
 # A driver in the middle of a poll may take so long to let go of its line.
 _STOP_WITHIN_S = 0.5
 _STATUS_BYTES = 1024 * 1024
@@ -32,14 +32,22 @@ class AcquisitionProcess:
     """
 
     def __init__(
-        self, name: str, make: Callable[[], Acquisition], control: Control, clock: Clock, memory_mb: float
+        self,
+        name: str,
+        make: Callable[[], Acquisition],
+        control: Control,
+        clock: Clock,
+        memory_mb: float,
+        look: Callable[[float], None] = lambda now_s: None,
     ) -> None:
-        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB."""
+        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB; `look`: called with
+        the time (s) every `LOOK_EVERY_S`, for the votes of the gauges."""
         self.name = name
         self._make = make
         self._control = control
         self._clock = clock
         self._memory_mb = memory_mb
+        self._look = look
         self._status = SharedMessage(_STATUS_BYTES)
 
     @property
@@ -61,7 +69,8 @@ class AcquisitionProcess:
         never = threading.Event()
         while self._control.phase != Phase.STOPPING:
             self._status.write(dict(acquisition.status()))
-            self._clock.wait(never, _TELL_EVERY_S)
+            self._look(self._clock.monotonic())
+            self._clock.wait(never, LOOK_EVERY_S)
         acquisition.stop(_STOP_WITHIN_S)
 
 

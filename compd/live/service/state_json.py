@@ -39,6 +39,7 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
     "shadow": "shadow_memory",
     "adopting": "adopting",
     "u_tip_um": "u_tip_um",
+    "tip_correction_mm": "tip_correction_mm",
 }
 
 
@@ -58,6 +59,8 @@ def to_plain(value: Any) -> Any:
             }
         case tuple() if hasattr(value, "_fields"):
             names = _CYCLE_STATE_FIELDS if isinstance(value, CycleState) else {name: name for name in value._fields}
+            if isinstance(value, ComparatorSet) and not value.group_times_s:
+                names = {name: name for name in names if name != "group_times_s"}
             fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
         case tuple():

@@ -41,7 +41,7 @@ def test_before_any_reading_it_is_starting_and_names_what_is_missing(tripod):
     assert setpoint.state is State.STARTING
     assert not setpoint.valid
     assert setpoint.valid_until_s == setpoint.time_s
-    assert "joint 1 (joints.1): never_read" in setpoint.reason
+    assert "joint 1 to 9 (joints): never_read, frame t1 to t3 (cabinet): never_read" in setpoint.reason
 
 
 def test_without_a_zero_every_setpoint_is_invalid_and_says_why_until_one_is_taken(tripod):

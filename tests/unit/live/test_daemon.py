@@ -33,7 +33,7 @@ NEVER_STALE_S = 1e6
 class StillGauges:
     """In the place of the lines: every gauge is read once and stays good."""
 
-    def __init__(self, lines, latest, clock):
+    def __init__(self, lines, latest, clock, trust):
         self.latest = latest
 
     def start(self):

@@ -108,6 +108,7 @@ def test_the_names_in_a_recording_stay_whatever_the_classes_are_called():
     _, message, _ = list(run.quiet(2))[-1]
     carried = message["carried"]
     names = {"kind", "zero", "warm", "correction_mm", "last_good", "scales_seen", "shadow", "adopting", "u_tip_um"}
+    names |= {"tip_correction_mm"}  # since 0.3.0
     assert set(carried) == names
     kinds = {name: carried[name]["kind"] for name in ("warm", "last_good", "shadow")}
     assert kinds == {"warm": "WarmStart", "last_good": "Comparators", "shadow": "Remembered"}

@@ -9,12 +9,13 @@ import pytest
 
 from compd.configuration.operation import LoopSettings
 from compd.gauge import Quality
+from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
 from compd.live.loop.states import State
 from tests.support.live_machine import PERIOD_S, machine
 
 HOLD_S = 4.0
-LOST = "joint 4 (joints.4): timeout"
+LOST = Lost("joint 4 (joints.4): timeout")
 LAST = ComparatorSet(np.array([0.01, -0.02, 0.03]), time_s=100.0, oldest_s=99.9)
 
 
@@ -25,7 +26,7 @@ def settings(on_stale: str) -> LoopSettings:
 @pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
 def test_a_live_set_is_used_as_it_is(on_stale):
     live = LAST._replace(time_s=101.0)
-    usable = usable_comparators(live, LAST, "", 101.0, settings(on_stale))
+    usable = usable_comparators(live, LAST, Lost(), 101.0, settings(on_stale))
     assert usable.comparators is live
     assert (usable.state, usable.reason, usable.expires_s) == (State.OK, "", math.inf)
 
@@ -35,21 +36,21 @@ def test_before_the_first_whole_set_there_is_nothing_to_hold(on_stale):
     usable = usable_comparators(None, None, LOST, 100.0, settings(on_stale))
     assert usable.comparators is None
     assert usable.state is State.STARTING
-    assert LOST in usable.reason
+    assert LOST.text in usable.reason
 
 
 def test_stop_is_at_once():
     usable = usable_comparators(None, LAST, LOST, 100.005, settings("stop"))
     assert usable.comparators is None
     assert usable.state is State.STOP
-    assert LOST in usable.reason
+    assert LOST.text in usable.reason
 
 
 def test_hold_keeps_the_set_whole_and_then_stops():
     held = usable_comparators(None, LAST, LOST, 103.9, settings("hold"))
     assert held.comparators is LAST
     assert (held.state, held.expires_s) == (State.HOLD, 104.0)
-    assert LOST in held.reason
+    assert LOST.text in held.reason
     ended = usable_comparators(None, LAST, LOST, 104.0, settings("hold"))
     assert ended.comparators is None
     assert ended.state is State.STOP

@@ -1,0 +1,72 @@
+"""What the votes look at, ten times a second."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from compd.arrays import FloatArray
+from compd.live.memory.trust_memory import TrustMemory
+
+
+class WiredLength(NamedTuple):
+    """What a length channel measures.
+
+    kind : of the gauge. meaning : for people, as "scale 1". sign : +1 or -1. link : from 1, of a scale or a joint; 0.
+    role : S, Ra, Rb or B of a joint comparator; "". length_mm : of the distance that a frame comparator measures; nan.
+    noise_um : standard deviation of a reading; nan where it is not declared.
+    """
+
+    kind: Literal["scale", "joint", "frame"]
+    meaning: str
+    sign: int
+    link: int
+    role: str
+    length_mm: float
+    noise_um: float
+
+
+class MachineView(NamedTuple):
+    """The gauges at one time.
+
+    Attributes
+    ----------
+    now_s : monotonic time, s.
+    memory : of the length channels, with how often each has repeated its digits.
+    wired : what each length channel measures, (n).
+    value : (n), mm, as read. believed : (n), whether it is.
+    change : (n), mm since machine zero, with its sign; nan without a machine zero.
+    quantities : temperatures and the rest that are good, by name.
+    setpoint : the newest SETPOINT message; None before the first.
+    """
+
+    now_s: float
+    memory: TrustMemory
+    wired: tuple[WiredLength, ...]
+    value: FloatArray
+    believed: npt.NDArray[np.bool_]
+    change: FloatArray
+    quantities: Mapping[str, float]
+    setpoint: Mapping[str, Any] | None
+
+    def of_kind(self, kind: str) -> list[int]:
+        """The channels of this kind."""
+        return [i for i, wired in enumerate(self.wired) if wired.kind == kind]
+
+
+class Contradiction(NamedTuple):
+    """A channel, by its number, that others contradict, and the evidence in words."""
+
+    channel: int
+    evidence: str
+
+
+class Vote(Protocol):
+    """One kind of contradiction. A channel that is not believed takes no part, and begins anew when it is again."""
+
+    def look(self, view: MachineView) -> Iterator[Contradiction]:
+        """The channels that the gauges contradict now."""
+        ...

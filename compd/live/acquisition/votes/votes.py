@@ -1,0 +1,102 @@
+"""All votes of a machine: they look at the gauges ten times a second, beside the lines' threads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import structlog
+
+from compd.configuration.operation import VoteSettings
+from compd.live.acquisition.votes.following_error import FollowingError
+from compd.live.acquisition.votes.frame_temperature import FrameTemperature
+from compd.live.acquisition.votes.joint_pair import JointPair
+from compd.live.acquisition.votes.machine_view import MachineView, Vote, WiredLength
+from compd.live.acquisition.votes.repeated_digits import RepeatedDigits
+from compd.live.acquisition.votes.standing_scale import StandingScale
+from compd.live.acquisition.votes.tip_speed import TipSpeed
+from compd.live.memory.latest import Latest
+from compd.live.memory.trust_memory import Doubt, TrustMemory
+
+# From one look to the next, s.
+LOOK_EVERY_S = 0.1
+
+log = structlog.get_logger()
+
+
+class Votes:
+    """Looks at the gauges, and names in `TrustMemory` those that others contradict."""
+
+    def __init__(
+        self,
+        settings: VoteSettings,
+        memory: TrustMemory,
+        wired: Sequence[WiredLength],
+        quantities: Mapping[str, tuple[str, float]],
+        latest: Latest,
+        zero_mm: Callable[[], Mapping[str, float] | None],
+        setpoint_line: Callable[[], bytes | None],
+    ) -> None:
+        """`wired`: what each channel of `memory` measures. `quantities`: channel and stale limit (s) of each quantity,
+        by name. `zero_mm`: readings at machine zero by channel, or None. `setpoint_line`: the newest SETPOINT."""
+        self._memory = memory
+        self._wired = tuple(wired)
+        self._sign = np.array([entry.sign for entry in self._wired], dtype=float)
+        self._quantities = quantities
+        self._latest = latest
+        self._zero_mm = zero_mm
+        self._setpoint_line = setpoint_line
+        self._votes = _votes(settings)
+        # the messages are parsed only for votes that look at them
+        self._needs_setpoint = settings.following_mm is not None or settings.tip_mm_per_s is not None
+
+    def look(self, now_s: float) -> None:
+        """Look once, at `now_s` (s)."""
+        view = self._view(now_s)
+        evidence: dict[str, str] = {}
+        for vote in self._votes:
+            for number, text in vote.look(view):
+                evidence.setdefault(self._memory.channels[number], text)
+        if evidence:
+            for channel, text in evidence.items():
+                log.warning("gauge is contradicted", channel=channel, evidence=text)
+            self._memory.vote(evidence)
+
+    def _view(self, now_s: float) -> MachineView:
+        memory, n = self._memory, len(self._wired)
+        value = memory.value[:n].copy()
+        zero = self._zero_mm()
+        zero_mm = np.array([math.nan if zero is None else zero.get(channel, math.nan) for channel in memory.channels])
+        readings = self._latest.snapshot(now_s).readings
+        quantities = {}
+        for name, (channel, stale_after_s) in self._quantities.items():
+            reading = readings[self._latest.index[channel]]
+            if reading.ok and now_s - reading.time_s <= stale_after_s:
+                quantities[name] = reading.value
+        believed = (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(value)
+        change = self._sign * (value - zero_mm)
+        return MachineView(now_s, memory, self._wired, value, believed, change, quantities, self._setpoint())
+
+    def _setpoint(self) -> Mapping[str, Any] | None:
+        line = self._setpoint_line() if self._needs_setpoint else None
+        return None if not line else json.loads(line)
+
+
+def _votes(settings: VoteSettings) -> list[Vote]:
+    votes: list[Vote] = []
+    if settings.repeated_digits:
+        votes.append(RepeatedDigits())
+    if settings.standing_scale_mm is not None:
+        votes.append(StandingScale(settings.standing_scale_mm))
+    if settings.following_mm is not None:
+        votes.append(FollowingError(settings.following_mm))
+    if settings.joint_pair_um is not None:
+        votes.append(JointPair(settings.joint_pair_um))
+    if settings.tip_mm_per_s is not None:
+        votes.append(TipSpeed(settings.tip_mm_per_s))
+    if settings.frame is not None:
+        votes.append(FrameTemperature(settings.frame))
+    return votes

@@ -1,0 +1,91 @@
+"""`on_stale: degrade`: each group of gauges fades by itself, and its correction is absent when that has ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.configuration.operation import LoopSettings
+from compd.live.loop.reasons import Lost
+from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
+from compd.live.loop.states import State
+
+GROUPS = ("joints", "frame", "effects")
+
+
+class GroupReadings(NamedTuple):
+    """The joint comparators, the frame comparators, or the quantities that the effects need, in one snapshot.
+
+    values : in mm since machine zero; of quantities nothing. lost : which cannot be used. oldest_s : of the readings.
+    """
+
+    values: FloatArray
+    lost: Lost
+    oldest_s: float
+
+
+def degraded_comparators(
+    groups: tuple[GroupReadings, GroupReadings, GroupReadings],
+    quantities: Mapping[str, FloatArray],
+    last_good: ComparatorSet | None,
+    now_s: float,
+    settings: LoopSettings,
+) -> tuple[ComparatorSet | None, UsableComparators]:
+    """The newest good readings of every group, and what to compute with.
+
+    Parameters
+    ----------
+    groups : joints, frame and quantities, of which one or more are lost.
+    quantities : by name, where they are good.
+    last_good : what this has returned in the cycle before, or the last complete set; None before the first.
+    now_s : monotonic time of the snapshot.
+    """
+    lost = groups[0].lost.and_also(groups[1].lost).and_also(groups[2].lost)
+    if last_good is None:
+        return None, UsableComparators(None, State.STARTING, f"no complete set of comparators yet: {lost}", now_s)
+    joints = len(groups[0].values)
+    before_s = last_good.group_times_s or (last_good.time_s,) * 3
+    times_s = tuple(before if group.lost else now_s for group, before in zip(groups, before_s, strict=True))
+    weights = [max(0.0, 1.0 - (now_s - time_s) / settings.hold_s) for time_s in times_s]
+    known_mm = np.concatenate(
+        [
+            last_good.change_mm[:joints] if groups[0].lost else groups[0].values,
+            last_good.change_mm[joints:] if groups[1].lost else groups[1].values,
+        ]
+    )
+    by_gauge = np.repeat(weights[:2], (joints, len(known_mm) - joints))
+    newest = ComparatorSet(
+        known_mm,
+        last_good.time_s,
+        min(last_good.oldest_s, *(group.oldest_s for group in groups)),
+        last_good.quantities if groups[2].lost else quantities,
+        times_s,
+    )
+    absent = [name for name, weight in zip(GROUPS, weights, strict=True) if weight == 0.0]
+    fading = [f"{name} count {weight:.0%}" for name, weight in zip(GROUPS, weights, strict=True) if 0.0 < weight < 1.0]
+    what = [*([f"the correction of {_listed(absent)} is absent"] if absent else []), *fading]
+    live_s = [group.oldest_s for group in groups if not group.lost]
+    used_s = min(
+        [*live_s, *(time_s for time_s, weight in zip(times_s, weights, strict=True) if 0.0 < weight < 1.0)],
+        default=now_s,
+    )
+    missing_mm = (1.0 - by_gauge) * np.abs(known_mm)
+    if weights[2] < 1.0:
+        missing_mm = np.full(len(known_mm), math.inf)  # what an effect would have corrected is not known
+    usable = UsableComparators(
+        newest._replace(change_mm=known_mm * by_gauge, oldest_s=used_s),
+        State.DEGRADED if absent and not fading else State.FADE,
+        f"{lost}; {'; '.join(what)}",
+        math.inf,
+        weights[2],
+        missing_mm,
+    )
+    return newest, usable
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

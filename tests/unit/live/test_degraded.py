@@ -1,0 +1,175 @@
+"""What is published when something is missing for good, and which gauge or effect a reason names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compd.gauge import Quality
+from compd.live.loop.commands import Target
+from compd.live.loop.reasons import LONGEST_REASON_BYTES
+from compd.live.loop.states import State
+from compd.live.loop.tip_uncertainty import declared_noise
+from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
+
+FRAME = ("cabinet.t1", "cabinet.t2", "cabinet.t3")
+
+
+@pytest.fixture
+def tripod():
+    tripod = machine(on_stale="degrade")
+    gauges = {
+        name: options.model_copy(update={"noise_um": 0.1}) for name, options in tripod.configuration.gauges.items()
+    }
+    noise = declared_noise(replace(tripod.configuration, gauges=gauges))
+    tripod.settings = replace(tripod.settings, noise=noise)
+    tripod.change_mm["joints.1"] = 0.02
+    tripod.change_mm["cabinet.t1"] = 0.03
+    tripod.settle()
+    return tripod
+
+
+def after_fade(tripod):
+    """The setpoints until the fade has ended and the correction has slewed."""
+    return [tripod.step() for _ in range(int((HOLD_S + 0.5) / PERIOD_S))]
+
+
+def test_what_is_lost_fades_and_is_then_absent_while_the_rest_goes_on(tripod):
+    before = tripod.step()
+    tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
+    setpoints = after_fade(tripod)
+    assert all(setpoint.valid for setpoint in setpoints)
+    assert {setpoint.state for setpoint in setpoints[10:-200]} == {State.FADE}
+    last = setpoints[-1]
+    assert last.state is State.DEGRADED
+    assert "the correction of frame is absent" in last.reason
+    assert "frame t1 to t3 (cabinet): line_lost" in last.reason
+    assert last.values.sources_mm["frame"] == pytest.approx([0, 0, 0], abs=1e-9)
+    assert last.values.sources_mm["joints"] == pytest.approx(before.values.sources_mm["joints"])
+    tripod.change_mm["joints.1"] = 0.01
+    assert tripod.step().values.sources_mm["joints"] != pytest.approx(before.values.sources_mm["joints"], abs=1e-4)
+
+
+def test_what_is_absent_counts_in_the_uncertainty_of_the_tip(tripod):
+    before = np.linalg.norm(tripod.step().values.u_tip_um)
+    tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
+    last = after_fade(tripod)[-1]
+    assert np.linalg.norm(last.values.u_tip_um) > 10.0 > before, "30 um of the frame are not corrected any more"
+
+
+def test_the_correction_slews_on_every_change_there_and_back(tripod):
+    tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
+    setpoints = after_fade(tripod)
+    tripod.faults.clear()
+    setpoints += [tripod.step() for _ in range(200)]
+    assert setpoints[-1].state is State.OK
+    applied = np.array([setpoint.values.correction_mm for setpoint in setpoints])
+    assert np.abs(np.diff(applied, axis=0)).max() <= STEP_MM + 1e-12
+    tips = np.array([setpoint.values.tip_M_mm for setpoint in setpoints])
+    assert np.abs(np.diff(tips, axis=0)).max() <= 5 * STEP_MM, "nor does the tip jump"
+
+
+def test_before_everything_has_been_good_once_nothing_is_published():
+    tripod = machine(on_stale="degrade")
+    tripod.faults |= dict.fromkeys(FRAME, Quality.TIMEOUT)
+    assert tripod.step().state is State.STARTING
+
+
+def test_effects_whose_thermometer_is_lost_leave_the_uncertainty_unknown(tripod):
+    """There is no telling what they would have corrected."""
+    tripod.faults |= dict.fromkeys(FRAME, Quality.TIMEOUT)
+    tripod.faults["joints.1"] = Quality.TIMEOUT
+    assert "the correction of joints and frame is absent" in after_fade(tripod)[-1].reason
+
+
+@pytest.mark.parametrize(
+    ("on_stale", "state"), [("stop", State.FAULT), ("hold", State.HOLD), ("fade", State.FADE), ("degrade", State.FADE)]
+)
+def test_a_comparator_that_is_not_believed_is_replaced_like_a_lost_one(on_stale, state):
+    tripod = machine(on_stale=on_stale)
+    tripod.settle()
+    tripod.faults["joints.1"] = Quality.DISTRUSTED
+    tripod.step()
+    assert tripod.step().state is state
+
+
+@pytest.mark.parametrize(("on_stale", "state"), [("hold", State.FAULT), ("degrade", State.DEGRADED)])
+def test_when_that_has_ended_a_person_is_waited_for(on_stale, state):
+    tripod = machine(on_stale=on_stale)
+    tripod.settle()
+    tripod.faults["joints.1"] = Quality.DISTRUSTED
+    assert after_fade(tripod)[-1].state is state
+
+
+def test_a_scale_that_is_not_believed_is_a_fault_at_once():
+    tripod = machine()
+    tripod.settle()
+    tripod.faults["scale_1.position"] = Quality.DISTRUSTED
+    setpoint = tripod.step()
+    assert (setpoint.state, setpoint.valid) == (State.FAULT, False)
+    assert "scale 1 (scale_1.position): distrusted" in setpoint.reason
+
+
+def test_in_machine_tool_mode_scales_count_where_they_are_compared_with_the_setpoints():
+    tripod = machine()
+    tripod.settle()
+    tripod.commands.target = Target((0.0, 0.0, -510.0))
+    tripod.settle()
+    tripod.faults["scale_1.position"] = Quality.LINE_LOST
+    assert tripod.step().state is State.OK
+    tripod.settings = replace(tripod.settings, scales_checked=True)
+    setpoint = tripod.step()
+    assert (setpoint.state, setpoint.valid) == (State.DEGRADED, True)
+    assert "not compared with the setpoint: scale 1" in setpoint.reason
+    tripod.faults["scale_1.position"] = Quality.DISTRUSTED
+    assert tripod.step().state is State.FAULT
+
+
+def test_a_reason_names_gauges_in_groups_and_is_never_long():
+    tripod = machine()
+    tripod.settle()
+    lengths = tripod.wires.length_channels
+    tripod.faults |= dict.fromkeys(lengths, Quality.LINE_LOST)
+    tripod.faults["scale_2.position"] = Quality.TIMEOUT
+    setpoint = tripod.step()
+    assert "scale 2 (scale_2.position): timeout" in setpoint.reason
+    assert "joint 1 to 9 (joints): line_lost, frame t1 to t3 (cabinet): line_lost" in setpoint.reason
+    for k, channel in enumerate(lengths):
+        tripod.faults[channel] = list(Quality)[1 + k % (len(Quality) - 1)]
+    reason = tripod.step().reason
+    assert len(reason.encode()) <= LONGEST_REASON_BYTES
+    assert "STATUS names all" in reason
+
+
+def test_a_cycle_that_cannot_be_computed_names_the_gauge():
+    tripod = machine()
+    tripod.settle()
+    tripod.change_mm["frame_u.u1"] = 1e30
+    setpoint = tripod.step()
+    assert setpoint.state is State.REFUSED
+    assert "frame u1 (frame_u.u1) is 1e+30 mm from machine zero" in setpoint.reason
+
+
+def test_a_tip_that_is_valid_never_jumps_in_cmm_mode(tripod):
+    before = tripod.step().values.tip_M_mm
+    tripod.change_mm["frame_u.u1"] = 0.05
+    setpoint = tripod.step()
+    assert setpoint.state is State.SLEWING
+    assert np.abs(setpoint.values.tip_M_mm - before).max() < 5 * STEP_MM
+    assert np.abs(tripod.settle().values.tip_M_mm - before).max() > 0.01
+
+
+def test_after_an_invalid_setpoint_the_tip_is_right_at_once(tripod):
+    tripod.change_mm["frame_u.u1"] = 0.05
+    right = tripod.settle().values.tip_M_mm
+    tripod.change_mm["frame_u.u1"] = 0.0
+    tripod.settle()
+    tripod.faults["scale_1.position"] = Quality.TIMEOUT
+    assert not tripod.step().valid
+    tripod.faults.clear()
+    tripod.change_mm["frame_u.u1"] = 0.05
+    setpoint = tripod.step()
+    assert setpoint.state is State.SLEWING
+    assert setpoint.values.tip_M_mm == pytest.approx(right, abs=1e-6)
