@@ -143,6 +143,7 @@ docs: $(STAMP) $(GALLERY) $(EXAMPLE)
 # Hours of faults, and other examples of every fuzzer than yesterday's.
 nightly: lint wheel demo test pages walks long service hidden bench
 	$(BIN)/python -m tests.soak --minutes 180 --seed $$(date +%j)
+	$(BIN)/python -m tests.soak --without-faults --hours 24
 	COMPD_FUZZ=20 $(BIN)/pytest --timeout 1800 tests/fuzz
 	$(MAKE) scoreboard
 

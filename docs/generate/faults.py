@@ -65,9 +65,9 @@ def _unseen() -> str:
     ]
     return join(
         heading(2, "What nothing shows", target("faults", "unseen")),
-        "Each of these gauges is the only one that measures what it measures. While it drifts the state stays `ok`, and "
-        "the tip is wrong by as much as the last column says. `compd check --what-cannot-be-seen` lists them for your "
-        "machine.",
+        "Each of these gauges is the only one that measures what it measures. While it drifts the state stays `ok`, "
+        "and the tip is wrong by as much as the last column says. `compd check --what-cannot-be-seen` lists them for "
+        "your machine.",
         table(["what fails", "what was injected", "tip wrong by"], rows),
     )
 

@@ -24,6 +24,7 @@ class Way(Enum):
     UNDISTURBED = "nothing to leave: the setpoints stay `ok`"
     ITSELF = "by itself"
     ACCEPTED = "by `compd accept`"
+    EITHER = "by itself, or by `compd accept` where a gauge is not believed any more"
     UNSEEN = "nothing shows it"
 
 

@@ -105,7 +105,7 @@ LINES: tuple[Case, ...] = (
         "a display answers each request with the reply to the one before, driving",
         "scale 1 one reply behind; all links drive 7 mm",
         while_driving(on("scale_1", faults.OneReplyLate)),
-        Way.ITSELF,
+        Way.EITHER,
         bound_um=3.0,
     ),
     Case(
