@@ -18,8 +18,8 @@ from tests.injection.rig import InjectedMachine, Verdict
 from tests.support.watching import Seen, Watcher
 
 # Until a fault shows, and until the state is ok after its end.
-SHOWS_WITHIN_S = 15.0
-BACK_WITHIN_S = 20.0
+SHOWS_WITHIN_S = 6.0
+BACK_WITHIN_S = 12.0
 # Before something else is tried.
 SETTLED_WITHIN_S = 8.0
 # For so long a gauge that must be accepted is watched after its cause has gone.
