@@ -303,10 +303,10 @@ class Gauge(ABC, Generic[LineT]):
 
     @property
     def reply_identity(self) -> str | None:
-        """What every reply has that those of other gauges on the same line do not have; None where there is nothing.
+        """How every reply with a value begins, where that says whose it is; None where it does not.
 
-        On a line with several gauges, of which two have the same identity or one has none, a late reply looks like the
-        answer to the next request. Register lines tell replies apart themselves.
+        On a line with several gauges whose replies do not differ in it, a late reply looks like the answer to the next
+        request: see `replies_tell_whose`. Register lines tell replies apart themselves.
         """
         return None
 
@@ -316,3 +316,16 @@ class Gauge(ABC, Generic[LineT]):
         For a driver on registers these are the bytes on an RTU line, with address and checksum.
         """
         return None
+
+
+def replies_tell_whose(gauges: Sequence[Gauge[Any]]) -> bool:
+    """Whether every reply on a line with these gauges says whose it is: no identity is the beginning of another."""
+    if len(gauges) < 2 or all(gauge.line_kind == "registers" for gauge in gauges):
+        return True
+    identities = [gauge.reply_identity for gauge in gauges]
+    return not any(
+        a is None or b is None or a.startswith(b)
+        for k, a in enumerate(identities)
+        for m, b in enumerate(identities)
+        if k != m
+    )

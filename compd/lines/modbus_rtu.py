@@ -91,13 +91,18 @@ class RtuMaster:
             raise LineFault(Quality.DEVICE_ERROR, f"exception {code}, {EXCEPTIONS.get(code, 'unknown')}")
         return RegisterReply(registers, time_s)
 
-    def drain(self) -> bytes:
-        """After a fault: wait until nothing has come for the line's timeout; what came."""
-        return self._stream.drain()
+    def drain(self, quiet_s: float | None = None) -> bytes:
+        """Wait until nothing has come for `quiet_s`, the line's timeout if None; what came."""
+        return self._stream.drain(quiet_s)
 
     def close(self) -> None:
         """Close the port."""
         self._stream.close()
+
+    @property
+    def requests(self) -> int:
+        """How many requests were sent."""
+        return self._stream.requests
 
     @property
     def unexpected_bytes(self) -> int:

@@ -26,6 +26,7 @@ logging.getLogger("pymodbus").propagate = False
 class ModbusTcp:
     """A `RegisterLine` over Modbus TCP. Used by one thread."""
 
+    requests = 0  # not counted: a reply names its request
     unexpected_bytes = 0  # pymodbus drops them by their transaction number, uncounted
 
     def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:
@@ -57,7 +58,7 @@ class ModbusTcp:
             raise self._fault(Quality.LINE_LOST, str(error)) from error
         return RegisterReply(self._registers(reply, function, count), time_s)
 
-    def drain(self) -> bytes:
+    def drain(self, quiet_s: float | None = None) -> bytes:
         """Nothing: after a fault the connection is a new one."""
         return b""
 

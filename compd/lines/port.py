@@ -23,7 +23,7 @@ log = structlog.get_logger()
 PORT_FAULTS = (OSError, termios.error)
 MOST_BYTES = 4096  # of one read: far more than any reply
 # How often, s, ports without a file descriptor (rfc2217://, loop://) are asked: `select` cannot wait for them.
-SLICE_S = 0.02
+SLICE_S = 5e-3
 
 
 class Port(Protocol):
@@ -50,6 +50,8 @@ class SerialPort:
     def __init__(self, port: str, baud: int, form: str, low_latency: bool, write_timeout_s: float) -> None:
         """`port`: device path or pyserial URL; `form`: data bits, parity and stop bits, as "8N1" or "7E2".
 
+        `write_timeout_s`: how long the port may take no byte, s; not watched over rfc2217://.
+
         Raises LineFault (LINE_LOST) when it cannot be opened.
         """
         data_bits, parity, stop_bits = int(form[0]), form[1], int(form[2])
@@ -62,14 +64,14 @@ class SerialPort:
                 parity=parity,
                 stopbits=stop_bits,
                 timeout=SLICE_S,
-                write_timeout=write_timeout_s,
                 exclusive=True if is_device else None,
             )
-        except (*PORT_FAULTS, ValueError) as error:
-            raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error}") from error
+        except Exception as error:  # of a URL, it is anything that its handler or the network raises
+            raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error or type(error).__name__}") from error
         # Behind a URL the device server sets the baud rate, and the time of a character is unknown here.
         bits = 1 + data_bits + (parity != "N") + stop_bits
         self.character_s = bits / baud if is_device else 0.0
+        self._write_timeout_s = write_timeout_s
         self._fd: int | None = None if port.startswith(("rfc2217:", "loop:")) else self._port.fileno()
         if is_device:
             try:
@@ -119,9 +121,26 @@ class SerialPort:
 
     def write(self, data: bytes) -> None:
         try:
-            self._port.write(data)
+            if self._fd is None:
+                self._port.write(data)
+            elif unsent := self._write_in_time(self._fd, data):
+                self._port.reset_output_buffer()  # or the rest of a request would leave with the next one
+                text = f"{len(unsent)} of {len(data)} bytes could not be written within {self._write_timeout_s:g} s"
+                raise LineFault(Quality.TIMEOUT, text)
         except PORT_FAULTS as error:
             raise LineFault(Quality.LINE_LOST, f"write: {error}") from error
+
+    def _write_in_time(self, fd: int, data: bytes) -> bytes:
+        """Write `data`; what the port did not take. Only a port that takes nothing is late, not a computer that is.
+
+        pyserial's own timeout also ends a write that is complete, where the computer was busy in between.
+        """
+        while data and select.select([], [fd], [], self._write_timeout_s)[1]:
+            try:
+                data = data[os.write(fd, data) :]
+            except BlockingIOError:
+                continue
+        return data
 
     def close(self) -> None:
         try:

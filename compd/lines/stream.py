@@ -24,7 +24,7 @@ class StreamLine:
     """A `ByteLine` over a port. Used by one thread.
 
     Two rules keep a reply with its request: a request is written only when nothing has come for `gap_s`, and what came
-    without a request is discarded and counted in `unexpected_bytes`.
+    without a request is discarded and counted in `unexpected_bytes`. `requests` counts what was sent.
     """
 
     def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock) -> None:
@@ -33,6 +33,7 @@ class StreamLine:
         `gap_s`: silence before a request, s.
         """
         self.unexpected_bytes = 0
+        self.requests = 0
         self._port = port
         self._timeout_s = timeout_s
         self._gap_s = gap_s
@@ -48,6 +49,7 @@ class StreamLine:
         """
         self._wait_for_silence()
         started_s = self._clock.monotonic()
+        self.requests += 1
         self._port.write(request)
         return started_s + len(request) * self._port.character_s
 
@@ -87,11 +89,12 @@ class StreamLine:
             searched = max(0, len(self._received) - len(terminator) + 1)
             self._read_more(limit, deadline_s)
 
-    def drain(self) -> bytes:
-        """After a fault: wait until nothing has come for the line's timeout; all that came."""
+    def drain(self, quiet_s: float | None = None) -> bytes:
+        """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
+        quiet_s = self._timeout_s if quiet_s is None else quiet_s
         dropped = self._take(len(self._received))
         until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
-        while (data := self._port.read(self._timeout_s)) and self._clock.monotonic() < until_s:
+        while (data := self._port.read(quiet_s)) and self._clock.monotonic() < until_s:
             dropped += data
         self.unexpected_bytes += len(dropped)
         return dropped

@@ -203,16 +203,23 @@ class Daemon:
             line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
             for line, settings in configuration.lines.items()
         }
+        stale_after_s = {
+            name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s
+            for name, options in configuration.gauges.items()
+        }
         groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
         groups = {name: group for name, group in groups.items() if group}
         first = next(iter(groups))
         return [
             AcquisitionProcess(
                 name,
-                partial(Acquisition, {line: lines[line] for line in group}, self.latest, clock, trust=trust),
+                partial(
+                    Acquisition, {line: lines[line] for line in group}, stale_after_s, self.latest, clock, trust=trust
+                ),
                 self.control,
                 clock,
                 configuration.acquisition.memory_mb,
+                configuration.loop.priority // 4,
                 *([votes.look] if name == first else []),
             )
             for name, group in groups.items()

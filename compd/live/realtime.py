@@ -1,4 +1,4 @@
-"""What loop and service ask of the system: priority, locked memory, precise timers; garbage collection on demand."""
+"""What the processes ask of the system: priority, locked memory, precise timers; garbage collection on demand."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PR_SET_TIMERSLACK = 29  # linux/prctl.h
 SWITCH_INTERVAL_S = 50e-6
 # A thread with priority that takes more of a processor than this would keep others from theirs: from the gauges, and
 # with the kernel's limit for all real-time threads (95 %) even the loop.
-_LARGEST_SHARE = 0.5
+LARGEST_SHARE = 0.5
 _RATION_EVERY_S = 0.1
 # Exceptions in drivers leave reference cycles of a few kB each; collected at this interval they stay within a few MB.
 _COLLECT_EVERY_S = 5.0
@@ -86,35 +86,52 @@ def shorten_switch_interval() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
 
-class RationedPriority:
-    """SCHED_FIFO for a thread that serves others, as long as it takes no more than half a processor.
+def thread_time_s(thread_id: int) -> float:
+    """Processor time (s) of a thread of this process, by the kernel's id. OSError where there is none.
 
-    A client that asks without end then slows down itself and the other clients, and nothing else.
+    The clock's id as glibc's pthread_getcpuclockid makes it, which wants a thread that is alive.
+    """
+    return time.clock_gettime(~thread_id << 3 | 6)
+
+
+class RationedPriority:
+    """SCHED_FIFO for a thread that serves others, as long as it takes no more than its share of a processor.
+
+    A client that asks without end then slows down itself and the other clients, and nothing else; a driver that never
+    waits slows down its own process.
     """
 
-    def __init__(self, priority: int, clock: Clock) -> None:
-        """`priority`: below the loop's; 0 for none."""
+    def __init__(
+        self, priority: int, clock: Clock, thread_id: int | None = None, largest_share: float = LARGEST_SHARE
+    ) -> None:
+        """`priority`: below the loop's; 0 for none. `thread_id`: as the kernel counts; None: the thread that looks."""
         self._priority = priority
         self._clock = clock
+        self._thread_id = thread_id
+        self._largest_share = largest_share
         self._next_s = -math.inf
         self._last_s = self._used_s = 0.0
         self.has_priority = False
 
     def look(self) -> None:
-        """Take or give up the priority; called by the thread itself, often."""
+        """Give the priority, or take it away; called often."""
         now_s = self._clock.monotonic()
         if now_s < self._next_s or not self._priority:
             return
-        used_s = time.thread_time()
-        wanted = used_s - self._used_s <= _LARGEST_SHARE * (now_s - self._last_s)
+        try:
+            used_s = time.thread_time() if self._thread_id is None else thread_time_s(self._thread_id)
+        except OSError:  # the thread has ended
+            self._priority = 0
+            return
+        wanted = used_s - self._used_s <= self._largest_share * (now_s - self._last_s)
         self._next_s, self._last_s, self._used_s = now_s + _RATION_EVERY_S, now_s, used_s
         if wanted != self.has_priority:
             # threads that this one starts have no priority
             policy = (os.SCHED_FIFO if wanted else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
             try:
-                os.sched_setscheduler(0, policy, os.sched_param(self._priority if wanted else 0))
+                os.sched_setscheduler(self._thread_id or 0, policy, os.sched_param(self._priority if wanted else 0))
             except OSError:
-                self._priority = 0  # not permitted, now or later
+                self._priority = 0  # not permitted, now or later, or the thread has ended
             else:
                 self.has_priority = wanted
 

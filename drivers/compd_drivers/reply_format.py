@@ -88,6 +88,7 @@ class ReplyFormat:
     channels : names of its numbers, in order; "" for one that is not named.
     length : bytes of the reply where the format fixes it, else None.
     longest : bytes of the longest reply that is waited for.
+    beginning : the literal bytes before all else.
     """
 
     def __init__(self, text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> None:
@@ -102,11 +103,17 @@ class ReplyFormat:
         source = unescape(text).decode("latin-1")
         pattern = ""
         at = 0
+        beginning = None
         for match in _CONVERTER.finditer(source):
             pattern += self._literally(source[at : match.start()])
-            pattern += self._converter(match)
+            if match["percent"]:
+                pattern += self._fixed("%")
+            else:
+                beginning = self.literal if beginning is None else beginning
+                pattern += self._converter(match)
             at = match.end()
         self._pattern = re.compile((pattern + self._literally(source[at:])).encode("latin-1"), re.DOTALL)
+        self.beginning = self.literal if beginning is None else beginning
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -168,8 +175,6 @@ class ReplyFormat:
         self.length = None if self.length is None or by is None else self.length + by
 
     def _converter(self, match: re.Match[str]) -> str:
-        if match["percent"]:
-            return self._fixed("%")
         if match["checksum"]:
             return self._checksum(match)
         if match["kind"] in tuple("fdex") and not match["star"]:

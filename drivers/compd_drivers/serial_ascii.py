@@ -101,6 +101,10 @@ class SerialAscii(Gauge[ByteLine]):
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
+    @property
+    def reply_identity(self) -> str | None:
+        return self._description.reply.beginning.decode("latin-1") or None
+
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         length = self._description.reply.length
         if length is None or not self._protocol.out:

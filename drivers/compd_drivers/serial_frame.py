@@ -19,6 +19,7 @@ the whole poll; they may be shorter than the reply.
 
 from __future__ import annotations
 
+import itertools
 import re
 import struct
 from collections.abc import Mapping, Sequence
@@ -55,6 +56,11 @@ class FrameLayout(NamedTuple):
             raise ValueError("the checksum's bytes `CS` must stand together")
         fixed = tuple(None if token in {"..", "CS"} else int(token, 16) for token in tokens)
         return cls(fixed, slice(places[0], places[-1] + 1) if places else slice(0, 0))
+
+    @property
+    def beginning(self) -> bytes:
+        """The fixed bytes before all others."""
+        return bytes(itertools.takewhile(lambda byte: byte is not None, self.fixed))  # type: ignore[arg-type]
 
     def fits(self, data: bytes) -> bool:
         """Whether `data` has this length and these fixed bytes."""
@@ -201,6 +207,10 @@ class SerialFrame(Gauge[ByteLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    @property
+    def reply_identity(self) -> str | None:
+        return self._frame.beginning.decode("latin-1") or None
 
     def traffic(self) -> Sequence[tuple[int, int]]:
         return [(len(self._request), len(self._frame.fixed))]

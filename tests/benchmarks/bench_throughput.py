@@ -142,7 +142,9 @@ def _round(line: Any, polled: dict[str, Gauge[Any]]) -> None:
 
 def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> float:
     latest = Latest([f"{name}.{channel.name}" for name, gauge in polled.items() for channel in gauge.channels])
-    acquisition = Acquisition({"x": (settings, list(polled.items()))}, latest, MonotonicClock())
+    acquisition = Acquisition(
+        {"x": (settings, list(polled.items()))}, dict.fromkeys(polled, 1.0), latest, MonotonicClock()
+    )
     acquisition.start()
     time.sleep(0.5)
     gauge = acquisition.lines["x"].gauges[-1]

@@ -1,25 +1,29 @@
 """The threads that poll the gauges, one per line, and put their readings into `Latest`.
 
 A lost line is closed, and opened again after a waiting time that doubles with every failure. A gauge that does not
-answer is left alone in the same way, so that an absent unit does not slow the others on its line. No line waits for
-another.
+answer rests for a shorter time, so that an absent unit does not slow the others on its line. No line waits for
+another. Where replies do not say whose they are, the readings of a round are published when it has ended and nothing
+more came (`compd.live.acquisition.reply_order`).
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import structlog
 
 from compd.clock import Clock
 from compd.configuration.lines import LineSettings
-from compd.gauge import Gauge, LineFault, Quality
+from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
+from compd.lines.stream import shown
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.reading_trust import ReadingTrust
+from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
 
@@ -38,11 +42,15 @@ class OpenLine(Protocol):
     """What acquisition itself needs of a line; the rest is between the line and the driver."""
 
     @property
+    def requests(self) -> int:
+        """How many requests were sent since the line was opened; not counted where a reply names its request."""
+
+    @property
     def unexpected_bytes(self) -> int:
         """Bytes that came without a request, since the line was opened."""
 
-    def drain(self) -> bytes:
-        """Wait until nothing more comes; what came."""
+    def drain(self, quiet_s: float | None = None) -> bytes:
+        """Wait until nothing has come for `quiet_s`, the line's timeout if None; what came."""
 
     def close(self) -> None:
         """Close the line."""
@@ -68,6 +76,7 @@ class LineThread:
         name: str,
         settings: LineSettings,
         gauges: Sequence[tuple[str, Gauge[Any]]],
+        stale_after_s: Mapping[str, float],
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
@@ -75,7 +84,8 @@ class LineThread:
     ) -> None:
         """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel".
 
-        trust : judges the readings of each length channel that is wired, by "gauge.channel".
+        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: judges the readings of each
+        length channel that is wired, by "gauge.channel".
         """
         self.name = name
         self.state = "opening"
@@ -84,12 +94,16 @@ class LineThread:
         self.lost = 0
         self.round_s = math.nan
         self.gauges = [
-            PolledGauge(gauge, driver, latest, settings.back_off_s, clock, trust) for gauge, driver in gauges
+            PolledGauge(gauge, driver, latest, settings.timeout_s, stale_after_s[gauge], clock, trust)
+            for gauge, driver in gauges
         ]
         self._settings = settings
         self._clock = clock
         self._opener = opener
         self._line: OpenLine | None = None
+        self._order = ReplyOrder([driver for _, driver in gauges], settings.timeout_s)
+        self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the duration of their poll, s
+        self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
         self._back_off = BackOff(*settings.back_off_s)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
@@ -97,6 +111,11 @@ class LineThread:
     def start(self) -> None:
         """Start to poll; return at once, whether or not the line can be opened."""
         self._thread.start()
+
+    @property
+    def thread_id(self) -> int | None:
+        """Of the line's thread, as the kernel counts; None before its start."""
+        return self._thread.native_id
 
     def stop(self) -> None:
         """Ask the thread to end, which it does after its current poll."""
@@ -128,12 +147,16 @@ class LineThread:
                 self._mark_open()
                 while not self._stop.is_set():
                     self._round(self._line)
-            except LineFault as fault:  # LINE_LOST alone: `_poll` handles every other fault
-                self._mark_lost(fault)
+            except LineFault as fault:  # LINE_LOST alone: `_faults_of` handles every other fault
+                self._mark_lost(fault.detail)
+            except MemoryError:  # it is the whole process that has none left
+                raise
+            except Exception as error:  # a port's library may raise anything; it must not end the line's thread
+                if self.state != "lost":
+                    log.exception("line failed", line=self.name)
+                self._mark_lost(f"{type(error).__name__}: {error}")
             finally:
-                if self._line is not None:
-                    self._line.close()
-                    self._line = None
+                self._close()
             if not self._stop.is_set():
                 self._clock.wait(self._stop, self._back_off.failed())
         self.state = "stopped"
@@ -142,23 +165,36 @@ class LineThread:
         self.opened += 1
         self.state, self.detail = "open", ""
         log.info("line is open", line=self.name)
+        self._order.missed(self._clock.monotonic())
         for gauge in self.gauges:
             gauge.resume()
 
-    def _mark_lost(self, fault: LineFault) -> None:
+    def _mark_lost(self, detail: str) -> None:
         if self.state != "lost":
             self.lost += 1
-            log.warning("line is lost", line=self.name, detail=fault.detail)
-        self.state, self.detail = "lost", fault.detail
+            log.warning("line is lost", line=self.name, detail=detail)
+        self.state, self.detail = "lost", detail
+        self._waiting.clear()
         for gauge in self.gauges:
-            gauge.lose(Quality.LINE_LOST, fault.detail, self._clock.monotonic())
+            gauge.lose(Quality.LINE_LOST, detail, self._clock.monotonic())
+
+    def _close(self) -> None:
+        line, self._line = self._line, None
+        if line is None:
+            return
+        try:
+            line.close()
+        except Exception as error:  # noqa: BLE001  of a lost port; it must not end the line's thread
+            log.info("a line did not close cleanly", line=self.name, reason=str(error))
 
     def _round(self, line: OpenLine) -> None:
         """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
+        self._dropped_before = line.unexpected_bytes
         for gauge in self.gauges:
             if gauge.rests_until_s <= start_s and not self._stop.is_set():
                 self._poll(gauge, line)
+        self._publish_waiting(line)
         end_s = self._clock.monotonic()
         self.round_s = end_s - start_s
         next_s = start_s + max(self._settings.poll_every_s, FASTEST_ROUND_S)
@@ -167,23 +203,78 @@ class LineThread:
             self._clock.wait(self._stop, wake_s - end_s)
 
     def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
-        try:
-            gauge.put(gauge.read(line), self._clock.monotonic())
+        with self._faults_of(gauge, line):
+            asked_s, requests = self._clock.monotonic(), line.requests
+            readings = gauge.read(line)
+            now_s = self._clock.monotonic()
             self._back_off.succeeded()
+            # a device that speaks unasked has no late replies
+            if line.requests > requests and self._order.in_doubt(now_s):
+                self._waiting.append((gauge, readings, now_s - asked_s))
+            else:
+                self._order.answered(now_s - asked_s)
+                gauge.put(readings, now_s)
+
+    def _publish_waiting(self, line: OpenLine) -> None:
+        """Publish the readings that wait, if nothing more comes. Raises LineFault (LINE_LOST)."""
+        if not self._waiting:
+            return
+        # what came just before a request was dropped: the reply before it may have been another one's
+        dropped = line.unexpected_bytes - self._dropped_before
+        came = line.drain(self._order.listen_s)
+        if came or dropped:
+            seen = shown(came) if came else f"{dropped} bytes"
+            self._discard_waiting(f"{seen} came that nobody asked for: replies may belong to other requests")
+            line.drain()
+        waiting, self._waiting = self._waiting, []
+        for gauge, readings, duration_s in waiting:
+            with self._faults_of(gauge, line):
+                self._order.answered(duration_s)
+                gauge.put(readings, self._clock.monotonic())
+
+    def _discard_waiting(self, why: str) -> None:
+        """Count the polls whose readings wait as failed: they may be those of other requests."""
+        now_s = self._clock.monotonic()
+        waiting, self._waiting = self._waiting, []
+        self._order.missed(now_s)
+        for gauge, _, _ in waiting:
+            gauge.fail(Quality.MISMATCH, why, now_s)
+
+    @contextmanager
+    def _faults_of(self, gauge: PolledGauge, line: OpenLine) -> Iterator[None]:
+        """Count what goes wrong with a gauge, and leave the line without anything under way, so far as that can be.
+
+        Raises LineFault (LINE_LOST).
+        """
+        try:
+            yield
         except LineFault as fault:
             if fault.quality is Quality.LINE_LOST:
                 raise
-            if fault.quality not in NOTHING_UNDER_WAY:
-                line.drain()
-            gauge.fail(fault.quality, fault.detail, self._clock.monotonic())
+            self._fail(gauge, line, fault.quality, fault.detail)
         except MemoryError:  # it is the whole process that has none left
             raise
         except Exception as error:  # a driver may raise anything; it must not end the line's thread
             if not gauge.reported:
                 gauge.reported = True
                 log.exception("driver failed", gauge=gauge.name)
-            line.drain()
-            gauge.fail(Quality.DRIVER_ERROR, f"{type(error).__name__}: {error}", self._clock.monotonic())
+            self._fail(gauge, line, Quality.DRIVER_ERROR, f"{type(error).__name__}: {error}")
+
+    def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
+        """Raises LineFault (LINE_LOST)."""
+        failed_s = self._clock.monotonic()
+        if quality in NOTHING_UNDER_WAY:
+            gauge.fail(quality, detail, failed_s)
+            return
+        self._order.missed(failed_s)
+        # A unit that has been absent before costs the others on the line its timeout, and no silence after it.
+        absent = quality is Quality.TIMEOUT and gauge.failures > 0 and len(self.gauges) > 1
+        came = b"" if absent else line.drain()
+        if came or quality is not Quality.TIMEOUT:
+            self._discard_waiting(
+                f"does not count, since {gauge.name} in the same round had {quality} {detail}".rstrip()
+            )
+        gauge.fail(quality, detail, failed_s)
 
 
 class Acquisition:
@@ -192,15 +283,18 @@ class Acquisition:
     def __init__(
         self,
         lines: Mapping[str, tuple[LineSettings, Sequence[tuple[str, Gauge[Any]]]]],
+        stale_after_s: Mapping[str, float],
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
         trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
-        """`lines`: settings of each line and its gauges as (name, driver), by name of the line; `trust`: see
-        `LineThread`."""
+        """`lines`: settings of each line and its gauges as (name, driver), by name of the line.
+
+        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: see `LineThread`.
+        """
         self.lines = {
-            name: LineThread(name, settings, gauges, latest, clock, opener, trust)
+            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener, trust)
             for name, (settings, gauges) in lines.items()
         }
 

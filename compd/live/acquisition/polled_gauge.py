@@ -17,6 +17,10 @@ from compd.live.memory.latest import LONGEST_DETAIL, Latest
 log = structlog.get_logger()
 
 _NO_TRUST: Mapping[str, ReadingTrust] = {}
+# Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
+MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
+# A gauge on a line that is open rests at most so long, s: what a fault has cost is known again within a second.
+LONGEST_REST_S = 0.9
 # How far ahead of now, s, the time of a reading may be: `send` returns when the last bit will have left. One further
 # ahead is of another clock.
 AHEAD_S = 0.05
@@ -51,6 +55,7 @@ class PolledGauge:
     quality, detail : of the last poll.
     last_ok_s : monotonic time (s) of the last poll in which every channel had a value; nan before.
     rests_until_s : monotonic time (s) before which it is not asked again.
+    failures : polls that failed as a whole, in a row.
     reported : whether an exception of its driver is in the log already.
     """
 
@@ -59,11 +64,13 @@ class PolledGauge:
         name: str,
         driver: Gauge[Any],
         latest: Latest,
-        back_off_s: tuple[float, float],
+        timeout_s: float,
+        stale_after_s: float,
         clock: Clock,
         trust: Mapping[str, ReadingTrust] = _NO_TRUST,
     ) -> None:
-        """`trust`: judges the readings of each length channel that is wired, by "gauge.channel"."""
+        """`timeout_s`: of the line; `stale_after_s`: age (s) from which a reading is not used; `trust`: judges the
+        readings of each length channel that is wired, by "gauge.channel"."""
         self.name = name
         self.driver = driver
         self.polls = 0
@@ -76,12 +83,15 @@ class PolledGauge:
         self.last_ok_s = math.nan
         self.rests_until_s = -math.inf
         self.reported = False
-        self._failures = 0
-        self._back_off = BackOff(*back_off_s)
+        self.failures = 0
+        self._back_off = BackOff(min(timeout_s, LONGEST_REST_S), LONGEST_REST_S)
+        self._stale_after_s = stale_after_s
         self._latest = latest
         channels = [f"{name}.{channel.name}" for channel in driver.channels]
         self._slots = [latest.index[channel] for channel in channels]
         self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
+        self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
+        self._logged = Quality.NEVER_READ
 
     def read(self, line: Any) -> Sequence[Reading]:
         """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises."""
@@ -94,19 +104,15 @@ class PolledGauge:
         """
         if len(readings) != len(self._slots):
             raise ValueError(f"{len(readings)} readings for {len(self._slots)} channels")
-        faulty = None
         for reading in readings:
             if not reading.time_s <= now_s + AHEAD_S:
                 raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
-            if reading.quality is not Quality.OK:
-                faulty = reading
-            elif not math.isfinite(reading.value):
+            if reading.ok and not math.isfinite(reading.value):
                 raise ValueError(f"{reading.value} given as ok")
         readings = self._trust.judge(readings, now_s)
         faulty = next((reading for reading in reversed(readings) if not reading.ok), None)
-        for slot, reading in zip(self._slots, readings, strict=True):
-            if reading.quality is not Quality.MISMATCH:
-                self._latest.put(slot, reading)
+        for place, reading in enumerate(readings):
+            self._publish_unless_kept(place, reading, now_s)
         self.polls += 1
         if faulty is None:
             self.ok += 1
@@ -114,41 +120,65 @@ class PolledGauge:
         else:
             for quality in {reading.quality for reading in readings} - {Quality.OK}:
                 self.faults[quality] += 1
-        self._failures = 0
+        self.failures = 0
         self._back_off.succeeded()
-        self._report(faulty.quality if faulty else Quality.OK, faulty.detail if faulty else "")
+        self._note(faulty.quality if faulty else Quality.OK, faulty.detail if faulty else "")
+        self._log_change()
 
     def fail(self, quality: Quality, detail: str, now_s: float) -> None:
-        """Count a poll that failed as a whole: every channel takes `quality`.
+        """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
-        After a missing reply, or the second fault in a row, the gauge rests: a late reply has time to come and go, and
-        the others on the line are not slowed.
+        A reading that is still good stays after a fault that may pass (`MAY_PASS`); every other channel takes
+        `quality`. After a missing reply, or the second fault in a row, the gauge rests for one timeout of the line,
+        then for twice as long each time: a late reply has time to come and go, and the others are not slowed.
         """
         self.polls += 1
-        self.lose(quality, detail, now_s)
-        self._failures += 1
-        if quality is Quality.TIMEOUT or self._failures > 1:
+        self.faults[quality] += 1
+        self._trust.fail(quality, now_s)
+        published = bad(now_s, quality, detail)
+        kept = sum(self._publish_unless_kept(place, published, now_s) for place in range(len(self._slots)))
+        self._note(quality, detail)
+        if not kept:
+            self._log_change()
+        self.failures += 1
+        if quality is Quality.TIMEOUT or self.failures > 1:
             self.rests_until_s = now_s + self._back_off.failed()
 
     def lose(self, quality: Quality, detail: str, now_s: float) -> None:
-        """Give every channel `quality`; with LINE_LOST also without a poll."""
+        """Give every channel `quality`, without a poll: the line is lost."""
         self._trust.fail(quality, now_s)
-        for slot in self._slots:
-            self._latest.put(slot, bad(now_s, quality, detail))
         self.faults[quality] += 1
-        self._report(quality, detail)
+        for place in range(len(self._slots)):
+            self._publish(place, bad(now_s, quality, detail))
+        self._note(quality, detail)
+        self._log_change()
 
     def resume(self) -> None:
         """End a rest, since the line has been opened anew."""
         self.rests_until_s = -math.inf
 
-    def _report(self, quality: Quality, detail: str) -> None:
-        """Log a change of quality, except to and from LINE_LOST, which the line logs once for all its gauges."""
-        if quality is not self.quality and Quality.LINE_LOST not in (quality, self.quality):
-            log_change = log.info if quality is Quality.OK else log.warning
-            log_change("gauge", gauge=self.name, quality=str(quality), was=str(self.quality), detail=detail)
+    def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
+        """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
+        last = self._published[place]
+        if reading.quality in MAY_PASS and last.ok and now_s - last.time_s <= self._stale_after_s:
+            return True
+        self._publish(place, reading)
+        return False
+
+    def _publish(self, place: int, reading: Reading) -> None:
+        self._published[place] = reading
+        self._latest.put(self._slots[place], reading)
+
+    def _note(self, quality: Quality, detail: str) -> None:
         self.quality = quality
         self.detail = detail[:LONGEST_DETAIL]
+
+    def _log_change(self) -> None:
+        """Log a change of quality, except to and from LINE_LOST, which the line logs once for all its gauges."""
+        quality, was, self._logged = self.quality, self._logged, self.quality
+        if quality is not was and Quality.LINE_LOST not in (quality, was):
+            log_change = log.info if quality is Quality.OK else log.warning
+            log_change("gauge", gauge=self.name, quality=str(quality), was=str(was), detail=self.detail)
 
     def status(self) -> dict[str, Any]:
         """The gauge's part of STATUS, as plain data; what is not known is left out."""

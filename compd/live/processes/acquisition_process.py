@@ -16,9 +16,12 @@ from compd.live.acquisition.votes.votes import LOOK_EVERY_S
 from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
 from compd.live.processes.control import Control, Phase
+from compd.live.realtime import LARGEST_SHARE, RationedPriority
 
 # A driver in the middle of a poll may take so long to let go of its line.
 _STOP_WITHIN_S = 0.5
+# Processor time of a line that polls as fast as it goes, with a margin: 115200 baud takes 0.04 (benchmarks/).
+_SHARE_OF_A_FAST_LINE = 0.1
 _STATUS_BYTES = 1024 * 1024
 _BYTES_PER_MB = 1_000_000
 
@@ -38,16 +41,21 @@ class AcquisitionProcess:
         control: Control,
         clock: Clock,
         memory_mb: float,
+        priority: int,
         look: Callable[[float], None] = lambda now_s: None,
     ) -> None:
-        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB; `look`: called with
-        the time (s) every `LOOK_EVERY_S`, for the votes of the gauges."""
+        """`make`: the acquisition of its lines; `memory_mb`: by how much the process may grow, MB.
+
+        `priority`: real-time priority of the lines' threads, below the loop's and the service's; 0 for none. `look`:
+        called with the time (s) every `LOOK_EVERY_S`, for the votes of the gauges.
+        """
         self.name = name
         self._make = make
         self._control = control
         self._clock = clock
         self._memory_mb = memory_mb
         self._look = look
+        self._priority = priority
         self._status = SharedMessage(_STATUS_BYTES)
 
     @property
@@ -66,12 +74,22 @@ class AcquisitionProcess:
         acquisition = self._make()
         acquisition.start()
         _limit_memory(self._memory_mb)
+        priorities = self._priorities(acquisition)
         never = threading.Event()
         while self._control.phase != Phase.STOPPING:
+            for priority in priorities:
+                priority.look()
             self._status.write(dict(acquisition.status()))
             self._look(self._clock.monotonic())
             self._clock.wait(never, LOOK_EVERY_S)
         acquisition.stop(_STOP_WITHIN_S)
+
+    def _priorities(self, acquisition: Acquisition) -> list[RationedPriority]:
+        """Of this thread and of every line's. This one looks after the others: a driver that never waits loses its."""
+        threads = [line.thread_id for line in acquisition.lines.values()]
+        share = max(LARGEST_SHARE / max(1, len(threads)), _SHARE_OF_A_FAST_LINE)
+        own = RationedPriority(self._priority, self._clock)
+        return [own, *(RationedPriority(self._priority, self._clock, thread, share) for thread in threads)]
 
 
 def _limit_memory(memory_mb: float) -> None:

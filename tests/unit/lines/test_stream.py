@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import socket
 import termios
@@ -223,6 +224,29 @@ def test_a_write_to_a_pulled_plug_loses_the_line(pty: tuple[int, str]) -> None:
     with pytest.raises(LineFault) as caught:
         port.write(b"?")
     assert caught.value.quality is Quality.LINE_LOST
+    port.close()
+
+
+def test_a_port_that_takes_no_bytes_is_a_fault_of_the_poll_and_not_a_lost_line(pty: tuple[int, str]) -> None:
+    _, name = pty
+    port = SerialPort(name, 9600, "8N1", False, 0.01)
+    with pytest.raises(LineFault, match="could not be written within") as caught:
+        port.write(bytes(1_000_000))  # nobody reads the other end
+    assert caught.value.quality is Quality.TIMEOUT
+    port.close()
+
+
+def test_a_busy_computer_is_no_fault_of_a_request_that_has_left(
+    pty: tuple[int, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process has no processor from before a write until long after its timeout: the bytes are out all the same."""
+    master, name = pty
+    port = SerialPort(name, 9600, "8N1", False, 0.1)
+    now_s = itertools.count(0.0, 1.0)  # a second passes from one look at the clock to the next
+    monkeypatch.setattr("time.monotonic", lambda: next(now_s))
+    port.write(b"?\r")
+    monkeypatch.undo()
+    assert os.read(master, 10) == b"?\r"
     port.close()
 
 

@@ -42,7 +42,7 @@ class Shop:
         self.gauges = {}
         for name in GAUGES:
             trust = {f"{name}.value": ReadingTrust(self.memory, f"{name}.value", self._settings)}
-            self.gauges[name] = PolledGauge(name, Scale(self, name), self.latest, (0.5, 1.0), self, trust)
+            self.gauges[name] = PolledGauge(name, Scale(self, name), self.latest, 0.1, STALE_AFTER_S, self, trust)
 
     def monotonic(self) -> float:
         return self.now_s

@@ -7,6 +7,8 @@ import math
 import os
 import signal
 import socket
+import threading
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -21,7 +23,7 @@ from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.processes.loop_process import ModelChange
 from compd.live.processes.loop_succession import LoopSuccession
 from compd.live.processes.service_process import StateLog
-from compd.live.realtime import RationedPriority
+from compd.live.realtime import RationedPriority, thread_time_s
 from compd.live.service.loop_watch import LoopWatch
 
 
@@ -217,6 +219,40 @@ def test_priority_is_given_up_while_a_thread_takes_more_than_half_a_processor(mo
     assert had == [True, True, True, False, False, True]
     assert [policy & ~os.SCHED_RESET_ON_FORK for policy in policies] == [os.SCHED_FIFO, os.SCHED_OTHER, os.SCHED_FIFO]
     assert all(policy & os.SCHED_RESET_ON_FORK for policy in policies), "threads that it starts have none"
+
+
+def test_the_thread_of_a_line_has_its_priority_from_another_thread_and_loses_it_when_it_never_waits(monkeypatch):
+    now, used, policies = [0.0], [0.0], []
+    monkeypatch.setattr("compd.live.realtime.thread_time_s", lambda thread_id: used[0])
+    monkeypatch.setattr(
+        "compd.live.realtime.os.sched_setscheduler",
+        lambda thread, policy, _: policies.append((thread, policy & ~os.SCHED_RESET_ON_FORK)),
+    )
+    priority = RationedPriority(10, SimpleNamespace(monotonic=lambda: now[0]), 4711, 0.25)
+    for share in (0.2, 0.3, 0.3):
+        priority.look()
+        now[0] += 0.11
+        used[0] += 0.11 * share
+    assert policies == [(4711, os.SCHED_FIFO), (4711, os.SCHED_OTHER)]
+
+
+def test_the_processor_time_of_a_thread_is_its_own_until_it_has_ended():
+    started, end = threading.Event(), threading.Event()
+
+    def line() -> None:
+        sum(range(1_000_000))
+        started.set()
+        end.wait()
+
+    thread = threading.Thread(target=line)
+    thread.start()
+    assert started.wait(20.0)
+    assert 0.0 < thread_time_s(thread.native_id) < time.process_time()
+    assert thread_time_s(threading.get_native_id()) == pytest.approx(time.thread_time(), abs=0.1)
+    end.set()
+    thread.join()
+    with pytest.raises(OSError, match="Invalid argument"):
+        thread_time_s(2**22)  # beyond the kernel's last
 
 
 def test_where_priority_is_not_permitted_it_is_asked_for_once(monkeypatch):

@@ -1,0 +1,202 @@
+"""Nine comparators on one line whose replies do not say whose they are: a reply may be late by any time.
+
+The comparators stand still, 2 um apart, so that no number looks wrong; each takes 60 ms to answer. Time is virtual.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compd.clock import Clock
+from compd.commissioning.conformance.faults import Piece
+from compd.commissioning.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
+from compd.gauge import Gauge, Quality, replies_tell_whose
+from compd.live.acquisition.acquisition import LineThread
+from compd.plugins import GAUGES, load
+from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+
+UNITS = 9
+ANSWER_S = 60e-3
+TIMEOUT_S = 0.3
+SETTINGS_TCP = SETTINGS.validate_python({"kind": "tcp", "host": "x", "port": 1, "timeout_s": TIMEOUT_S})
+
+
+class Comparators:
+    """The far end: units that answer `01` CR, `02` CR ... by their bare measure, unit k shows 2 k um.
+
+    reply : changes what comes back, a list of pieces, by the number of the request from 1 on.
+    """
+
+    longest = 12
+
+    def __init__(self, reply: Callable[[int, Piece], Sequence[Piece]] = lambda _, piece: [piece]) -> None:
+        self._reply = reply
+        self.requests = 0
+
+    def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+        self.requests += 1
+        measure = f"+{2e-3 * int(request):08.4f}\r".encode()
+        return self._reply(self.requests, Piece(ANSWER_S - TURNAROUND_S, measure))
+
+
+def comparator(unit: int, form: str = "%+09.4f") -> Gauge[Any]:
+    driver = load(GAUGES, "serial_ascii", "test")
+    options = {
+        "driver": "serial_ascii",
+        "line": "line",
+        "out": f"{unit:02}",
+        "out_terminator": r"\r",
+        "in": form,
+        "in_terminator": r"\r",
+        "channels": [{"name": "x", "unit": "1"}],
+    }
+    return driver(driver.Options.model_validate(options))
+
+
+class EndingClock:
+    """The clock of a virtual wire, which calls `end` once its time has come."""
+
+    def __init__(self, clock: VirtualClock, until_s: float, end: Callable[[], None]) -> None:
+        self._clock = clock
+        self._until_s = until_s
+        self._end = end
+
+    def monotonic(self) -> float:
+        if self._clock.now_s > self._until_s:
+            self._end()
+        return self._clock.now_s
+
+    def wait(self, event: threading.Event, timeout_s: float) -> bool:
+        return self._clock.wait(event, timeout_s)
+
+
+class Run:
+    """One line's thread on a virtual wire, for so many seconds of its time."""
+
+    def __init__(self, device: Comparators, gauges: Sequence[Gauge[Any]], seconds: float) -> None:
+        self.wire = VirtualWire(device, registers=False, timeout_s=TIMEOUT_S)  # type: ignore[arg-type]
+        self.names = [f"c{k}" for k in range(1, len(gauges) + 1)]
+        self.latest = WatchedLatest([f"{name}.x" for name in self.names])
+        clock = EndingClock(self.wire.clock, self.wire.clock.now_s + seconds, self._end)
+
+        def opener(settings: Any, clock: Clock) -> Any:
+            return self.wire.open()
+
+        named = list(zip(self.names, gauges, strict=True))
+        stale_after_s = dict.fromkeys(self.names, 2.0)
+        self.thread = LineThread("line", SETTINGS_TCP, named, stale_after_s, self.latest, clock, opener)
+        self.thread.start()
+        assert self.thread.join(PATIENCE_S)
+
+    def _end(self) -> None:
+        self.thread.stop()
+
+    def wrong(self) -> list[str]:
+        """Every reading that was published as good and is another comparator's."""
+        return [
+            f"{name} {reading.value:.4f} at {reading.time_s:.3f} s"
+            for name, reading in self.latest.history
+            if reading.ok and abs(reading.value - 2e-3 * int(name[1 : name.index(".")])) > 1e-6
+        ]
+
+    def polls(self) -> int:
+        return sum(gauge.polls for gauge in self.thread.gauges)
+
+    def good(self) -> int:
+        return sum(gauge.ok for gauge in self.thread.gauges)
+
+
+def late_once(number: int, late_s: float) -> Callable[[int, Piece], Sequence[Piece]]:
+    return lambda request, piece: [piece._replace(delay_s=late_s)] if request == number else [piece]
+
+
+NINE = [comparator(unit) for unit in range(1, UNITS + 1)]
+
+
+@pytest.mark.parametrize("late_s", [*np.linspace(0.4, 3.0, 30).tolist(), 10.0, 20.0])
+def test_one_late_reply_never_shifts_the_comparators(late_s: float) -> None:
+    run = Run(Comparators(late_once(30, late_s)), NINE, 5.0 + late_s)
+    assert run.wrong() == []
+    assert run.good() > 0.7 * run.polls(), "and it costs a few rounds"
+    assert run.thread.gauges[2].faults[Quality.TIMEOUT] == 1
+
+
+@pytest.mark.parametrize("after_s", [0.02, 0.07, 0.1, 0.5, 5.0])
+def test_a_reply_that_nobody_asked_for_never_shifts_the_comparators(after_s: float) -> None:
+    """The button on a comparator that sends its reading: no request was left without an answer before."""
+
+    def twice(request: int, piece: Piece) -> Sequence[Piece]:
+        return [piece, piece._replace(delay_s=piece.delay_s + after_s)] if request == 40 else [piece]
+
+    run = Run(Comparators(twice), NINE, 12.0)
+    assert run.wrong() == []
+    assert run.good() > 0.8 * run.polls()
+
+
+def test_late_replies_again_and_again_give_no_wrong_reading() -> None:
+    rng = np.random.default_rng(1)
+    late = set(range(20, 100_000, 73))
+
+    def reply(request: int, piece: Piece) -> Sequence[Piece]:
+        return [piece._replace(delay_s=rng.uniform(0.3, 4.0))] if request in late else [piece]
+
+    run = Run(Comparators(reply), NINE, 1200.0)
+    assert run.wrong() == []
+    assert run.good() > 0.6 * run.polls()
+
+
+def test_an_absent_comparator_costs_the_others_little() -> None:
+    def without_the_fifth(_: int, piece: Piece) -> Sequence[Piece]:
+        return [] if b"0.0100" in piece.data else [piece]
+
+    whole, without = Run(Comparators(), NINE, 60.0), Run(Comparators(without_the_fifth), NINE, 60.0)
+    assert without.wrong() == []
+    assert without.thread.gauges[4].ok == 0
+    assert all(gauge.ok > 0.7 * whole.thread.gauges[0].ok for k, gauge in enumerate(without.thread.gauges) if k != 4)
+
+
+def test_replies_with_an_address_need_no_silence_at_the_end_of_a_round() -> None:
+    """The price of the silence at the end of a round: less than a sixth of nine comparators' rate."""
+    addressed = [comparator(unit, f"{unit:02}%+09.4f") for unit in range(1, UNITS + 1)]
+
+    class Addressed(Comparators):
+        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, heard_s, timeout_s)
+            return [piece._replace(data=request[:2] + piece.data)]
+
+    told, not_told = Run(Addressed(), addressed, 60.0), Run(Comparators(), NINE, 60.0)
+    assert told.wrong() == not_told.wrong() == []
+    assert 5 / 6 * told.good() < not_told.good() < told.good()
+
+
+@pytest.mark.parametrize("late_s", np.linspace(0.4, 3.0, 14).tolist())
+def test_a_late_reply_does_not_leave_a_single_gauge_one_reply_behind(late_s: float) -> None:
+    """A reading that answers the request before is stamped with the time of this one: its age is understated."""
+    counter = itertools.count(1)
+
+    class Counting(Comparators):
+        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, heard_s, timeout_s)
+            heard[number := next(counter)] = heard_s
+            delay_s = late_s if number == 30 else piece.delay_s
+            return [Piece(delay_s, f"+{number:08.4f}\r".encode())]
+
+    heard: dict[int, float] = {}
+    run = Run(Counting(), [comparator(1)], 8.0)
+    readings = [reading for _, reading in run.latest.history if reading.ok]
+    assert len(readings) > 30
+    assert [r.time_s for r in readings] == pytest.approx([heard[round(r.value)] for r in readings])
+
+
+def test_identities_differ_only_where_none_begins_another() -> None:
+    assert replies_tell_whose([comparator(1, "A%+09.4f"), comparator(2, "B%+09.4f")])
+    assert not replies_tell_whose([comparator(1, "1%+09.4f"), comparator(2, "12%+09.4f")])
+    assert not replies_tell_whose([comparator(1, "A%+09.4f"), comparator(2)])
+    assert not replies_tell_whose([comparator(1, "%+09.4fA"), comparator(2, "%+09.4fB")]), "only its beginning counts"
+    assert replies_tell_whose([comparator(1)])
