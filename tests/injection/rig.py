@@ -43,7 +43,8 @@ TRUTH_EVERY_S = 0.05
 class Verdict:
     """What became of the setpoints of a time.
 
-    worst_um : largest distance of a valid tip from the true one, the machine at rest; nan where none was valid.
+    worst_um : largest distance of a valid tip from the true one, the machine at rest; nan where none was valid, inf
+    for a tip that is no number.
     worst : that setpoint. states : how often each state was there. reasons : likewise.
     """
 
@@ -73,7 +74,9 @@ class Verdict:
             return
         self.judged += 1
         error_um = float(np.linalg.norm(np.subtract(seen["tip_M_mm"], tip_mm))) * 1e3
-        if not error_um <= self.worst_um:  # also the first, and one that is not finite
+        if not math.isfinite(error_um):
+            error_um = math.inf
+        if math.isnan(self.worst_um) or error_um > self.worst_um:
             self.worst_um, self.worst = error_um, seen.setpoint
 
 
