@@ -26,7 +26,8 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.errors import Problem, StateError
+from compd.configuration.yaml_reader import decode, parse_yaml, read_text
+from compd.errors import ConfigurationError, Problem, StateError
 from compd.files import write_files
 from compd.release import __version__
 
@@ -141,13 +142,12 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
     """
     where = str(path)
     try:
-        data = yaml.safe_load((path.read_bytes() if content is None else content).decode())
-    except OSError as error:
-        raise StateError(
-            Problem(where=where, what=f"cannot be read: {error.strerror}", next_step="`compd effect add` writes one")
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise StateError(Problem(where=where, what="is not YAML", value=str(error).splitlines()[0])) from error
+        text = (
+            read_text(path, "a model file; `compd effect add` writes one") if content is None else decode(content, path)
+        )
+        data, _ = parse_yaml(text, path, dumped=True)
+    except ConfigurationError as error:
+        raise StateError(error.problems) from error
     if not isinstance(data, dict):
         raise StateError(
             Problem(

@@ -21,6 +21,9 @@ def main() -> None:
     try:
         app()
     except CompdError as error:
+        from compd.cli.problems import print_problems
+
+        print_problems(error.problems)
         count = len(error.problems)
-        print(*error.problems, f"{count} problem{'s' * (count != 1)}", sep="\n", file=sys.stderr)
+        print(f"{count} problem{'s' * (count != 1)}", file=sys.stderr)
         sys.exit(2)

@@ -149,7 +149,7 @@ def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget])
             configuration.gauges[gauge].stale_after_s or configuration.loop.stale_after_s
             for gauge in _gauges_on(configuration, budget.name)
         )
-        problems += line_warnings(budget, stale_after_s, f"{configuration.path} lines.{budget.name}")
+        problems += line_warnings(budget, stale_after_s, configuration.where("lines", budget.name))
     return problems
 
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import ValidationError
 
 from compd.clock import Clock
 from compd.configuration import load as load_configuration
 from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
+from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.lines import Line, open_line, open_stream
@@ -72,7 +72,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
             raise ConfigurationError(
                 Problem(where="--set", what="is not KEY=VALUE", value=assignment, allowed="--set heads=9")
             )
-        options[key] = yaml.safe_load(value)
+        options[key], _ = parse_yaml(value, Path(f"--set {key}"))
     try:
         gauge = kind(kind.Options.model_validate(options))
     except ValidationError as error:

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from compd.configuration.document import Document, Location
-from compd.configuration.geometry import Geometry
-from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
-from compd.configuration.operation import FRAME_DISTANCES, AcquisitionSettings, JointWire, Wiring
+from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
 
@@ -20,55 +18,58 @@ _OWN_PACKAGES = ("compd", "compd_drivers")
 
 @dataclass(frozen=True)
 class Sections:
-    """What could be read of a document; None, or left out of the mapping, where a section or a gauge has a problem.
+    """What could be read of a document, as `section.readable` gives it: None where something has a problem of its own.
 
-    gauges : options by name. drivers : the gauges' driver classes by name.
+    links : of the machine, 3 or 6. gauges : options by name, without the faulty ones. drivers : the gauges' driver
+        classes by name.
     """
 
     document: Document
-    geometry: Geometry | None
-    lines: Mapping[str, LineSettings] | None
+    links: int | None
+    lines: Mapping[str, Any]
     gauges: Mapping[str, GaugeOptions]
     drivers: Mapping[str, type[Gauge[Any]]]
-    wiring: Wiring | None
-    acquisition: AcquisitionSettings | None = None
+    wiring: Any
+    acquisition: Any = None
 
 
 def problems(sections: Sections) -> list[Problem]:
-    """Every contradiction between sections that could be read."""
-    contradictions = [*_port_problems(sections), *_line_problems(sections), *_process_problems(sections)]
-    if sections.wiring is not None:
-        contradictions += [
-            *_channel_problems(sections, sections.wiring),
-            *_completeness_problems(sections, sections.wiring),
-        ]
-    return contradictions
+    """Every contradiction between sections, as far as they could be read."""
+    return [
+        *_port_problems(sections),
+        *_line_problems(sections),
+        *_process_problems(sections),
+        *_channel_problems(sections),
+        *_completeness_problems(sections),
+    ]
 
 
 def warnings(sections: Sections) -> list[Problem]:
     """What can be used but is probably a mistake or a risk: lines without gauges, gauges without wires, drivers from
     elsewhere in the process of the other lines."""
-    used_lines = {options.line for options in sections.gauges.values()}
+    gauges = sections.document.data.get("gauges")
+    named = gauges.values() if isinstance(gauges, dict) else ()
+    used_lines = {str(options.get("line")) for options in named if isinstance(options, dict)}
     unused = [
         Problem(
             where=sections.document.where(("lines", name)),
             what="no gauge uses this line",
             next_step="remove it or wire a gauge",
         )
-        for name in sections.lines or {}
-        if name not in used_lines
+        for name in sections.lines
+        if used_lines and name not in used_lines
     ]
-    if sections.wiring is not None:
-        wired_gauges = {channel.split(".")[0] for _, channel, _ in _wires(sections.wiring)}
-        unused += [
-            Problem(
-                where=sections.document.where(("gauges", name)),
-                what="polled but wired to nothing",
-                next_step="name it under `wiring:` or remove it",
-            )
-            for name in sections.gauges
-            if name not in wired_gauges
-        ]
+    wired_gauges = {channel.split(".")[0] for _, channel, _ in _wires(sections.wiring)}
+    whole = all(_is_whole(sections.wiring, kind, "gauge") for kind in ("scale", "joint", "frame", "quantities"))
+    unused += [
+        Problem(
+            where=sections.document.where(("gauges", name)),
+            what="polled but wired to nothing",
+            next_step="name it under `wiring:` or remove it",
+        )
+        for name in sections.gauges
+        if whole and name not in wired_gauges
+    ]
     return [*unused, *_shared_process_warnings(sections)]
 
 
@@ -91,12 +92,12 @@ def resolve_channel(
 def _port_problems(sections: Sections) -> Iterator[Problem]:
     """A port that two lines name."""
     line_of_port: dict[str, str] = {}
-    for name, line in (sections.lines or {}).items():
-        match line:
-            case SerialLine() | ModbusRtuLine():
-                port = line.port
-            case TcpLine() | ModbusTcpLine():
-                port = f"{line.host}:{line.port}"
+    for name, line in sections.lines.items():
+        port = getattr(line, "port", None)
+        if port is None or getattr(line, "kind", None) is None:
+            continue
+        if line.kind in ("tcp", "modbus_tcp"):
+            port = f"{line.host}:{port}"
         if port in line_of_port:
             yield Problem(
                 where=sections.document.where(("lines", name, "port")),
@@ -110,27 +111,32 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
 
 def _line_problems(sections: Sections) -> Iterator[Problem]:
     """A gauge whose line does not exist, or carries registers where the driver needs bytes or the other way round."""
-    if sections.lines is None:
+    lines, gauges = sections.document.data.get("lines"), sections.document.data.get("gauges")
+    if not isinstance(lines, dict) or not isinstance(gauges, dict):
         return
-    for name, options in sections.gauges.items():
-        location: Location = ("gauges", name, "line")
-        line = sections.lines.get(options.line)
-        if line is None:
-            if options.line not in (sections.document.data.get("lines") or {}):
-                yield Problem(
-                    where=sections.document.where(location),
-                    what="no such line",
-                    value=options.line,
-                    allowed=", ".join(sections.lines),
-                    next_step="write the name of a line under `lines:`",
-                )
+    for name, options in gauges.items():
+        line_name = options.get("line") if isinstance(options, dict) else None
+        if not isinstance(line_name, str):
             continue
-        carries: Literal["bytes", "registers"] = "registers" if line.kind.startswith("modbus") else "bytes"
+        location: Location = ("gauges", name, "line")
+        if line_name not in lines:
+            yield Problem(
+                where=sections.document.where(location),
+                what="no such line",
+                value=line_name,
+                allowed=", ".join(map(str, lines)),
+                next_step="write the name of a line under `lines:`",
+            )
+            continue
+        kind = getattr(sections.lines.get(line_name), "kind", None)
+        if kind is None or name not in sections.drivers:
+            continue
+        carries: Literal["bytes", "registers"] = "registers" if kind.startswith("modbus") else "bytes"
         if carries != sections.drivers[name].line_kind:
             yield Problem(
                 where=sections.document.where(location),
-                what=f"driver {options.driver} needs a line that carries {sections.drivers[name].line_kind}",
-                value=f"{options.line} (kind {line.kind})",
+                what=f"driver {options['driver']} needs a line that carries {sections.drivers[name].line_kind}",
+                value=f"{line_name} (kind {kind})",
                 allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
 
@@ -138,10 +144,12 @@ def _line_problems(sections: Sections) -> Iterator[Problem]:
 def _process_problems(sections: Sections) -> Iterator[Problem]:
     """A line that is to have a process of its own and does not exist, or is named twice."""
     lines = sections.document.data.get("lines")
-    if sections.acquisition is None or not isinstance(lines, dict):
+    if not isinstance(lines, dict):
         return
     named: set[str] = set()
-    for i, name in enumerate(sections.acquisition.own_process):
+    for i, name in enumerate(getattr(sections.acquisition, "own_process", None) or ()):
+        if name is None:
+            continue
         where = sections.document.where(("acquisition", "own_process", i))
         if name not in lines:
             yield Problem(
@@ -158,11 +166,9 @@ def _process_problems(sections: Sections) -> Iterator[Problem]:
 
 def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
     """A driver that is not part of compd, on a line that shares its process with others."""
-    if sections.acquisition is None:
-        return
-    own_process = sections.acquisition.own_process
+    own_process = getattr(sections.acquisition, "own_process", None) or ()
     for name, options in sections.gauges.items():
-        shared = set(sections.lines or ()).difference(own_process)
+        shared = set(sections.lines).difference(own_process)
         if options.line in shared and len(shared) > 1 and _from_elsewhere(options.driver, sections.drivers[name]):
             yield Problem(
                 where=sections.document.where(("gauges", name, "driver")),
@@ -178,20 +184,27 @@ def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:
     return driver.startswith("/") or kind.__module__.partition(".")[0] not in _OWN_PACKAGES
 
 
-def _wires(wiring: Wiring) -> Iterator[tuple[Location, str, str]]:
-    """Every wire: its location in the document, the channel that it names, the unit that it must have."""
-    for kind in ("scale", "joint", "frame"):
-        for i, wire in enumerate(getattr(wiring, kind)):
-            yield ("wiring", kind, i, "gauge"), wire.gauge, "mm"
-    for i, quantity in enumerate(wiring.quantities):
-        yield ("wiring", "quantities", i, "gauge"), quantity.gauge, quantity.name.rsplit("_", 1)[1]
+def _entries(wiring: Any, kind: str) -> list[tuple[int, Any]]:
+    """The wires of a kind that could be read, each with its place in the list."""
+    return [(i, wire) for i, wire in enumerate(getattr(wiring, kind, None) or ()) if wire is not None]
 
 
-def _channel_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
+def _wires(wiring: Any) -> Iterator[tuple[Location, str, str]]:
+    """Every wire: its location in the document, the channel that it names, the unit that it must have; "" for any."""
+    for kind in ("scale", "joint", "frame", "quantities"):
+        for i, wire in _entries(wiring, kind):
+            if wire.gauge is not None:
+                unit = "mm" if kind != "quantities" else (wire.name or "").rpartition("_")[2]
+                yield ("wiring", kind, i, "gauge"), wire.gauge, unit
+
+
+def _channel_problems(sections: Sections) -> Iterator[Problem]:
     """A wire whose channel does not exist, has another unit, or is wired already."""
     location_of_channel: dict[str, Location] = {}
-    gauges_in_file = sections.document.data.get("gauges") or {}
-    for location, channel, unit in _wires(wiring):
+    gauges_in_file = sections.document.data.get("gauges")
+    if not isinstance(gauges_in_file, dict):
+        return
+    for location, channel, unit in _wires(sections.wiring):
         name = channel.split(".")[0]
         where = sections.document.where(location)
         if name not in sections.gauges:
@@ -200,7 +213,7 @@ def _channel_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
                     where=where,
                     what="no such gauge",
                     value=channel,
-                    allowed=", ".join(gauges_in_file),
+                    allowed=", ".join(map(str, gauges_in_file)),
                     next_step="write a name under `gauges:`",
                 )
             continue
@@ -216,7 +229,7 @@ def _channel_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
             )
             continue
         delivers = units[full_name.split(".")[1]]
-        if delivers != unit:
+        if unit and delivers != unit:
             yield Problem(where=where, what=f"needs a gauge in {unit}, this one delivers {delivers}", value=channel)
         if full_name in location_of_channel:
             yield Problem(
@@ -228,44 +241,80 @@ def _channel_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
         location_of_channel[full_name] = location
 
 
-def _completeness_problems(sections: Sections, wiring: Wiring) -> Iterator[Problem]:
+def _completeness_problems(sections: Sections) -> Iterator[Problem]:
     """Frame distances, quantities, scales and joint comparators that are wired too rarely or too often."""
-    where = sections.document.where
-    counts: Counter[str] = Counter(wire.distance for wire in wiring.frame)
+    yield from _frame_problems(sections)
+    yield from _quantity_problems(sections)
+    if sections.links is not None:
+        yield from _scale_problems(sections, sections.links)
+        yield from _joint_problems(sections, sections.links)
+
+
+def _is_whole(wiring: Any, kind: str, key: str) -> bool:
+    """Whether this key of all wires of a kind could be read: only then is one that is not there missing."""
+    wires = getattr(wiring, kind, None)
+    return wires is not None and all(getattr(wire, key, None) is not None for wire in wires)
+
+
+def _frame_problems(sections: Sections) -> Iterator[Problem]:
+    counts = Counter(wire.distance for _, wire in _entries(sections.wiring, "frame"))
+    least = 1 if _is_whole(sections.wiring, "frame", "distance") else 0
     for distance in FRAME_DISTANCES:
-        if counts[distance] != 1:
+        if not least <= counts[distance] <= 1:
             yield Problem(
-                where=where(("wiring", "frame")),
+                where=sections.document.where(("wiring", "frame")),
                 what=f"frame distance {distance} is wired {counts[distance]} times",
                 allowed="t1..t3 and u1..u6, each exactly once",
             )
-    names = Counter(quantity.name for quantity in wiring.quantities)
+
+
+def _quantity_problems(sections: Sections) -> Iterator[Problem]:
+    names = Counter(wire.name for _, wire in _entries(sections.wiring, "quantities"))
     for name, count in names.items():
-        if count > 1:
+        if name is not None and count > 1:
             yield Problem(
-                where=where(("wiring", "quantities")), what=f"{name} is wired {count} times", allowed="each name once"
+                where=sections.document.where(("wiring", "quantities")),
+                what=f"{name} is wired {count} times",
+                allowed="each name once",
             )
-    if sections.geometry is None:
-        return
-    links = sections.geometry.links
-    scales = Counter(wire.link for wire in wiring.scale)
-    for link in sorted({*range(1, links + 1), *scales}):
-        if scales[link] != (1 if link <= links else 0):
+
+
+def _no_such_link(sections: Sections, kind: str, links: int) -> Iterator[Problem]:
+    for i, wire in _entries(sections.wiring, kind):
+        if wire.link is not None and wire.link > links:
             yield Problem(
-                where=where(("wiring", "scale")),
+                where=sections.document.where(("wiring", kind, i, "link")),
+                what="there is no such link",
+                value=str(wire.link),
+                allowed=f"1..{links}",
+            )
+
+
+def _scale_problems(sections: Sections, links: int) -> Iterator[Problem]:
+    yield from _no_such_link(sections, "scale", links)
+    scales = Counter(wire.link for _, wire in _entries(sections.wiring, "scale"))
+    least = 1 if _is_whole(sections.wiring, "scale", "link") else 0
+    for link in range(1, links + 1):
+        if not least <= scales[link] <= 1:
+            yield Problem(
+                where=sections.document.where(("wiring", "scale")),
                 what=f"link {link} has {scales[link]} scales",
                 allowed=f"links 1..{links}, each exactly one",
             )
-    joints_by_link: dict[int, list[JointWire]] = defaultdict(list)
-    for wire in wiring.joint:
+
+
+def _joint_problems(sections: Sections, links: int) -> Iterator[Problem]:
+    yield from _no_such_link(sections, "joint", links)
+    if not (_is_whole(sections.wiring, "joint", "link") and _is_whole(sections.wiring, "joint", "role")):
+        return
+    joints_by_link: dict[int, list[Any]] = defaultdict(list)
+    for _, wire in _entries(sections.wiring, "joint"):
         joints_by_link[wire.link].append(wire)
     for link, wires in sorted(joints_by_link.items()):
         roles = Counter(wire.role for wire in wires)
-        if link > links:
-            yield Problem(where=where(("wiring", "joint")), what=f"there is no link {link}", allowed=f"1..{links}")
         if max(roles.values()) > 1 or roles["Ra"] != roles["Rb"] or (roles["B"] and roles["Ra"]):
             yield Problem(
-                where=where(("wiring", "joint")),
+                where=sections.document.where(("wiring", "joint")),
                 what=f"link {link} has comparators {', '.join(sorted(roles.elements()))}",
                 allowed="at most one S, and either one B or Ra and Rb together",
             )

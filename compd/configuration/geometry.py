@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
+from compd.configuration.document import Location
 from compd.configuration.section import Number, Positive, Section
+
+LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 
 # A drawing gives coordinates to 1 nm at best: a frame that misses its convention by more was measured or typed wrongly.
 CONVENTION_TOLERANCE_MM = 1e-6
@@ -42,28 +47,6 @@ class BasePlatform(Section):
     support_of_joint: tuple[Annotated[int, Field(ge=1, le=3)], ...] = Field(
         description="for each base joint the support (1, 2 or 3) that carries it"
     )
-
-    @model_validator(mode="after")
-    def _frame_convention(self) -> Self:
-        """Check that {B} is the frame of its supports: origin at their centroid, z_B their normal, y_B towards b1."""
-        b1, b2, b3 = self.supports_B_mm
-        for axis in range(3):
-            mean = (b1[axis] + b2[axis] + b3[axis]) / 3
-            if abs(mean) > CONVENTION_TOLERANCE_MM:
-                raise ValueError(
-                    f"supports_B_mm: the centroid must be the origin of {{B}}, its {'xyz'[axis]} is {mean:.6g} mm"
-                )
-        if max(abs(b[2]) for b in self.supports_B_mm) > CONVENTION_TOLERANCE_MM:
-            raise ValueError("supports_B_mm: all three must lie in the plane z = 0 of {B}")
-        if abs(b1[0]) > CONVENTION_TOLERANCE_MM or b1[1] <= 0:
-            raise ValueError(f"supports_B_mm: b1 must lie on +y, is {list(b1)}")
-        if (b2[0] - b1[0]) * (b3[1] - b1[1]) - (b2[1] - b1[1]) * (b3[0] - b1[0]) <= 0:
-            raise ValueError("supports_B_mm: (b2-b1) x (b3-b1) must point along +z; exchange b2 and b3")
-        if len(self.joints_B_mm) != len(self.support_of_joint):
-            raise ValueError(
-                f"joints_B_mm has {len(self.joints_B_mm)} entries, support_of_joint {len(self.support_of_joint)}"
-            )
-        return self
 
 
 class MovingPlatform(Section):
@@ -121,25 +104,99 @@ class Geometry(Section):
     @property
     def links(self) -> int:
         """Number of links: 3 or 6."""
-        return 3 if self.kinematics == "tripod_3spr" else 6
+        return LINKS[self.kinematics]
 
-    @model_validator(mode="after")
-    def _one_entry_per_link(self) -> Self:
-        """Check the number of joints and axes against the number of links, and what a tripod cannot have."""
-        n = self.links
-        counts = {
-            "base.joints_B_mm": len(self.base.joints_B_mm),
-            "platform.joints_P_mm": len(self.platform.joints_P_mm),
-            "platform.revolute_axes_P": len(self.platform.revolute_axes_P),
-        }
-        needed = {**dict.fromkeys(counts, n), "platform.revolute_axes_P": n if n == 3 else 0}
-        wrong = [
-            f"{key} has {counts[key]} entries, needs {needed[key]}" for key in counts if counts[key] != needed[key]
-        ]
-        if wrong:
-            raise ValueError(f"{self.kinematics}: " + "; ".join(wrong))
-        if self.link_length_mm is not None and self.link_length_mm[0] >= self.link_length_mm[1]:
-            raise ValueError(f"link_length_mm: shortest first, then longest, is {list(self.link_length_mm)}")
-        if n == 3 and any(self.tool.zero_rotation_P_in_M_rad):
-            raise ValueError("tool.zero_rotation_P_in_M_rad: a tripod's attitude follows from its tip; leave it out")
-        return self
+
+class Contradiction(NamedTuple):
+    """What does not fit together in a geometry. location : below `geometry`."""
+
+    location: Location
+    what: str
+    value: str = ""
+    allowed: str = ""
+    next_step: str = ""
+
+
+def contradictions(geometry: Any) -> list[Contradiction]:
+    """Everything in a geometry that does not fit together, as far as it could be read.
+
+    geometry : a `Geometry`, or what `section.readable` makes of a faulty one.
+    """
+    base = getattr(geometry, "base", None)
+    return [
+        *_frame_contradictions(base),
+        *_point_contradictions(geometry),
+        *_count_contradictions(geometry),
+        *_length_contradictions(geometry),
+    ]
+
+
+def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
+    """{B} is the frame of its supports: origin at their centroid, z_B their normal, y_B towards b1."""
+    supports = getattr(base, "supports_B_mm", None)
+    if supports is None:
+        return
+    b1, b2, b3 = supports
+    place: Location = ("base", "supports_B_mm")
+    for axis, name in enumerate("xyz"):
+        mean = (b1[axis] + b2[axis] + b3[axis]) / 3
+        if abs(mean) > CONVENTION_TOLERANCE_MM and name != "z":
+            what = f"the centroid must be the origin of {{B}}, its {name} is {mean:.6g} mm"
+            yield Contradiction(place, what, next_step=f"subtract {mean:.12g} from every {name}")
+    for k, support in enumerate(supports):
+        if abs(support[2]) > CONVENTION_TOLERANCE_MM:
+            yield Contradiction((*place, k), "must lie in the plane z = 0 of {B}", f"z {support[2]:g} mm", "0")
+    if abs(b1[0]) > CONVENTION_TOLERANCE_MM or b1[1] <= 0:
+        yield Contradiction((*place, 0), "b1 must lie on +y", str(list(b1)), "[0, y, 0] with y > 0")
+    if (b2[0] - b1[0]) * (b3[1] - b1[1]) - (b2[1] - b1[1]) * (b3[0] - b1[0]) <= 0:
+        yield Contradiction(place, "(b2-b1) x (b3-b1) must point along +z", next_step="exchange b2 and b3")
+
+
+def _point_contradictions(geometry: Any) -> Iterator[Contradiction]:
+    """Points that are the same, and a plate whose points lie in line."""
+    lists: tuple[tuple[Location, Any], ...] = (
+        (("base", "joints_B_mm"), getattr(getattr(geometry, "base", None), "joints_B_mm", None)),
+        (("platform", "joints_P_mm"), getattr(getattr(geometry, "platform", None), "joints_P_mm", None)),
+        (("plate_points_M_mm",), getattr(geometry, "plate_points_M_mm", None)),
+    )
+    for location, points in lists:
+        known = [(i, point) for i, point in enumerate(points or ()) if point is not None]
+        for (i, one), (k, other) in combinations(known, 2):
+            if math.dist(one, other) < CONVENTION_TOLERANCE_MM:
+                yield Contradiction((*location, k), f"is the same point as entry {i + 1}", str(list(other)))
+    plate = lists[-1][1]
+    if plate is not None:
+        sides_mm = sorted(math.dist(one, other) for one, other in combinations(plate, 2))
+        if sides_mm[2] > 0 and sides_mm[0] + sides_mm[1] - sides_mm[2] < CONVENTION_TOLERANCE_MM and sides_mm[0] > 0:
+            yield Contradiction(lists[-1][0], "the three points lie on one line", next_step="let them span the plate")
+
+
+def _count_contradictions(geometry: Any) -> Iterator[Contradiction]:
+    """As many joints and axes as links, and nothing that a tripod cannot have."""
+    kinematics = getattr(geometry, "kinematics", None)
+    if kinematics is None:
+        return
+    n = LINKS[kinematics]
+    needed = {
+        ("base", "joints_B_mm"): n,
+        ("base", "support_of_joint"): n,
+        ("platform", "joints_P_mm"): n,
+        ("platform", "revolute_axes_P"): n if n == 3 else 0,
+    }
+    for (part, key), count in needed.items():
+        entries = getattr(getattr(geometry, part, None), key, None)
+        if entries is not None and len(entries) != count:
+            what = f"has {len(entries)} entries, {kinematics} needs {count}"
+            yield Contradiction((part, key), what, next_step="write one for each link" if count else "leave it out")
+    rotation = getattr(getattr(geometry, "tool", None), "zero_rotation_P_in_M_rad", None)
+    if n == 3 and rotation is not None and any(rotation):
+        what = "a tripod's attitude follows from its tip"
+        yield Contradiction(("tool", "zero_rotation_P_in_M_rad"), what, str(list(rotation)), next_step="leave it out")
+
+
+def _length_contradictions(geometry: Any) -> Iterator[Contradiction]:
+    limits = getattr(geometry, "link_length_mm", None)
+    if limits is not None and limits[0] >= limits[1]:
+        yield Contradiction(
+            ("link_length_mm",), "must be the shortest length first, then the longest", str(list(limits))
+        )

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from compd.configuration.section import Positive, Section
+from compd.configuration.section import Positive, Section, Text
 
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 
@@ -22,9 +22,7 @@ class _LineSettings(Section):
 
 
 class _SerialSettings(_LineSettings):
-    port: str = Field(
-        min_length=1, description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port)"
-    )
+    port: Text = Field(description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port)")
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
     low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")
@@ -43,7 +41,7 @@ class TcpLine(_LineSettings):
     """A stream of bytes over TCP."""
 
     kind: Literal["tcp"] = Field(description="bytes over TCP")
-    host: str = Field(min_length=1, description=_HOST)
+    host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="TCP port of the device")
 
 
@@ -57,7 +55,7 @@ class ModbusTcpLine(_LineSettings):
     """Modbus TCP."""
 
     kind: Literal["modbus_tcp"] = Field(description="Modbus TCP registers")
-    host: str = Field(min_length=1, description=_HOST)
+    host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(default=502, description="TCP port of the device")
 
 

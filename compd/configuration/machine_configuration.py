@@ -5,16 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
-from compd.configuration.geometry import Geometry
+from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.lines import LineSettings
 from compd.configuration.operation import (
     AcquisitionSettings,
@@ -25,7 +26,8 @@ from compd.configuration.operation import (
     VoteSettings,
     Wiring,
 )
-from compd.configuration.section import unknown_key, validate, validation_problems
+from compd.configuration.plausible import implausible
+from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
@@ -35,8 +37,23 @@ from compd.tables import Columns, data_frame, html_table
 if TYPE_CHECKING:
     import pandas as pd
 
+# Sidecars name any machine so that compd does not know.
+_EXTERNAL = "external"
+
+
+def _own_name(machine: str) -> str:
+    """The name itself; ValueError where a sidecar would mean something else by it."""
+    if machine == _EXTERNAL:
+        raise ValueError("recordings of machines without a configuration have this name: choose another one")
+    return machine
+
+
 SECTIONS: Mapping[str, Any] = {
-    "machine": Annotated[str, Field(description="the machine's name, which recordings and model files repeat")],
+    "machine": Annotated[
+        Text,
+        AfterValidator(_own_name),
+        Field(description="the machine's name, which recordings and model files repeat"),
+    ],
     "geometry": Geometry,
     "lines": Annotated[
         dict[str, LineSettings], Field(description="The lines (ports), by name; each is polled by a thread of its own.")
@@ -87,6 +104,8 @@ class Configuration:
         What the gauges say of each other.
     warnings : tuple of Problem
         What can be used but is probably a mistake or a risk.
+    document : Document or None
+        The file's data with the line of every key.
     """
 
     path: Path
@@ -103,6 +122,12 @@ class Configuration:
     acquisition: AcquisitionSettings = OPTIONAL_SECTIONS["acquisition"]
     votes: VoteSettings = OPTIONAL_SECTIONS["votes"]
     warnings: tuple[Problem, ...] = ()
+    document: Document | None = field(default=None, compare=False)
+
+    def where(self, *location: str | int) -> str:
+        """`file:line key.path` of a key, for a problem: where("limits", "correction_mm")."""
+        document = self.document or Document(self.path, {}, {})
+        return document.where(location)
 
     def gauge_objects(self) -> dict[str, Gauge[Any]]:
         """A fresh driver object for every gauge."""
@@ -207,10 +232,40 @@ _FORMER_SPEED_LIMITS: Mapping[str, float] = {
 }
 
 
+class Examined(NamedTuple):
+    """A file as far as it can be read: what is to be mended, and the configuration where nothing is.
+
+    geometry, wiring : None where they have a problem.
+    """
+
+    document: Document
+    configuration: Configuration | None
+    problems: list[Problem]
+    warnings: list[Problem]
+    geometry: Geometry | None
+    wiring: Wiring | None
+
+
 def load(path: Path) -> Configuration:
     """Read and check a configuration.
 
     Raises ConfigurationError with every problem: file, line, key, value, what is allowed, next step.
+    """
+    examined = examine(path)
+    if examined.configuration is None:
+        raise ConfigurationError(in_order(examined.problems))
+    return examined.configuration
+
+
+def in_order(problems: Sequence[Problem]) -> list[Problem]:
+    """Each problem once, in the order of the file."""
+    return sorted(dict.fromkeys(problems), key=lambda problem: _line_number(problem.where))
+
+
+def examine(path: Path) -> Examined:
+    """Read a configuration as far as that is possible; every check is made that what could be read allows.
+
+    Raises ConfigurationError where the file as a whole cannot be read.
     """
     document = read_document(path)
     problems: list[Problem] = []
@@ -226,25 +281,39 @@ def load(path: Path) -> Configuration:
             sections[name] = None
             problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
     gauges, drivers = _gauges(document, problems)
-    readable = crosscheck.Sections(
+    part = {
+        name: sections[name] if sections[name] is not None else readable(kind, document.value((name,)))
+        for name, kind in SECTIONS.items()
+    }
+    problems += [
+        Problem(where=document.where(("geometry", *location)), what=what, value=value, allowed=allowed, next_step=step)
+        for location, what, value, allowed, step in contradictions(part["geometry"])
+    ]
+    kinematics = getattr(part["geometry"], "kinematics", None)
+    checked = crosscheck.Sections(
         document,
-        sections["geometry"],
-        sections["lines"],
+        LINKS[kinematics] if kinematics is not None else None,
+        part["lines"] or {},
         gauges,
         drivers,
-        sections["wiring"],
-        sections["acquisition"],
+        part["wiring"],
+        part["acquisition"],
     )
-    problems += crosscheck.problems(readable)
-    if problems:
-        raise ConfigurationError(sorted(set(problems), key=lambda problem: _line_number(problem.where)))
-    return Configuration(
-        path, gauges=gauges, drivers=drivers, warnings=tuple(crosscheck.warnings(readable)), **sections
-    )
+    problems += crosscheck.problems(checked)
+    warnings = in_order([*crosscheck.warnings(checked), *implausible(document, part, gauges)])
+    configuration = None
+    if not problems:
+        configuration = Configuration(
+            path, gauges=gauges, drivers=drivers, warnings=tuple(warnings), document=document, **sections
+        )
+    return Examined(document, configuration, problems, warnings, sections["geometry"], sections["wiring"])
 
 
 def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, GaugeOptions], dict[str, type[Gauge[Any]]]]:
-    """Each gauge's options, checked by its own driver's model; a faulty gauge is left out and its problems noted."""
+    """Each gauge's options, checked by its own driver's model, and its driver; the problems of a faulty one are noted.
+
+    A gauge with faulty options is not among the options.
+    """
     gauges: dict[str, GaugeOptions] = {}
     drivers: dict[str, type[Gauge[Any]]] = {}
     section = document.data.get("gauges")
@@ -259,25 +328,52 @@ def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, Gaug
         return gauges, drivers
     for name, raw in section.items():
         location: Location = ("gauges", name)
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]+", name):
+            problems.append(
+                Problem(
+                    where=document.where(location),
+                    what="cannot be a gauge's name",
+                    value=repr(name),
+                    allowed="letters, digits and _",
+                    next_step="rename it, under `wiring:` too; in quotes if it has digits only",
+                )
+            )
+            continue
         if not isinstance(raw, dict) or not isinstance(raw.get("driver"), str):
             problems.append(
                 Problem(
                     where=document.where(location),
                     what="needs `driver:`",
-                    value=str(raw),
+                    value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw),
                     next_step="`compd check --drivers` lists them",
                 )
             )
             continue
         try:
-            driver = load_plugin(GAUGES, raw["driver"], document.where((*location, "driver")))
-            gauges[name] = driver.Options.model_validate(raw)
-            drivers[name] = driver
+            driver = drivers[name] = load_plugin(GAUGES, raw["driver"], document.where((*location, "driver")))
+            options = driver.Options.model_validate(raw)
         except PluginError as error:
             problems += error.problems
         except ValidationError as error:
             problems += validation_problems(error, document, location, driver.Options)
+        else:
+            if (why := _why_not_made(driver, options)) is None:
+                gauges[name] = options
+            else:
+                problems.append(Problem(where=document.where(location), what=why, next_step="mend the driver"))
     return gauges, drivers
+
+
+def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None:
+    """Why a driver, whose author may have made any mistake, cannot be made with these options; None where it can."""
+    try:
+        channels = [(channel.name, channel.unit) for channel in driver(options).channels]
+    except Exception as error:  # noqa: BLE001
+        return f"the driver fails with these options: {type(error).__name__}: {error}"
+    names = [name for name, _ in channels]
+    if not names or len(set(names)) < len(names):
+        return f"the driver has {'two channels of one name' if names else 'no channels'}"
+    return None
 
 
 def _said(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -290,8 +386,8 @@ def _said(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _line_number(where: str) -> int:
     """The line in "file:line key.path"; 0 where there is none, so that problems of the whole file come first."""
-    head = where.split(" ", maxsplit=1)[0].rsplit(":", 1)
-    return int(head[1]) if len(head) == 2 and head[1].isdigit() else 0
+    found = re.search(r":(\d+)(?: |$)", where)
+    return int(found[1]) if found else 0
 
 
 def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[str, ...] = ()) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator
 
-from compd.configuration.section import Positive, Section
+from compd.configuration.section import AbsolutePath, Positive, Section, Text
 
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
@@ -171,13 +171,13 @@ class TcpSocket(Section):
 class UnixSocket(Section):
     """Clients on this computer; machine zero is taken here only."""
 
-    path: str = Field(pattern=r"^/", max_length=100, description="absolute path of the Unix socket")
+    path: AbsolutePath = Field(max_length=100, description="absolute path of the Unix socket")
 
 
 class UdpTarget(Section):
     """Where the binary SETPOINT goes, one packet per cycle."""
 
-    host: str = Field(description="name or address of the controller")
+    host: Text = Field(description="name or address of the controller")
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="UDP port of the controller")
 
 
@@ -195,7 +195,7 @@ class SocketSettings(Section):
 class StateSettings(Section):
     """What the daemon keeps across restarts, and what it starts with."""
 
-    directory: str = Field(pattern=r"^/", description="absolute path of the directory in which machine zero is kept")
-    model_file: str | None = Field(
-        default=None, pattern=r"^/", description="absolute path of the model file to start with; without: no effects"
+    directory: AbsolutePath = Field(description="absolute path of the directory in which machine zero is kept")
+    model_file: AbsolutePath | None = Field(
+        default=None, description="absolute path of the model file to start with; without: no effects"
     )

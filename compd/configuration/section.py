@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
-from typing import Annotated, Any, get_args
+import re
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from compd.configuration.document import Document, Location
@@ -15,7 +18,42 @@ from compd.errors import Problem
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
+
+def _printable(text: str) -> str:
+    """The text itself; ValueError where it has characters that neither a terminal nor a path takes."""
+    if not text.isprintable():
+        raise ValueError("must have printable characters only")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+AbsolutePath = Annotated[str, Field(pattern=r"^/"), AfterValidator(_printable)]
+
 _REFUSAL = "refusal"
+# What pydantic says of a value of the wrong kind, in the words of a file.
+_WHAT = {
+    "model_type": "must be a section: `key: value` lines, indented",
+    "model_attributes_type": "must be a section: `key: value` lines, indented",
+    "dict_type": "must be a section: `name: ...` lines, indented",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "string_type": "must be a text",
+    "string_too_short": "must not be empty",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+}
+# What a pattern means; others are shown as they are.
+_PATTERNS = {
+    "^/": "an absolute path, /...",
+    r"^[78][NEO][12]$": "data bits, parity, stop bits: 8N1, 7E2, ...",
+    r"^[a-z][a-z0-9_]*_(degC|N|hPa|pct|mm|1)$": "small letters with a unit: temperature_room_degC, force_N, ...",
+    r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$": "gauge or gauge.channel, of letters, digits and _",
+}
 # A list or mapping longer than this is not repeated in a message: the line is enough to find it.
 _LONGEST_VALUE = 80
 
@@ -44,6 +82,47 @@ def validate(kind: Any, document: Document, location: Location, problems: list[P
         return None
 
 
+def readable(kind: Any, value: Any) -> Any:
+    """`value` as `kind`, or as much of it as can be read, for checks that must not wait until the rest is mended.
+
+    A section with a faulty key becomes a namespace with the same attributes, None for what is missing or cannot be
+    read; of a list or mapping the faulty entries do. None where nothing can be read.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(value)
+    except ValidationError:
+        pass
+    if get_origin(kind) is Annotated:
+        inner = get_args(kind)[0]
+        # of a number or a text nothing is left where its limits do not hold
+        return readable(inner, value) if get_origin(inner) in (tuple, dict, Union, UnionType) else None
+    arguments = get_args(kind)
+    if get_origin(kind) in (Union, UnionType) and isinstance(value, Mapping):
+        kind = next((model for model in _models(kind) if _is_tagged(model, value)), None)
+    if isinstance(kind, type) and issubclass(kind, Section) and isinstance(value, Mapping):
+        return SimpleNamespace(
+            **{name: _readable_field(field, name, value) for name, field in kind.model_fields.items()}
+        )
+    # of a vector nothing is left where a coordinate is wrong, of a list of entries the others are
+    if get_origin(kind) is tuple and isinstance(value, list) and arguments[-1] is Ellipsis:
+        return tuple(readable(arguments[0], entry) for entry in value)
+    if get_origin(kind) is dict and isinstance(value, Mapping):
+        return {name: readable(arguments[1], entry) for name, entry in value.items()}
+    return None
+
+
+def _readable_field(field: FieldInfo, name: str, section: Mapping[Any, Any]) -> Any:
+    if name not in section:
+        return None if field.is_required() else field.default
+    kind = field.annotation
+    return readable(Annotated[kind, *field.metadata] if field.metadata else kind, section[name])
+
+
+def _is_tagged(model: type[BaseModel], value: Mapping[Any, Any]) -> bool:
+    """Whether the mapping has the tag of this member of a union: `kind: serial`, `on: plate`."""
+    return any(value.get(name) in get_args(field.annotation) for name, field in model.model_fields.items())
+
+
 def validation_problems(error: ValidationError, document: Document, location: Location, kind: Any) -> list[Problem]:
     """Every error that pydantic found in the value at `location`, in the words of the person who wrote the file.
 
@@ -58,7 +137,7 @@ def unknown_key(document: Document, location: Location, allowed: Sequence[str]) 
     return Problem(
         where=document.where(location),
         what="unknown key",
-        value=_value_text(document.value(location)),
+        value=value_text(document.value(location)),
         allowed=", ".join(allowed),
         next_step=f"did you mean `{close[0]}`?" if close else "remove it",
     )
@@ -69,16 +148,27 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
     where, value = document.where(location), document.value(location)
     context = detail.get("ctx", {})
     if detail["type"] == _REFUSAL:
-        value_text = "" if value is None else _value_text(value)
         return Problem(
             where=where,
             what=context["what"],
-            value=value_text,
+            value="" if value is None else value_text(value),
             allowed=context["allowed"],
             next_step=context["next_step"],
         )
     if detail["type"] == "extra_forbidden":
         return unknown_key(document, location, _keys_beside(kind, detail["loc"]))
+    if detail["loc"] and detail["loc"][-1] == "[key]":
+        name = detail["loc"][-2]
+        return Problem(
+            where=where.removesuffix(".[key]"),
+            what="a name must be a text",
+            value=repr(name),
+            next_step=f"write it in quotes: '{name}'",
+        )
+    if detail["type"] == "missing" and detail["loc"] and isinstance(detail["loc"][-1], int):
+        return Problem(
+            where=document.where(location[:-1]), what="has too few entries", value=value_text(detail["input"])
+        )
     if detail["type"] == "missing":
         return Problem(where=where, what="is missing", next_step=f"add `{location[-1]}:`")
     allowed = {
@@ -88,15 +178,31 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
         "greater_than": f"greater than {context.get('gt')}",
         "greater_than_equal": f"{context.get('ge')} or more",
         "less_than_equal": f"{context.get('le')} or less",
-        "string_pattern_mismatch": f"the pattern {context.get('pattern')}",
+        "string_pattern_mismatch": _PATTERNS.get(pattern := str(context.get("pattern")), f"the pattern {pattern}"),
         "finite_number": "a finite number",
     }.get(detail["type"], "")
-    message = detail["msg"].removeprefix("Value error, ")
-    return Problem(where=where, what=message, value=_value_text(value), allowed=allowed)
+    message = detail["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    if detail["type"] == "string_pattern_mismatch" and pattern in _PATTERNS:
+        message = "is not what it must be"
+    what = _WHAT.get(detail["type"], message)
+    return Problem(where=where, what=what, value=value_text(value), allowed=allowed, next_step=_remedy(what, value))
 
 
-def _value_text(value: Any) -> str:
-    return "" if isinstance(value, dict | list) and len(str(value)) > _LONGEST_VALUE else repr(value)
+def _remedy(what: str, value: Any) -> str:
+    """What to write instead, where that is clear."""
+    if isinstance(value, str) and "number" in what and re.fullmatch(r"[-+]?\d+,\d+", value):
+        return f"write {value.replace(',', '.')}, with a point"
+    if what == "must be a text" and isinstance(value, int | float):
+        return f"write it in quotes: '{value}'"
+    return ""
+
+
+def value_text(value: Any) -> str:
+    """A value as a problem shows it: not at all where it is long, since the line is enough to find it."""
+    text = repr(value)
+    if len(text) <= _LONGEST_VALUE:
+        return text
+    return "" if isinstance(value, dict | list) else f"{text[:_LONGEST_VALUE]} ..."
 
 
 def _location_in_file(document: Document, root: Location, loc: Location) -> Location:

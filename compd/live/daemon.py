@@ -37,6 +37,7 @@ from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import LoopProcess
 from compd.live.processes.service_process import ServiceProcess, StateLog
+from compd.live.service.last_readings import LastReadings
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import PROTOCOL
@@ -129,6 +130,9 @@ class Daemon:
             configuration.zero_hash,
             clock,
         )
+        last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
+        if before is None or before.trust is not self.trust:
+            last_readings.recall()
         model_switch = ModelSwitch(self.control)
         version: dict[str, Any] = {
             "class": "VERSION",
@@ -170,6 +174,7 @@ class Daemon:
             publisher,
             requests,
             zero_capture,
+            last_readings,
             model_switch,
             packets,
             self.control,

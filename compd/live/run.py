@@ -7,11 +7,14 @@ import sys
 import structlog
 
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, load
+from compd.configuration import Configuration
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
+from compd.live.events import name_event
+from compd.live.journal import Journal
 from compd.live.processes.supervisor import Ending, Supervisor
 from compd.live.systemd import Notifier
+from compd.machine_check import load_whole
 
 _log = structlog.get_logger()
 
@@ -56,7 +59,7 @@ class _Successor:
     def make(self) -> bool:
         """Whether it could be made; every problem is in the log where it could not."""
         try:
-            self.daemon = Daemon(load(self._now.configuration.path), self._now)
+            self.daemon = Daemon(load_whole(self._now.configuration.path), self._now)
         except CompdError as error:
             for problem in error.problems:
                 _log.error("configuration refused", problem=str(problem))
@@ -79,14 +82,20 @@ def _report(daemon: Daemon) -> None:
 
 
 def _log_to_stderr() -> None:
-    """Log one line per event to stderr, with colours on a terminal."""
+    """Log one line per event to stderr, with colours on a terminal; under systemd an entry of the journal."""
+    named = [structlog.processors.add_log_level, name_event]
+    if (journal := Journal.from_environment()) is not None:
+        structlog.configure(
+            processors=[*named, structlog.processors.format_exc_info, journal.render], logger_factory=journal
+        )
+        return
     structlog.configure(
         processors=[
-            structlog.processors.add_log_level,
+            *named,
             structlog.processors.TimeStamper(fmt="iso"),
             structlog.dev.ConsoleRenderer()
             if sys.stderr.isatty()
-            else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "event"]),
+            else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "id", "event"]),
         ],
         logger_factory=structlog.PrintLoggerFactory(sys.stderr),
     )

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from compd.commissioning.feigned_jumps import FeignedJump
+    from compd.commissioning.line_budget import LineBudget
     from compd.configuration import Configuration
     from compd.errors import Problem
 
@@ -18,8 +22,18 @@ def check(
     config: Annotated[Path | None, typer.Argument(help="The machine's configuration (YAML).")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema for editors and stop.")] = False,
     drivers: Annotated[bool, typer.Option("--drivers", help="List the installed gauge drivers and stop.")] = False,
+    what_cannot_be_seen: Annotated[
+        bool,
+        typer.Option(
+            "--what-cannot-be-seen", help="Print which faults of the gauges nothing shows, and what they cost."
+        ),
+    ] = False,
 ) -> None:
-    """Check a configuration; report every error at once, with file, line, key, value, what is allowed, next step."""
+    """Check a configuration; report every error at once, with file, line, key, value, what is allowed, next step.
+
+    Warnings are of what can be used but is probably a mistake or a risk; they change no exit code. The rate is compared
+    with the time that a cycle takes on this computer.
+    """
     if schema:
         from compd.configuration.schema import json_schema
 
@@ -30,13 +44,20 @@ def check(
         return
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
-    from compd.configuration import load
-    from compd.machine_builder import build_model
+    from compd.cli.problems import print_problems
+    from compd.errors import ConfigurationError
+    from compd.machine_check import examine_whole
 
-    configuration = load(config)
-    build_model(configuration.geometry, configuration.wiring)
-    for warning in (*configuration.warnings, *print_line_budgets(configuration)):
-        typer.echo(f"warning: {warning}")
+    examined = examine_whole(config)
+    configuration = examined.configuration
+    if configuration is None:
+        print_problems(examined.warnings, "warning: ")
+        raise ConfigurationError(examined.problems)
+    if what_cannot_be_seen:
+        print_blind_spots(configuration)
+        return
+    warnings = [*configuration.warnings, *print_lines(configuration), *_print_cycle(configuration)]
+    print_problems(warnings, "warning: ", sys.stdout)
     wiring = configuration.wiring
     own_process = configuration.acquisition.own_process
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
@@ -46,6 +67,63 @@ def check(
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
     )
+
+
+def print_blind_spots(configuration: Configuration) -> None:
+    """Print what a drift of each length costs, and the faults that nothing shows."""
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.table import Table
+    from rich.text import Text
+
+    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of
+
+    console = Console()
+    figures = figures_of(configuration)
+    title = f"A drift of {DRIFT_UM:g} um is an error at the tip, um"
+    table = Table("length", "gauge", "in CMM mode", "in machine-tool mode", title=title, title_justify="left")
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for drift in figures.drifts:
+        table.add_row(drift.length, drift.gauge, f"{drift.cmm_um:.1f}", f"{drift.machine_tool_um:.1f}")
+    console.print(table)
+    for spot in BLIND_SPOTS:
+        console.print(Text(spot.fault[0].upper() + spot.fault[1:], style="bold"))
+        for name, text in (
+            ("shown by", spot.shown_by or "nothing"),
+            ("unseen", spot.unseen),
+            ("cost", spot.cost(figures)),
+        ):
+            if text:
+                console.print(Padding(Text(f"{name}: {text}"), (0, 0, 0, 4)))
+
+
+def print_lines(configuration: Configuration) -> list[Problem]:
+    """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
+    from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
+    from compd.commissioning.line_budget import budget_warnings, line_budgets
+
+    budgets = line_budgets(configuration)
+    jumps = feigned_jumps(configuration, budgets)
+    _print_budgets(budgets)
+    _print_jumps(jumps)
+    return [
+        *budget_warnings(configuration, budgets),
+        *jump_warnings(configuration, jumps),
+        *reply_warnings(configuration),
+    ]
+
+
+def _print_cycle(configuration: Configuration) -> list[Problem]:
+    """Print what a cycle takes on this computer; the warning that follows."""
+    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle
+
+    cycle = measure_cycle(configuration)
+    typer.echo(
+        f"A cycle takes {cycle.median_s * 1e3:.2f} ms on this computer, "
+        f"and one is due every {1e3 / configuration.loop.rate_hz:.2f} ms."
+    )
+    return cycle_warnings(configuration, cycle)
 
 
 def _list_drivers() -> None:
@@ -61,21 +139,18 @@ def _list_drivers() -> None:
     Console().print(table)
 
 
-def print_line_budgets(configuration: Configuration) -> list[Problem]:
-    """Print bytes, milliseconds and rate per line; the warnings that follow."""
+def _print_budgets(budgets: Sequence[LineBudget]) -> None:
+    """Bytes, milliseconds and rate per line."""
     from rich.console import Console
     from rich.table import Table
 
-    from compd.commissioning.line_budget import budget_warnings, line_budgets
-
-    budgets = line_budgets(configuration)
     table = Table(
         "line",
         "gauges",
         "exchanges",
         "bytes",
-        "ms a round",
-        "ms, 10 ms turnaround",
+        "ms at best",
+        "ms, 10 ms to answer",
         "rate, Hz",
         title="What the lines can carry",
         title_justify="left",
@@ -94,7 +169,25 @@ def print_line_budgets(configuration: Configuration) -> list[Problem]:
             _rates(budget.usual_hz, budget.ideal_hz),
         )
     Console().print(table)
-    return budget_warnings(configuration, budgets)
+
+
+def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
+    """What each length gauge can feign without being distrusted."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.commissioning.feigned_jumps import named_together
+
+    title = "Largest jump that is believed"
+    table = Table("gauge", "measures", "ms to the next reading", "jump, um", title=title, title_justify="left")
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for jump in jumps:
+        poll = "?" if math.isnan(jump.poll_s) else f"{jump.poll_s * 1e3:.1f}"
+        size = "any" if math.isinf(jump.jump_mm) else "?" if math.isnan(jump.jump_mm) else f"{jump.jump_mm * 1e3:.3g}"
+        noise = " + 6 x noise" if math.isnan(jump.noise_um) and math.isfinite(jump.jump_mm) else ""
+        table.add_row(jump.gauge, named_together(jump.measures), poll, size + noise)
+    Console().print(table)
 
 
 def _rates(usual_hz: float, ideal_hz: float) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from compd.clock import Clock
 from compd.gauge import Quality, Reading
-from compd.live.acquisition.possible_motion import Sample
+from compd.live.acquisition.possible_motion import WINDOW_S, Sample
 from compd.live.acquisition.reading_trust import ReadingTrust
 
 
@@ -18,6 +19,7 @@ class GaugeTrust:
         self._channels = tuple(channels)
         self._clock = clock
         self._first: Sequence[Reading | None] = ()
+        self._shortest_s = math.inf
         self._window_s = 0.0
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
@@ -26,15 +28,23 @@ class GaugeTrust:
         They are not judged yet. Raises what `ask` raises.
         """
         self._first = ()
-        start_s = self._clock.monotonic()
-        readings = ask()
-        now_s = self._clock.monotonic()
-        self._window_s = now_s - start_s
+        readings, self._window_s = self._asked(ask)
         if len(readings) == len(self._channels) and any(map(self._surprises, self._channels, readings)):
             self._first = [reading if reading.ok else None for reading in readings]
-            readings = ask()
-            self._window_s = max(self._window_s, self._clock.monotonic() - now_s)
+            readings, window_s = self._asked(ask)
+            self._window_s = max(self._window_s, window_s)
         return readings
+
+    def _asked(self, ask: Callable[[], Sequence[Reading]]) -> tuple[Sequence[Reading], float]:
+        """Readings, and how much longer than the shortest poll theirs has taken, s.
+
+        So late the device may have sampled: it does so at the same time after each request, but for delays on the way.
+        """
+        start_s = self._clock.monotonic()
+        readings = ask()
+        duration_s = self._clock.monotonic() - start_s
+        self._shortest_s = min(self._shortest_s, duration_s)
+        return readings, duration_s - self._shortest_s + WINDOW_S
 
     def judge(self, readings: Sequence[Reading], now_s: float) -> list[Reading]:
         """The readings of the last poll, one per channel, as they may be published."""

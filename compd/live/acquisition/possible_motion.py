@@ -1,7 +1,8 @@
 """Whether what a gauge measures can have moved as its readings say, with a limited acceleration and speed.
 
-A reading was sampled at some time between its request and the end of its reply. So the mean speed between two readings
-is known as an interval, and so is every speed that can follow from it. Readings are possible where an interval is left.
+The time of a sample is known to within a window: a reply that took longer than others may have been sampled later. So
+the mean speed between two readings is known as an interval, and so is every speed that can follow from it. Readings are
+possible where an interval is left.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ from typing import NamedTuple
 
 # Over this time, s, the speed is measured that the measured part had before: long beside the time that a reply takes.
 BASE_S = 0.02
+# Of a reply that took no longer than others.
+WINDOW_S = 1e-3
 
 
 class Sample(NamedTuple):
-    """A reading as a sample of motion: value (mm), time of the request (s), and how long the reply took (s)."""
+    """A reading as a sample of motion: value (mm), time (s), and by how much it may have been later (s)."""
 
     value: float
     time_s: float
@@ -94,8 +97,8 @@ def is_possible(
 def unseen_jump_mm(limits: MotionLimits, poll_s: float, tolerance_mm: float) -> float:
     """The largest jump that a part at rest may show twice and that may be motion, mm; inf without limits.
 
-    poll_s : from one poll to the next, which is also how long a reply takes at most.
+    poll_s : from one reading to the next, s.
     """
-    duration_s = 2 * poll_s
+    duration_s = poll_s + WINDOW_S
     speed = min(limits.speed, limits.acceleration * (BASE_S + duration_s) / 2)
     return tolerance_mm + speed * duration_s

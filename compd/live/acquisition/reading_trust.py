@@ -81,6 +81,7 @@ class ReadingTrust:
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
         self._history: deque[Sample] = deque(maxlen=_HISTORY)
+        self._back_s = math.nan  # since when a gauge that was away answers again
 
     def surprises(self, sample: Sample) -> bool:
         """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
@@ -102,7 +103,7 @@ class ReadingTrust:
         Parameters
         ----------
         reading : good, and the last answer of the poll.
-        window_s : how long a reply took, s.
+        window_s : by how much the sample may be later than the reading's time, s.
         first : the first answer of a poll that was asked twice, where that is good too.
         """
         memory, i = self._memory, self._i
@@ -158,6 +159,8 @@ class ReadingTrust:
     def _returned(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
         """The first readings of a gauge that was away."""
         memory, i = self._memory, self._i
+        if not self._back_s > memory.lost_s[i]:
+            self._back_s = sample.time_s
         if self._settings.returns_by_itself or math.isnan(memory.value[i]):
             return self._begin(reading, sample, first)
         away_mm = sample.value - float(memory.value[i])
@@ -194,7 +197,7 @@ class ReadingTrust:
             return (int(np.flatnonzero(moved)[0]) if moved.any() else None), True
         known = others & ~np.isnan(witness)
         back = known & (memory.shown_s[:n] > lost_s)
-        if back.sum() < known.sum() and now_s - memory.shown_s[:n][back | ~others].min() < _WAIT_FOR_OTHERS_S:
+        if back.sum() < known.sum() and now_s - self._back_s < _WAIT_FOR_OTHERS_S:
             return None, False
         moved = back & (np.abs(memory.shown[:n] - witness) > tolerance)
         if 2 * moved.sum() > back.sum():

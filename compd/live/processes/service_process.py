@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
+from compd.live.journal import Journal
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.states import State
 from compd.live.processes.control import Control, Phase
 from compd.live.processes.log_relay import LogRelay
 from compd.live.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
+from compd.live.service.last_readings import LastReadings
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.requests import Requests
@@ -56,6 +58,7 @@ class ServiceProcess:
     publisher: Publisher
     requests: Requests
     zero_capture: ZeroCapture
+    last_readings: LastReadings
     model_switch: ModelSwitch
     packets: UdpSender | None
     control: Control
@@ -65,8 +68,10 @@ class ServiceProcess:
 
     def run(self) -> None:
         """Serve until the daemon stops."""
-        relay = LogRelay(self.logs, _write, self.clock)
+        journal = Journal.from_environment()
+        relay = LogRelay(self.logs, _write if journal is None else journal.write, self.clock)
         relay.start()
+        self.last_readings.start()
         shorten_switch_interval()
         sharpen_timers()
         priority = RationedPriority(self.priority, self.clock)
@@ -79,6 +84,7 @@ class ServiceProcess:
         self.publisher.run(self.requests, lambda: self.control.phase != Phase.STOPPING, each_round)
         self.publisher.end(self.control.ending())
         self.zero_capture.stop()
+        self.last_readings.stop()
         relay.stop()
 
 

@@ -1,0 +1,38 @@
+"""`compd status`: is the machine's correction good? For people and for monitoring."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from compd.cli.options import DEFAULT_SOCKET, unix_address
+
+
+def status(
+    address: Annotated[
+        str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names it.")
+    ] = DEFAULT_SOCKET,
+    timeout_s: Annotated[float, typer.Option("--timeout", min=0.1, help="How long to wait for an answer, s.")] = 5.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the same, and all that STATUS says, as JSON.")] = False,
+) -> None:
+    """Print state and reason of the daemon's setpoints, and the gauges that are not good.
+
+    The exit code is that of monitoring plug-ins: 0 for state ok; 1, a warning, for another state in which setpoints are
+    valid; 2, critical, for one in which they are not; 3 where no daemon answers, or the configuration cannot be read.
+    """
+    from compd.commissioning.daemon_status import DaemonStatus, Health, daemon_status
+    from compd.errors import CompdError
+
+    try:
+        found = daemon_status(unix_address(address), timeout_s)
+    except CompdError as error:
+        found = DaemonStatus(Health.UNKNOWN, address, "", str(error.problems[0]).replace("\n", " "))
+    if as_json:
+        typer.echo(json.dumps(found.to_json()))
+    else:
+        typer.echo(found.text)
+        for gauge in found.gauges:
+            typer.echo(f"    {gauge}")
+    raise typer.Exit(int(found.health))

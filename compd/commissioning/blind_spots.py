@@ -1,0 +1,318 @@
+"""What compd cannot see: faults that look like a good machine, what shows some of them, and what each costs.
+
+The numbers are those of one machine: its kinematics at machine zero, its lines and its limits. `BLIND_SPOTS` is the one
+list, for `compd check --what-cannot-be-seen` and for the documentation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.commissioning.feigned_jumps import FeignedJump, feigned_jumps, measured_lengths
+from compd.commissioning.line_budget import LineBudget, line_budgets
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.configuration import Configuration
+from compd.configuration.operation import FRAME_DISTANCES
+from compd.errors import KinematicsError
+from compd.machine_builder import build_model
+from compd.model.machine import MachineModel
+from compd.model.tool import ToolOnPlate
+from compd.units import UM_PER_MM
+
+DRIFT_UM = 10.0
+# Where no gauge says how fast the machine moves: a measuring machine between two points.
+_USUAL_SPEED_MM_PER_S = 50.0
+
+
+class DriftCost(NamedTuple):
+    """What a drift of one length by DRIFT_UM does to the tip, at machine zero, um.
+
+    length : as "scale 1". cmm_um : error of the published tip. machine_tool_um : by how much the tip misses its target.
+    """
+
+    length: str
+    gauge: str
+    cmm_um: float
+    machine_tool_um: float
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What the numbers of the blind spots are computed from.
+
+    exchange_mm : largest error at the tip where two scales that are 1 mm apart are exchanged.
+    """
+
+    configuration: Configuration
+    drifts: Sequence[DriftCost]
+    exchange_mm: float
+    jumps: Sequence[FeignedJump]
+    budgets: Sequence[LineBudget]
+
+    def largest_um(self, kind: str) -> float:
+        """Of the lengths of a kind ("scale", "joint", "frame"): the largest tip error of a drift of DRIFT_UM."""
+        return max((d.cmm_um for d in self.drifts if d.length.startswith(kind)), default=math.nan)
+
+    def leverage(self, kind: str) -> float:
+        """Tip error per error of a length."""
+        return self.largest_um(kind) / DRIFT_UM
+
+
+@dataclass(frozen=True)
+class BlindSpot:
+    """One kind of fault.
+
+    Attributes
+    ----------
+    name : stable, for programs.
+    fault : what happens.
+    shown_by : what shows it, and under which condition; "" where nothing does.
+    vote : the key under `votes:` that switches this on; "" where it needs none, or there is none.
+    unseen : what remains that nothing shows.
+    cost : its number for a machine; "" where it has none there.
+    """
+
+    name: str
+    fault: str
+    shown_by: str
+    vote: str
+    unseen: str
+    cost: Callable[[Figures], str]
+
+
+def figures_of(configuration: Configuration) -> Figures:
+    """Everything that the numbers need. Raises KinematicsError for an impossible machine zero."""
+    budgets = line_budgets(configuration)
+    drifts, exchange_mm = drift_costs(configuration), _exchange_mm(configuration)
+    return Figures(configuration, drifts, exchange_mm, feigned_jumps(configuration, budgets), budgets)
+
+
+def drift_costs(configuration: Configuration) -> list[DriftCost]:
+    """For every length gauge, scales first, then joints and frame: from the kinematics, at machine zero."""
+    model = build_model(configuration.geometry, configuration.wiring)
+    gauge_of = {length: gauge for gauge, lengths in measured_lengths(configuration).items() for length in lengths}
+    lengths = [f"scale {link}" for link in range(1, model.links + 1)]
+    lengths += [f"joint {k}" for k in range(1, len(configuration.wiring.joint) + 1)]
+    lengths += [f"frame {distance}" for distance in FRAME_DISTANCES]
+    drift_mm = DRIFT_UM / UM_PER_MM
+    costs = []
+    for number, length in enumerate(lengths):
+        change_mm = np.zeros(len(lengths))
+        change_mm[number] = drift_mm
+        costs.append(DriftCost(length, gauge_of[length], *_tip_errors_um(model, change_mm)))
+    return costs
+
+
+def _exchange_mm(configuration: Configuration) -> float:
+    """Largest error at the tip where two scales that are 1 mm apart are exchanged."""
+    model = build_model(configuration.geometry, configuration.wiring)
+    drift_mm = DRIFT_UM / UM_PER_MM
+    errors_um = []
+    for one, other in combinations(range(model.links), 2):
+        change_mm = np.zeros(model.links + len(configuration.wiring.joint) + len(FRAME_DISTANCES))
+        change_mm[one], change_mm[other] = drift_mm, -drift_mm
+        errors_um.append(_tip_errors_um(model, change_mm)[0])
+    return max(errors_um) / DRIFT_UM
+
+
+def _tip_errors_um(model: MachineModel, change_mm: FloatArray) -> tuple[float, float]:
+    """Error at the tip of readings that are wrong by `change_mm`, in CMM and in machine-tool mode."""
+    start = WarmStart.at_zero(model)
+    shown, _ = compensate_cmm(model, _values(model, change_mm), start)
+    cmm_um = _away_um(model, shown)
+    # in machine-tool mode the drive goes where the scale setpoint says, by a scale that is wrong itself
+    on_plate = isinstance(model.arrangement, ToolOnPlate)
+    contact = model.zero.contact
+    target_mm = contact.tip_P_mm if on_plate else _in_B0(model, contact.tip_M_mm)
+    try:
+        command, _ = compensate_machine_tool(model, target_mm, None, _values(model, change_mm), start)
+    except KinematicsError:
+        return cmm_um, math.nan
+    true_scale_mm = command.scale_setpoint_mm - change_mm[: model.links]
+    reached, _ = compensate_cmm(
+        model, _values(model, np.concatenate([true_scale_mm, 0 * change_mm[model.links :]])), start
+    )
+    return cmm_um, _away_um(model, reached)
+
+
+def _away_um(model: MachineModel, computed: Compensation) -> float:
+    """How far the tip is from machine zero's; with the tool on the plate, on the work."""
+    contact = model.zero.contact
+    if isinstance(model.arrangement, ToolOnPlate):
+        return float(np.linalg.norm(computed.tip_P_mm - contact.tip_P_mm) * UM_PER_MM)
+    return float(np.linalg.norm(computed.tip_M_mm - contact.tip_M_mm) * UM_PER_MM)
+
+
+def _in_B0(model: MachineModel, tip_M_mm: FloatArray) -> FloatArray:
+    return np.asarray(model.frame.zero_rotation_M_B.T @ (tip_M_mm - model.frame.zero_origin_M_mm))
+
+
+def _values(model: MachineModel, change_mm: FloatArray) -> GaugeValues:
+    n = model.links
+    return GaugeValues(change_mm[:n], change_mm[n:-9], change_mm[-9:], {})
+
+
+def _drift(figures: Figures, kind: str) -> str:
+    names = {"scale": "a scale", "joint": "a joint comparator", "frame": "a frame comparator"}
+    return f"{DRIFT_UM:g} um of {names[kind]} are up to {figures.largest_um(kind):.1f} um at the tip"
+
+
+def _stuck_comparator(figures: Figures) -> str:
+    silent = [
+        gauge
+        for gauge in dict.fromkeys(d.gauge for d in figures.drifts if not d.length.startswith("scale"))
+        if figures.configuration.gauges[gauge].noise_um is None
+    ]
+    without = f"; no `noise_um`, so nobody can tell: {', '.join(silent)}" if silent else ""
+    return f"a joint that moves by {DRIFT_UM:g} um unseen: {figures.largest_um('joint'):.1f} um{without}"
+
+
+def _stuck_scale(figures: Figures) -> str:
+    return f"1 mm of a link unseen is {figures.leverage('scale'):.2f} mm at the tip"
+
+
+def _exchanged(figures: Figures) -> str:
+    return f"two scales 1 mm apart: up to {figures.exchange_mm:.2f} mm at the tip"
+
+
+def _late(figures: Figures) -> str:
+    gauges = figures.configuration.gauges
+    late = [
+        (jump.poll_s * (gauges[jump.gauge].fastest_mm_per_s or _USUAL_SPEED_MM_PER_S), jump)
+        for jump in figures.jumps
+        if any(length.startswith("scale") for length in jump.measures) and math.isfinite(jump.poll_s)
+    ]
+    if not late:
+        return ""
+    late_mm, jump = max(late, key=lambda entry: entry[0])
+    error_mm = late_mm * figures.leverage("scale")
+    return (
+        f"{jump.gauge}, {jump.poll_s * 1e3:.3g} ms late at {late_mm / jump.poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
+    )
+
+
+def _small_jump(figures: Figures) -> str:
+    parts = []
+    for kind in ("scale", "joint", "frame"):
+        jumps = [j.jump_mm for j in figures.jumps if any(length.startswith(kind) for length in j.measures)]
+        largest_mm = max((jump for jump in jumps if not math.isnan(jump)), default=math.nan)
+        if math.isinf(largest_mm):
+            parts.append(f"{kind}: any")
+        elif math.isfinite(largest_mm):
+            jump_um = largest_mm * UM_PER_MM
+            parts.append(f"{kind}: {jump_um:.3g} um, {jump_um * figures.leverage(kind):.3g} um at the tip")
+    return "; ".join(parts)
+
+
+def _power_cut(figures: Figures) -> str:
+    configuration = figures.configuration
+    counting = [jump.gauge for jump in figures.jumps if not _is_absolute(configuration, jump.gauge)]
+    return f"these count from where they are switched on: {', '.join(counting)}" if counting else "all are absolute"
+
+
+def _is_absolute(configuration: Configuration, gauge: str) -> bool:
+    said = configuration.gauges[gauge].absolute
+    return configuration.drivers[gauge].absolute if said is None else said
+
+
+def _nothing(_figures: Figures) -> str:
+    return ""
+
+
+BLIND_SPOTS: tuple[BlindSpot, ...] = (
+    BlindSpot(
+        "drift_of_a_scale",
+        "a scale drifts: its head comes loose, its mount grows warm",
+        "in machine-tool mode, once it exceeds the following error",
+        "scale_against_command",
+        "in CMM mode, and where the drive itself follows this scale",
+        lambda figures: _drift(figures, "scale"),
+    ),
+    BlindSpot(
+        "drift_of_a_joint_comparator",
+        "a joint comparator drifts, or its probe comes loose",
+        "of a revolute joint with two: the two no longer go together",
+        "ra_against_rb",
+        "of a joint with one comparator, or where both drift alike",
+        lambda figures: _drift(figures, "joint"),
+    ),
+    BlindSpot(
+        "drift_of_a_frame_comparator",
+        "a frame comparator drifts, or its rod grows warm",
+        "where frame temperatures are wired: the frame moves more than they explain",
+        "frame_against_temperature",
+        "slow drifts that a temperature could explain",
+        lambda figures: _drift(figures, "frame"),
+    ),
+    BlindSpot(
+        "stuck_comparator",
+        "a comparator shows one value for ever: its probe hangs, its unit repeats itself",
+        "where its noise exceeds its last digit: bit-identical readings while its neighbours scatter",
+        "frozen_comparator",
+        "where noise or digits are coarse, and until enough readings have come",
+        _stuck_comparator,
+    ),
+    BlindSpot(
+        "stuck_scale",
+        "a scale shows one value for ever",
+        "while the machine moves: the other links, or its own joints, say so",
+        "standing_scale",
+        "with the machine at rest; and what moved before the vote was sure",
+        _stuck_scale,
+    ),
+    BlindSpot(
+        "exchanged_gauges",
+        "the cables of two gauges are exchanged",
+        "while they are plugged: each came back with another value, or jumped",
+        "",
+        "where both show the same at that moment; and where they were exchanged when machine zero was taken",
+        _exchanged,
+    ),
+    BlindSpot(
+        "one_poll_late",
+        "a device answers each time with the reading before, or averages",
+        "where it can be asked two different things in turn: an answer to the wrong one",
+        "",
+        "nothing shows a display that is late by itself; at rest it does no harm",
+        _late,
+    ),
+    BlindSpot(
+        "small_jump",
+        "a reading jumps by less than what its acceleration and noise allow",
+        "a larger jump: `acceleration_mm_per_s2` of the gauge",
+        "",
+        "jumps up to that size",
+        _small_jump,
+    ),
+    BlindSpot(
+        "power_cut",
+        "displays and computer lose their power together; the displays count anew from where they stand",
+        "",
+        "",
+        "the daemon has no last value to compare with: take machine zero after every power cut",
+        _power_cut,
+    ),
+    BlindSpot(
+        "wrong_from_the_start",
+        "a sign, a link or a channel is wired wrongly, or machine zero was taken at another place",
+        "`compd compare` with a reference instrument; `compd zero` says by how much it differs from the one before",
+        "",
+        "the daemon alone cannot: at machine zero every wiring shows no change",
+        _nothing,
+    ),
+    BlindSpot(
+        "not_measured",
+        "what no gauge measures moves: the tool, the plate, a link between scale and joint, the platform",
+        "`compd diagnose`, from a recording with a reference instrument",
+        "",
+        "everything that is not between two ends of a gauge, beyond what the model's effects say",
+        _nothing,
+    ),
+)

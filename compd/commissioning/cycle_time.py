@@ -1,0 +1,92 @@
+"""How long a cycle of the loop takes on this computer: the daemon's own loop, run for a moment without gauges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple
+
+from compd.clock import Clock, MonotonicClock
+from compd.configuration import Configuration
+from compd.errors import Problem
+from compd.gauge import good
+from compd.live.loop.commands import Commands
+from compd.live.loop.directions import Directions
+from compd.live.loop.loop import Loop
+from compd.live.loop.machine_zero import MachineZero
+from compd.live.loop.model_loader import Models, ModelText, try_model
+from compd.live.loop.sent_cycle import CyclePacker, SentSetpoint
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.timing import LoopTiming
+from compd.live.pipeline import build_pipeline
+
+_CYCLES = 200
+# Half a second in all, also for a loop that is slower; between two cycles the processor does something else.
+_PERIOD_S = 2.5e-3
+# A loop that takes more leaves too little time for drivers, clients and whatever else the computer does.
+LARGEST_SHARE = 0.5
+_RAW_MM = 10.0
+_NOISE_MM = 1e-4
+
+
+class CycleTime(NamedTuple):
+    """Of a cycle, from the snapshot of the readings to the bytes of the setpoint, s."""
+
+    median_s: float
+    longest_s: float
+
+
+def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> CycleTime:
+    """Run the loop of this configuration for half a second, with readings near machine zero that scatter by 0.1 um.
+
+    The model of `state.model_file` is in it. Raises CompdError where that cannot be used.
+    """
+    clock = clock or MonotonicClock()
+    pipeline = build_pipeline(configuration, configuration.gauge_objects())
+    latest, wires, settings = pipeline.latest, pipeline.wires, pipeline.settings
+    file = configuration.state.model_file
+    model = pipeline.loader.load(None if file is None else ModelText.read(Path(file)))
+    try_model(settings.model, (), str(configuration.path))
+    zero = MachineZero(configuration.zero_hash, "", dict.fromkeys(wires.length_channels, _RAW_MM))
+    commands = Commands(zero, Models(model))
+    packer = CyclePacker(latest, Directions(wires.scale.wires))
+    numbers = count()
+    timing = LoopTiming(min(settings.period_s, _PERIOD_S))
+
+    def keep_on() -> bool:
+        """Readings for the next cycle, while there is one."""
+        number = next(numbers)
+        for channel, slot in latest.index.items():
+            value = _value(zero.readings_mm, channel) + _NOISE_MM * (number % 3 - 1)
+            latest.put(slot, good(value, clock.monotonic()))
+        return number < _CYCLES
+
+    def send(setpoint: Setpoint) -> None:
+        sent = SentSetpoint.of(setpoint, None)
+        sent.pack()
+        packer.pack(setpoint, sent.line)
+
+    Loop(settings, latest, commands, [send], clock, timing).run(keep_on)
+    return CycleTime(timing.cost.quantile_us(0.5) * 1e-6, timing.cost.largest_us * 1e-6)
+
+
+def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Problem]:
+    """A rate at which the loop would have no time left."""
+    rate_hz = configuration.loop.rate_hz
+    if cycle.median_s * rate_hz <= LARGEST_SHARE:
+        return []
+    fastest_hz = LARGEST_SHARE / cycle.median_s
+    return [
+        Problem(
+            where=configuration.where("loop", "rate_hz"),
+            what=f"a cycle takes {cycle.median_s * 1e3:.2f} ms on this computer: cycles would be missed",
+            value=f"{rate_hz:g} Hz, a cycle every {1e3 / rate_hz:.2f} ms",
+            allowed=f"{fastest_hz:.2g} Hz, so that half of the time is left",
+            next_step="lower rate_hz, or take a faster computer",
+        )
+    ]
+
+
+def _value(readings_mm: Mapping[str, float], channel: str) -> float:
+    return readings_mm.get(channel, 20.0)

@@ -1,0 +1,158 @@
+"""Which jump a length gauge can feign without being distrusted, and lines on which nobody can tell whose a reply is.
+
+A reading is believed while it lies where something that accelerates by at most a could have brought it since the last
+poll, a time T ago: from rest to speed and back within two polls is a T^2. To that come six standard deviations of the
+noise, three for each of two readings. Without a limit, any jump is believed that the next answer confirms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from compd.commissioning.line_budget import LineBudget
+from compd.configuration import Configuration
+from compd.configuration.crosscheck import resolve_channel
+from compd.errors import Problem
+from compd.gauge import GaugeOptions
+from compd.units import UM_PER_MM
+
+# The acquisition polls no line more often.
+_FASTEST_ROUND_S = 2e-3
+# Standard deviations of the noise between two readings: of 1e9 pairs one differs by more from noise alone.
+_NOISE_DEVIATIONS = 6.0
+
+
+class FeignedJump(NamedTuple):
+    """Of one gauge.
+
+    gauge : its name. measures : what its channels measure, as "scale 1". poll_s : from one reading to the next, nan
+    where the driver does not say what it moves. jump_mm : the largest that is believed; inf without a limit, nan where
+    it is not known. noise_um : nan where the configuration does not say, and the jump is then without it.
+    """
+
+    gauge: str
+    measures: tuple[str, ...]
+    poll_s: float
+    jump_mm: float
+    noise_um: float
+
+
+def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[FeignedJump]:
+    """For every gauge that measures a length, in the order of the file."""
+    poll_s = {budget.name: _poll_s(budget) for budget in budgets}
+    measures = measured_lengths(configuration)
+    return [
+        _jump(gauge, measures[gauge], poll_s[options.line], options)
+        for gauge, options in configuration.gauges.items()
+        if gauge in measures
+    ]
+
+
+def measured_lengths(configuration: Configuration) -> dict[str, tuple[str, ...]]:
+    """What each length gauge measures, as "scale 1", "joint 3", "frame u1", in the order of its channels."""
+    wiring = configuration.wiring
+    wires = [(f"scale {wire.link}", wire.gauge) for wire in wiring.scale]
+    wires += [(f"joint {k}", wire.gauge) for k, wire in enumerate(wiring.joint, start=1)]
+    wires += [(f"frame {wire.distance}", wire.gauge) for wire in wiring.frame]
+    measures: dict[str, list[tuple[int, str]]] = {}
+    for meaning, reference in wires:
+        channel = resolve_channel(reference, configuration.gauges, configuration.drivers)
+        assert channel is not None, f"{reference} was checked when the configuration was loaded"
+        gauge, _, name = channel.partition(".")
+        names = [c.name for c in configuration.drivers[gauge](configuration.gauges[gauge]).channels]
+        measures.setdefault(gauge, []).append((names.index(name), meaning))
+    return {gauge: tuple(meaning for _, meaning in sorted(named)) for gauge, named in measures.items()}
+
+
+def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) -> list[Problem]:
+    """A gauge without a limit, or with one that finds next to nothing."""
+    largest_mm = configuration.limits.correction_mm
+    warnings = []
+    for jump in jumps:
+        if math.isinf(jump.jump_mm):
+            warnings.append(
+                Problem(
+                    where=configuration.where("gauges", jump.gauge),
+                    what=f"any jump of {named_together(jump.measures)} is believed that two answers agree on",
+                    next_step="write `acceleration_mm_per_s2:`, the largest acceleration of what it measures",
+                )
+            )
+        elif jump.jump_mm > largest_mm:
+            warnings.append(
+                Problem(
+                    where=configuration.where("gauges", jump.gauge, "acceleration_mm_per_s2"),
+                    what=f"a jump of {named_together(jump.measures)} of {jump.jump_mm:.3g} mm is believed",
+                    value=f"{configuration.gauges[jump.gauge].acceleration_mm_per_s2:g} mm/s2, "
+                    f"a reading every {jump.poll_s * 1e3:.3g} ms",
+                    allowed=f"what is believed should be below limits.correction_mm, {largest_mm:g} mm",
+                    next_step="write the acceleration that it really has, or poll it more often",
+                )
+            )
+    return warnings
+
+
+def reply_warnings(configuration: Configuration) -> list[Problem]:
+    """Lines with several gauges on which a late reply looks like the answer to the next request."""
+    gauges = configuration.gauge_objects()
+    return [
+        Problem(
+            where=configuration.where("lines", line),
+            what=f"replies on this line do not say whose they are: one of {named_together(unnamed)} that comes late "
+            "looks like the answer of another gauge, and costs a pause until the line is in step again",
+            next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
+        )
+        for line, settings in configuration.lines.items()
+        if not settings.kind.startswith("modbus")
+        and (
+            unnamed := _without_identity(
+                {name: gauges[name].reply_identity for name, on in configuration.gauges.items() if on.line == line}
+            )
+        )
+    ]
+
+
+def named_together(names: Sequence[str]) -> str:
+    """("joint 1", ..., "joint 9", "scale 2") -> "joint 1 to 9, scale 2"."""
+    return ", ".join(_runs(names))
+
+
+def _runs(names: Sequence[str]) -> Iterator[str]:
+    start = 0
+    for i in range(1, len(names) + 1):
+        if i < len(names) and _follows(names[i - 1], names[i]):
+            continue
+        first, last = names[start], names[i - 1]
+        if i - start > 2:
+            yield f"{first} to {last.rpartition(' ')[2]}"
+        else:
+            yield from names[start:i]
+        start = i
+
+
+def _follows(before: str, name: str) -> bool:
+    """Whether one name counts on from the other: "joint 3" after "joint 2", "frame u2" after "frame u1"."""
+    kind, _, number = before.rpartition(" ")
+    letter, digits = number.rstrip("0123456789"), number[len(number.rstrip("0123456789")) :]
+    return digits.isdigit() and name == f"{kind} {letter}{int(digits) + 1}"
+
+
+def _without_identity(identities: Mapping[str, str | None]) -> list[str]:
+    """Gauges whose replies could be another one's, of the gauges of one line."""
+    counts = Counter(identities.values())
+    unnamed = [gauge for gauge, identity in identities.items() if identity is None or counts[identity] > 1]
+    return unnamed if len(identities) > 1 else []
+
+
+def _poll_s(budget: LineBudget) -> float:
+    return max(budget.usual_s, budget.line.poll_every_s, _FASTEST_ROUND_S) if budget.known else math.nan
+
+
+def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions) -> FeignedJump:
+    noise_um = math.nan if options.noise_um is None else options.noise_um
+    noise_mm = 0.0 if options.noise_um is None else _NOISE_DEVIATIONS * options.noise_um / UM_PER_MM
+    limit = options.acceleration_mm_per_s2
+    jump_mm = math.inf if limit is None else limit * poll_s**2 + noise_mm
+    return FeignedJump(gauge, measures, poll_s, jump_mm, noise_um)

@@ -1,0 +1,120 @@
+"""Places of a configuration outside of its file: directories that it names, and who reaches its sockets."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from compd.configuration.document import Document
+from compd.configuration.operation import SocketSettings, StateSettings
+from compd.errors import Problem
+
+# Below these, the service manager makes the daemon's own directory: RuntimeDirectory=, StateDirectory=.
+_OF_SERVICE_MANAGER = tuple(map(Path, ("/run", "/var/lib")))
+# File systems of the kernel, in which nobody can make a directory.
+_OF_KERNEL = tuple(map(Path, ("/proc", "/sys")))
+
+
+def place_problems(document: Document, sockets: SocketSettings | None, state: StateSettings | None) -> list[Problem]:
+    """A place that can never be what the configuration wants it to be."""
+    problems = []
+    if sockets is not None and _is_something_else(Path(sockets.unix.path)):
+        problems.append(
+            Problem(
+                where=document.where(("sockets", "unix", "path")),
+                what="there is something else that is no socket",
+                value=sockets.unix.path,
+                next_step="choose a name that is not used yet",
+            )
+        )
+    if state is not None and state.model_file is not None and not os.path.lexists(state.model_file):
+        problems.append(
+            Problem(
+                where=document.where(("state", "model_file")),
+                what="there is no such file",
+                value=state.model_file,
+                next_step="`compd effect add` writes a model file; or leave the key out",
+            )
+        )
+    for location, path, *_ in _directories(sockets, state):
+        if why := _why_impossible(path):
+            problems.append(
+                Problem(
+                    where=document.where(location),
+                    what=f"there can be no such directory: {why}",
+                    value=str(path),
+                    next_step="choose another one",
+                )
+            )
+    return problems
+
+
+def place_warnings(document: Document, sockets: SocketSettings | None, state: StateSettings | None) -> list[Problem]:
+    """A directory that this user can neither write nor make, and sockets that are open to other computers."""
+    warnings = []
+    for location, path, what_for in _directories(sockets, state):
+        if _why_impossible(path) or path.parent in _OF_SERVICE_MANAGER:
+            continue
+        existing = _nearest(path)
+        if not os.access(existing, os.W_OK | os.X_OK):
+            what = "cannot be written" if existing == path else f"does not exist, and {existing} cannot be written"
+            warnings.append(
+                Problem(
+                    where=document.where(location),
+                    what=f"the directory for {what_for} {what} by this user",
+                    value=str(path),
+                    next_step=f"as root: install -d -o USER {path}; USER is who runs the daemon",
+                )
+            )
+    return [*warnings, *_open_socket_warnings(document, sockets)]
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is of this computer alone."""
+    return host == "localhost" or ipaddress.ip_address(host).is_loopback
+
+
+def _open_socket_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:
+    if sockets is None or sockets.tcp is None or is_loopback(sockets.tcp.host):
+        return
+    yield Problem(
+        where=document.where(("sockets", "tcp", "host")),
+        what="other computers reach this port: whoever does may become the controller and set targets",
+        value=sockets.tcp.host,
+        allowed="127.0.0.1, or ::1, for this computer alone",
+        next_step="keep it to 127.0.0.1, or see that the network has nobody else in it",
+    )
+
+
+def _directories(
+    sockets: SocketSettings | None, state: StateSettings | None
+) -> Iterator[tuple[tuple[str, ...], Path, str]]:
+    """Location in the file, path, and what it is for, of every directory that the daemon makes."""
+    if sockets is not None:
+        yield ("sockets", "unix", "path"), Path(sockets.unix.path).parent, "the Unix socket"
+    if state is not None:
+        yield ("state", "directory"), Path(state.directory), "machine zero"
+
+
+def _why_impossible(path: Path) -> str:
+    existing = _nearest(path)
+    if not existing.is_dir():
+        return f"{existing} is no directory"
+    if existing != path and any(existing.is_relative_to(place) for place in _OF_KERNEL):
+        return f"{existing} is the kernel's"
+    return ""
+
+
+def _nearest(path: Path) -> Path:
+    """The path itself, or the nearest place above it that exists."""
+    return next((place for place in (path, *path.parents) if os.path.lexists(place)), Path("/"))
+
+
+def _is_something_else(path: Path) -> bool:
+    try:
+        return not stat.S_ISSOCK(path.stat().st_mode)
+    except OSError:
+        return False

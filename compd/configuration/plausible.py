@@ -1,0 +1,223 @@
+"""Which values of a configuration are plausible: one table, with the reason of every limit.
+
+A value beyond is no error, for there are machines of all sizes; `compd check` and `compd run` warn of it. It is most
+often a slip of the unit or of the decimal point, and it would let a fault pass that compd could have found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from compd.configuration.document import Document, Location
+from compd.errors import Problem
+from compd.gauge import GaugeOptions
+
+# A coordinate below this, with all others of its list, is more likely in metres than of a machine for a watchmaker.
+_SMALLEST_MACHINE_MM = 5.0
+_LARGEST_MACHINE_MM = 1e5
+
+
+class PlausibleRange(NamedTuple):
+    """Of one key. key : dotted; `*` stands for any name or entry. reason : of the limit that was passed."""
+
+    key: str
+    lowest: float
+    highest: float
+    unit: str
+    too_low: str
+    too_high: str
+
+
+PLAUSIBLE: tuple[PlausibleRange, ...] = (
+    PlausibleRange(
+        "loop.rate_hz", 5, 2000, "Hz",
+        "a machine at 50 mm/s moves 10 mm and more from one correction to the next",
+        "comparators are read 10 to 500 times a second: more cycles compute the same again",
+    ),
+    PlausibleRange(
+        "loop.stale_after_s", 0.005, 5, "s",
+        "a gauge is read every 5 to 50 ms: its readings would be stale as they come",
+        "a reading that old still counts as good, whatever the machine has done since",
+    ),
+    PlausibleRange(
+        "loop.hold_s", 0.01, 600, "s",
+        "too short for a line to be opened again: this is `on_stale: stop`",
+        "joints and frame drift by micrometres in ten minutes, and the correction would be held so long",
+    ),
+    PlausibleRange(
+        "limits.correction_mm", 0.001, 5, "mm",
+        "every correction of more than 1 um would be clamped",
+        "joints, links and frame are wrong by hundredths of mm: this limit would stop no wrong correction",
+    ),
+    PlausibleRange(
+        "limits.slew_mm_per_s", 0.001, 100, "mm/s",
+        "a correction of 0.1 mm would take minutes",
+        "corrections change by micrometres a second: this limit would stop no jump",
+    ),
+    PlausibleRange(
+        "sockets.valid_for_s", 0.002, 2, "s",
+        "a setpoint would have ended before it arrives",
+        "a controller may go on so long with the last setpoint of a daemon that has died",
+    ),
+    PlausibleRange(
+        "lines.*.timeout_s", 0.005, 5, "s",
+        "devices take 1 to 100 ms to answer: good replies would come too late",
+        "one lost reply keeps all gauges of the line waiting so long",
+    ),
+    PlausibleRange(
+        "lines.*.back_off_s.*", 0.01, 60, "s",
+        "a line that is gone would be opened without a pause",
+        "a cable that is plugged in again would be found only after that time",
+    ),
+    PlausibleRange("lines.*.poll_every_s", 0, 60, "s", "", "readings would be a minute old and more"),
+    PlausibleRange(
+        "gauges.*.stale_after_s", 0.005, 600, "s",
+        "a gauge is read every 5 to 50 ms: its readings would be stale as they come",
+        "a reading that old still counts as good; even a temperature changes in ten minutes",
+    ),
+    PlausibleRange(
+        "gauges.*.noise_um", 0.0005, 50, "um",
+        "no length gauge of a workshop repeats to half a nanometre",
+        "a comparator this noisy corrects nothing",
+    ),
+    PlausibleRange(
+        "gauges.*.fastest_mm_per_s", 0.001, 5000, "mm/s",
+        "not even thermal expansion would be believed after a pause",
+        "no link moves that fast: this limit would find no jump",
+    ),
+    PlausibleRange(
+        "gauges.*.acceleration_mm_per_s2", 0.01, 50_000, "mm/s2",
+        "not even noise would be believed",
+        "five times gravity: this limit would find no jump",
+    ),
+    PlausibleRange(
+        "geometry.link_length_mm.*", 20, 20_000, "mm", "shorter than its own joints", "longer than any machine's"
+    ),
+    PlausibleRange("geometry.plate_thickness_mm", 2, 5000, "mm", "a sheet is no surface plate", "no plate is so thick"),
+    PlausibleRange(
+        "geometry.scale_signal_period_mm", 1e-4, 20, "mm",
+        "the finest scales have 128 nm",
+        "the coarsest magnetic scales have 5 to 10 mm",
+    ),
+    PlausibleRange(
+        "geometry.platform.weight_N", 0.1, 1e5, "N", "no platform with its joints weighs less", "ten tons"
+    ),
+)  # fmt: skip
+
+# Lists of points, of which at least one must be this far from the origin.
+_POINTS: tuple[Location, ...] = (
+    ("geometry", "base", "supports_B_mm"),
+    ("geometry", "base", "joints_B_mm"),
+    ("geometry", "platform", "joints_P_mm"),
+    ("geometry", "plate_points_M_mm"),
+)
+
+
+def implausible(
+    document: Document, sections: Mapping[str, Any], gauges: Mapping[str, GaugeOptions]
+) -> Iterator[Problem]:
+    """A warning for every value that is probably a slip. sections : as far as they could be read."""
+    values = {**sections, "gauges": gauges}
+    for plausible in PLAUSIBLE:
+        for location, value in _values(values, plausible.key.split("."), ()):
+            if (problem := _out_of_range(plausible, location, value, document)) is not None:
+                yield problem
+    yield from _points_out_of_scale(document, sections)
+    yield from _times_that_do_not_fit(document, sections)
+
+
+def _out_of_range(plausible: PlausibleRange, location: Location, value: float, document: Document) -> Problem | None:
+    if plausible.lowest <= value <= plausible.highest:
+        return None
+    reason = plausible.too_low if value < plausible.lowest else plausible.too_high
+    allowed = f"{plausible.lowest:g} to {plausible.highest:g} {plausible.unit} as a rule"
+    next_step = "mend it, or ignore this where the machine is so"
+    if plausible.unit == "mm" and plausible.lowest <= value * 1e3 <= plausible.highest and value < plausible.lowest:
+        next_step = f"in metres? then write {value * 1e3:g}"
+    return Problem(
+        where=document.where(location),
+        what=f"is not plausible: {reason}",
+        value=f"{value:g} {plausible.unit}",
+        allowed=allowed,
+        next_step=next_step,
+    )
+
+
+def _points_out_of_scale(document: Document, sections: Mapping[str, Any]) -> Iterator[Problem]:
+    for location in (*_POINTS, *_tool_points(sections)):
+        points = [value for _, value in _values(sections, [*map(str, location), "*", "*"], ())]
+        points = points or [value for _, value in _values(sections, [*map(str, location), "*"], ())]
+        largest_mm = max(map(abs, points), default=math.nan)
+        if 0 < largest_mm < _SMALLEST_MACHINE_MM:
+            yield Problem(
+                where=document.where(location),
+                what="is not plausible: no coordinate is larger than a few millimetres",
+                value=f"at most {largest_mm:g} mm",
+                next_step="in metres? then multiply every number by 1000",
+            )
+        elif largest_mm > _LARGEST_MACHINE_MM:
+            yield Problem(
+                where=document.where(location),
+                what="is not plausible: no machine is a hundred metres large",
+                value=f"{largest_mm:g} mm",
+                next_step="all lengths are in mm",
+            )
+
+
+def _tool_points(sections: Mapping[str, Any]) -> Iterator[Location]:
+    """Points that may lie at an origin, but not near it: the base's origin, or the tip at machine zero."""
+    yield ("geometry", "base", "origin_B0_in_M_mm")
+    tool = getattr(sections.get("geometry"), "tool", None)
+    if getattr(tool, "on", None) == "platform":
+        yield ("geometry", "tool", "zero_tip_M_mm")
+
+
+def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> Iterator[Problem]:
+    """Times that make sense by themselves, but not beside the others."""
+    rate_hz = _value(sections, "loop", "rate_hz")
+    valid_for_s = _value(sections, "sockets", "valid_for_s")
+    if rate_hz and valid_for_s and valid_for_s * rate_hz < 2:
+        yield Problem(
+            where=document.where(("sockets", "valid_for_s")),
+            what="is not plausible: a setpoint ends before the next one comes",
+            value=f"{valid_for_s:g} s, one every {1 / rate_hz:g} s",
+            allowed=f"{2 / rate_hz:g} s or more",
+            next_step="write five periods or more",
+        )
+
+    for name, line in (sections.get("lines") or {}).items():
+        back_off_s = getattr(line, "back_off_s", None)
+        if back_off_s is not None and back_off_s[0] > back_off_s[1]:
+            yield Problem(
+                where=document.where(("lines", name, "back_off_s")),
+                what="is not plausible: the first wait is the longest",
+                value=f"{list(back_off_s)} s",
+                next_step="write the first wait, then the longest",
+            )
+
+
+def _value(sections: Mapping[str, Any], section: str, key: str) -> float | None:
+    value: float | None = getattr(sections.get(section), key, None)
+    return value
+
+
+def _values(value: Any, keys: Sequence[str], location: Location) -> Iterator[tuple[Location, float]]:
+    """Every number at a dotted key, in which `*` stands for any name or entry, with its location in the file."""
+    if not keys:
+        if isinstance(value, int | float) and math.isfinite(value):
+            yield location, value
+        return
+    key, *rest = keys
+    if key == "*":
+        parts: Iterator[tuple[str | int, Any]] = iter(())
+        if isinstance(value, Mapping):
+            parts = iter(value.items())
+        elif isinstance(value, list | tuple):
+            parts = iter(enumerate(value))
+        for name, part in parts:
+            yield from _values(part, rest, (*location, name))
+    else:
+        part = value.get(key) if isinstance(value, Mapping) else getattr(value, key, None)
+        yield from _values(part, rest, (*location, key))

@@ -1,0 +1,114 @@
+"""The events that the daemon logs: one list, of which the log, the journal's fields and the reference are made.
+
+Where something happens, it is logged by the words for people: `log.warning("line is lost", line=..., detail=...)`.
+`name_event` adds the name for programs, which stays the same when the words are improved: `id=line_lost`.
+A test holds every call in the daemon against this list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping
+from typing import Any, NamedTuple
+
+
+class Event(NamedTuple):
+    """One kind of event.
+
+    id : name for programs. text : what the log says. level : the highest that it is logged with.
+    keys : what it carries. meaning : when it comes.
+    """
+
+    id: str
+    text: str
+    level: str
+    keys: tuple[str, ...]
+    meaning: str
+
+
+# The keys of all events, and what they mean.
+KEYS: Mapping[str, str] = {
+    "check": "how the process that checked the configuration has ended",
+    "client": "address of the client, or `unix`",
+    "config_hash": "hash of the configuration",
+    "count": "how many",
+    "detail": "what the device sent or the line saw",
+    "effects": "ids of the effects of a model",
+    "error": "what went wrong, in the words of the system or of Python",
+    "file": "path of a model file; `none` for the machine without effects",
+    "gauge": "name of the gauge in the configuration",
+    "hash": "hash of a model file",
+    "how": "how a process has ended",
+    "line": "name of the line in the configuration",
+    "lines": "names of lines",
+    "machine": "name of the machine",
+    "mode": "`cmm` or `machine_tool`",
+    "path": "path of a file",
+    "port": "the port's device",
+    "problem": "one problem of the configuration, with its place and what to do",
+    "process": "name of a process of the daemon",
+    "quality": "quality of the gauge's last poll",
+    "rate_hz": "cycles per second",
+    "reason": "why, in words",
+    "signal": "name of the signal",
+    "source": "name of the process that prints",
+    "state": "state of the setpoints, see `states`",
+    "taken_at": "when machine zero was taken, UTC",
+    "tcp_port": "TCP port on which the daemon listens",
+    "unix": "path of the Unix socket",
+    "was": "quality before",
+    "what": "what is probably a mistake",
+    "where": "file, line and key",
+}
+
+EVENTS: tuple[Event, ...] = (
+    Event("running", "running", "info", ("machine", "config_hash", "rate_hz", "unix", "tcp_port"),
+          "the daemon is about to start its processes"),
+    Event("configuration_warning", "configuration", "warning", ("where", "what"),
+          "at the start, for each warning of `compd check`"),
+    Event("configuration_problem", "configuration refused", "error", ("problem",),
+          "at SIGHUP, for each problem of the new configuration"),
+    Event("reload_refused", "the configuration is refused, the daemon goes on with its own", "error", ("check",),
+          "after SIGHUP with a configuration that cannot be used"),
+    Event("stopping", "stopping", "info", ("signal",), "the daemon has got SIGTERM or SIGINT"),
+    Event("state", "state", "warning", ("state", "reason", "mode"),
+          "the state of the setpoints has changed; a warning where they are not valid"),
+    Event("gauge_quality", "gauge", "warning", ("gauge", "quality", "was", "detail"),
+          "the quality of a gauge has changed; a warning unless it is `ok` again"),
+    Event("driver_failed", "driver failed", "error", ("gauge",),
+          "a driver has raised an exception, for the first time; its traceback follows"),
+    Event("line_open", "line is open", "info", ("line",), "a line has been opened, also after it was lost"),
+    Event("line_lost", "line is lost", "warning", ("line", "detail"), "a port is gone, or the other end has closed"),
+    Event("lines_busy", "lines still busy", "warning", ("lines",), "at the end: drivers that do not return"),
+    Event("zero_loaded", "machine zero", "info", ("taken_at",), "at the start: machine zero is on the disk"),
+    Event("zero_missing", "no machine zero", "warning", ("reason",), "at the start: there is none that fits"),
+    Event("zero_taken", "machine zero taken", "info", ("path",), "`compd zero` has succeeded"),
+    Event("zero_refused", "machine zero refused", "warning", ("reason",), "`compd zero` has failed"),
+    Event("model_loaded", "model", "info", ("file", "hash", "effects"), "at the start, with `state.model_file`"),
+    Event("model_adopted", "model adopted", "info", ("file",), "`compd adopt` has succeeded"),
+    Event("shadow_adopted", "shadow", "info", ("file",), "`compd shadow` has succeeded"),
+    Event("model_refused", "model refused", "error", ("file", "reason"), "a model cannot be used; nothing has changed"),
+    Event("client_dropped", "slow client dropped", "warning", ("client",), "a client did not take what it asked for"),
+    Event("client_refused", "a client could not be accepted", "warning", ("error",),
+          "the system has no room for another connection"),
+    Event("loop_ended", "the loop has ended", "error", ("how",), "another loop takes over"),
+    Event("cycle_not_repeated", "the last cycle cannot be computed again", "warning", ("error",),
+          "a loop that takes over begins anew, from the correction that is applied"),
+    Event("process_ended", "a process has ended and starts anew", "error", ("process", "how"),
+          "of the acquisition, or of a line of its own"),
+    Event("service_ended", "the service has ended, and with it the daemon", "error", ("how",),
+          "the service manager starts the daemon again"),
+    Event("process_killed", "a process had to be killed", "warning", ("process",), "at the end of the daemon"),
+    Event("log_dropped", "log lines dropped", "warning", ("source", "count"), "a process prints too much"),
+    Event("low_latency_refused", "low_latency not granted", "info", ("port", "reason"),
+          "an adapter keeps bytes back for up to 16 ms"),
+    Event("port_close_failed", "a lost port did not close cleanly", "info", ("reason",), "when a line is lost"),
+)  # fmt: skip
+
+_ID_OF_TEXT = {event.text: event.id for event in EVENTS}
+
+
+def name_event(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """Add the name for programs to an event; a processor of structlog."""
+    if (name := _ID_OF_TEXT.get(event.get("event", ""))) is not None:
+        event["id"] = name
+    return event

@@ -1,0 +1,162 @@
+"""What every length gauge showed last, on disk: one that was switched off with the computer may count anew.
+
+When the daemon starts, a gauge must show what it showed last, as after any loss of its line; so must one that was not
+believed. A daemon that was away for seconds only, on a computer that was not started anew, goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
+
+from compd.clock import Clock
+from compd.files import write_files
+from compd.live.memory.trust_memory import Doubt, TrustMemory
+
+FILE_NAME = "last-readings.json"
+_FORMAT = 1
+# The file is written at most so often, s, and only when a gauge has moved or is not believed any more.
+_LOOK_EVERY_S = 1.0
+# A daemon that was away for longer, s, does not know what happened to its gauges.
+_LONGEST_ABSENCE_S = 10.0
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+
+log = structlog.get_logger()
+
+
+class _LastReading(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    value_mm: FiniteFloat
+    doubt: int = 0
+    amount: float | None = None
+    evidence: str = ""
+
+
+class _LastReadingsFile(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    format: int
+    zero_hash: str
+    boot_id: str
+    time_s: FiniteFloat
+    readings: dict[str, _LastReading]
+
+
+class LastReadings:
+    """Keeps `TrustMemory` on disk, by a thread of its own."""
+
+    def __init__(self, directory: Path, zero_hash: str, memory: TrustMemory, clock: Clock) -> None:
+        """`zero_hash`: of the configuration; readings of another one say nothing."""
+        self._path = directory / FILE_NAME
+        self._zero_hash = zero_hash
+        self._memory = memory
+        self._clock = clock
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="last readings", daemon=True)
+        self._written: tuple[np.ndarray, np.ndarray] | None = None
+        self._failed = False
+
+    def recall(self) -> None:
+        """Take what is on disk into the memory; before any gauge is read."""
+        try:
+            content = self._path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return
+        except (OSError, UnicodeDecodeError) as error:
+            log.warning("last readings cannot be read", path=str(self._path), reason=str(error))
+            return
+        try:
+            file = _LastReadingsFile.model_validate(json.loads(content))
+        except (ValueError, RecursionError, ValidationError) as error:
+            log.warning("last readings are damaged", path=str(self._path), reason=str(error).splitlines()[0])
+            return
+        if file.zero_hash != self._zero_hash or file.format != _FORMAT:
+            return
+        now_s = self._clock.monotonic()
+        goes_on = file.boot_id == boot_id() and 0.0 <= now_s - file.time_s <= _LONGEST_ABSENCE_S
+        memory = self._memory
+        for channel, last in file.readings.items():
+            i = memory.index.get(channel)
+            if i is not None:
+                memory.believe(i, last.value_mm, file.time_s if goes_on else now_s)
+        for channel, last in file.readings.items():
+            i = memory.index.get(channel)
+            if i is None:
+                continue
+            if last.doubt > Doubt.LOST:
+                memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
+            elif not goes_on:
+                memory.lose(i, now_s)
+        if evidence := {channel: last.evidence for channel, last in file.readings.items() if last.evidence}:
+            memory.evidence.write(evidence)
+
+    def start(self) -> None:
+        """Write from now on."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write once more, and end the thread."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._clock.wait(self._stop, _LOOK_EVERY_S):
+            self._write_if_changed()
+        self._write_if_changed()
+
+    def _write_if_changed(self) -> None:
+        memory, n = self._memory, len(self._memory.channels)
+        value, doubt = memory.value[:n].copy(), memory.doubt[:n].copy()
+        known = ~np.isnan(value)
+        if not known.any():
+            return
+        if self._written is not None:
+            moved = np.abs(value - self._written[0]) > memory.tolerance_mm
+            new = known & np.isnan(self._written[0])
+            if not (moved.any() or new.any() or (doubt != self._written[1]).any()):
+                return
+        evidence = memory.evidence.read() or {}
+        readings = {
+            channel: self._entry(i, float(value[i]), int(doubt[i]), evidence.get(channel, ""))
+            for i, channel in enumerate(memory.channels)
+            if known[i]
+        }
+        content = {
+            "format": _FORMAT,
+            "zero_hash": self._zero_hash,
+            "boot_id": boot_id(),
+            "time_s": self._clock.monotonic(),
+            "readings": readings,
+        }
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_files({self._path: json.dumps(content, indent=1, allow_nan=False) + "\n"})
+        except OSError as error:
+            if not self._failed:
+                log.warning("last readings cannot be written", path=str(self._path), reason=error.strerror)
+            self._failed = True
+            return
+        self._failed = False
+        self._written = value, doubt
+
+    def _entry(self, i: int, value_mm: float, doubt: int, evidence: str) -> dict[str, Any]:
+        entry: dict[str, Any] = {"value_mm": value_mm}
+        if doubt > Doubt.LOST:
+            amount = float(self._memory.amount[i])
+            entry |= {"doubt": doubt, **({"amount": amount} if math.isfinite(amount) else {})}
+            if doubt == Doubt.VOTED:
+                entry["evidence"] = evidence
+        return entry
+
+
+def boot_id() -> str:
+    """A text that is another one after every start of the computer."""
+    return _BOOT_ID.read_text(encoding="ascii").strip()

@@ -1,0 +1,112 @@
+"""A configuration as a whole machine: every problem of the file and of the machine that it describes, at once.
+
+`compd check`, `compd run` and a reload of the daemon read the configuration by this, so that all say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from compd.configuration import Configuration
+from compd.configuration.document import Document, Location
+from compd.configuration.geometry import Geometry
+from compd.configuration.machine_configuration import Examined, examine, in_order
+from compd.configuration.operation import SocketSettings, StateSettings
+from compd.configuration.places import place_problems, place_warnings
+from compd.configuration.section import Section, readable
+from compd.errors import ConfigurationError, KinematicsError, Problem
+from compd.machine_builder import build_model
+from compd.model.machine import MachineModel
+
+SectionT = TypeVar("SectionT", bound=Section)
+
+# Of the words in which a warning asks for the unit, `compd.configuration.plausible`.
+_IN_METRES = "in metres?"
+
+
+def load_whole(path: Path) -> Configuration:
+    """Read and check a configuration, with the machine that it describes; its warnings are complete.
+
+    Raises ConfigurationError with every problem.
+    """
+    examined = examine_whole(path)
+    if examined.configuration is None:
+        raise ConfigurationError(examined.problems)
+    return examined.configuration
+
+
+def examine_whole(path: Path) -> Examined:
+    """What `examine` finds in the file, with what the machine at machine zero and the places on the disk show.
+
+    Raises ConfigurationError where the file as a whole cannot be read.
+    """
+    examined = examine(path)
+    document, warnings = examined.document, list(examined.warnings)
+    problems = list(examined.problems)
+    if examined.geometry is not None and examined.wiring is not None and not _has_problem(problems):
+        try:
+            with np.errstate(all="ignore"):
+                model = build_model(examined.geometry, examined.wiring)
+        except (KinematicsError, ValueError) as error:
+            problems += _at_machine_zero(error, document, warnings)
+        else:
+            warnings += _stroke_warnings(document, examined.geometry, model)
+    sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
+    problems = in_order([*problems, *place_problems(document, sockets, state)])
+    warnings = in_order([*warnings, *place_warnings(document, sockets, state)])
+    configuration = examined.configuration
+    if configuration is not None:
+        configuration = None if problems else replace(configuration, warnings=tuple(warnings))
+    return examined._replace(configuration=configuration, problems=problems, warnings=warnings)
+
+
+def _section(kind: type[SectionT], document: Document, name: str) -> SectionT | None:
+    """A section that has no problem; None where it has."""
+    section = readable(kind, document.value((name,)))
+    return section if isinstance(section, kind) else None
+
+
+def _has_problem(problems: list[Problem]) -> bool:
+    """Whether the geometry or the wiring, from which the machine is built, has a problem already."""
+    return any(problem.where.rpartition(" ")[2].startswith(("geometry", "wiring")) for problem in problems)
+
+
+def _at_machine_zero(error: Exception, document: Document, warnings: list[Problem]) -> Iterator[Problem]:
+    """What the kinematics finds impossible at machine zero, at the key that most likely is the reason."""
+    found = error.problems if isinstance(error, KinematicsError) else (Problem(where="machine zero", what=str(error)),)
+    in_metres = [warning for warning in warnings if warning.next_step.startswith(_IN_METRES)]
+    for problem in found:
+        location: Location = (
+            ("geometry", "plate_points_M_mm") if problem.where.startswith("frame") else ("geometry", "tool")
+        )
+        where, value, next_step = document.where(location), "", problem.next_step
+        if in_metres:
+            where, value = in_metres[0].where, in_metres[0].value
+            next_step = "in metres? all lengths are in mm" + (f"; or {next_step}" if next_step else "")
+        yield Problem(where=where, what=f"{problem.where}: {problem.what}", value=value, next_step=next_step)
+
+
+def _stroke_warnings(document: Document, geometry: Geometry, model: MachineModel) -> Iterator[Problem]:
+    """Links that at machine zero are shorter or longer than any target may make them."""
+    if geometry.link_length_mm is None:
+        return
+    shortest_mm, longest_mm = geometry.link_length_mm
+    lengths_mm = model.zero.link_length_mm
+    outside = [link for link, length_mm in enumerate(lengths_mm, start=1) if not shortest_mm <= length_mm <= longest_mm]
+    if not outside:
+        return
+    in_metres = shortest_mm * 1e3 <= lengths_mm.min() and lengths_mm.max() <= longest_mm * 1e3
+    links = f"link {outside[0]}" if len(outside) == 1 else f"links {', '.join(map(str, outside))}"
+    yield Problem(
+        where=document.where(("geometry", "link_length_mm")),
+        what=f"{links} cannot be as long as at machine zero, {lengths_mm.min():.1f} to {lengths_mm.max():.1f} mm: "
+        "targets will be refused",
+        value=f"{shortest_mm:g} to {longest_mm:g} mm",
+        allowed=f"from less than {lengths_mm.min():.1f} to more than {lengths_mm.max():.1f} mm",
+        next_step="in metres? all lengths are in mm" if in_metres else "mend it, or the tool and joints",
+    )

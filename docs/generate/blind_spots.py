@@ -1,0 +1,57 @@
+"""The page of what compd cannot see, from the list in the code, with the numbers of the shipped tripod."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Figures, figures_of
+from compd.configuration.shipped import load_machine
+from docs.generate.markdown import code, escape, heading, join, sentence, table, target
+
+INTRODUCTION = """\
+A gauge that is lost says so; one that is wrong does not. compd compares what it can: a reading with the ones before it,
+a value that comes back with the last good one, gauges with each other. What then remains looks like a good machine, and
+a wrong setpoint is published as valid. This page lists it, with what it costs at the tip.
+
+The numbers are those of the tripod that comes with compd. For your own machine:
+
+    compd check --what-cannot-be-seen my-machine.yaml
+
+Where a vote is named, it is a key under `votes:` in the configuration.
+"""
+DRIFT = f"""\
+The error at the tip, at machine zero, of a length that is wrong by {DRIFT_UM:g} um: in CMM mode of the tip that is
+published, in machine-tool mode of the place to which the machine is sent.
+"""
+
+
+@cache
+def figures() -> Figures:
+    """Of the shipped tripod."""
+    return figures_of(load_machine("tripod-cmm"))
+
+
+def page() -> str:
+    """Markdown, from the list of blind spots and the kinematics."""
+    drifts = [[d.length, code(d.gauge), f"{d.cmm_um:.1f}", f"{d.machine_tool_um:.1f}"] for d in figures().drifts]
+    return join(
+        "# What compd cannot see",
+        INTRODUCTION,
+        *(_part(spot) for spot in BLIND_SPOTS),
+        heading(2, f"What a drift of {DRIFT_UM:g} um costs", "blind-spots-drift"),
+        DRIFT,
+        table(["length", "gauge", "CMM mode, um", "machine-tool mode, um"], drifts),
+    )
+
+
+def _part(spot: BlindSpot) -> str:
+    """One blind spot: a heading and a list."""
+    vote = f" (vote {code(spot.vote)})" if spot.vote else ""
+    points = [
+        ("Shown by", (escape(sentence(spot.shown_by)) if spot.shown_by else "Nothing.") + vote),
+        ("Unseen", escape(sentence(spot.unseen))),
+        ("On this tripod", escape(sentence(spot.cost(figures())) if spot.cost(figures()) else "")),
+    ]
+    title = spot.fault[0].upper() + spot.fault[1:]
+    items = "".join(f"- *{name}:* {text}\n" for name, text in points if text)
+    return join(heading(2, escape(title), target("blind-spots", spot.name)), items)
