@@ -36,7 +36,7 @@ class Sensors:
         """One noisy reading of every gauge by name, mm and degC, from true values (n,), (k,) and (9,)."""
         step_mm = self._strengths.comparator_step_um * UM
         noise_mm = self._strengths.comparator_noise_um * UM
-        scale = self._measure(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
+        scale = self.scale_mm(scale_mm)
         joint = self._measure(joint_mm, noise_mm, step_mm)
         frame = self._measure(frame_mm, noise_mm, step_mm)
         degC = np.array(list(thermometers_degC.values()))
@@ -47,6 +47,10 @@ class Sensors:
             **{f"frame_{name}": value for name, value in zip(DISTANCES, frame.tolist(), strict=True)},
             **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
         }
+
+    def scale_mm(self, scale_mm: FloatArray) -> FloatArray:
+        """(n,) one noisy reading of every scale, from true values (n,)."""
+        return self._measure(scale_mm, self._strengths.scale_noise_um * UM, self._scale_step_mm)
 
     def joint_values_mm(self, balls: Balls) -> FloatArray:
         """(k,) true displacements at the joint comparators, positive where they shorten the link: equation (1)."""

@@ -72,6 +72,7 @@ class World:
         self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion = SetpointMotion(np.zeros(self._mechanism.links))
         self._rows = rows
+        self._unsolved_s = 0.0, 0.0  # since the last `advance`, and how much of it the links moved
         self.time_s = 0.0
         self.force_M_N: FloatArray = np.zeros(3)
         self.mode: Mode = "zero"
@@ -85,6 +86,19 @@ class World:
 
     def advance(self, time_s: float) -> None:
         """Advance by `time_s`. Motion to a place that the links cannot reach stops before it (mode `blocked`)."""
+        self.move(time_s)
+        passed_s, moved_s = self._unsolved_s
+        self._unsolved_s = 0.0, 0.0
+        if passed_s > 0:
+            try:
+                self._advance_state(self._motion.position_mm, self._state.posture, passed_s, moved_s)
+            except KinematicsError:
+                self._motion = SetpointMotion(self._state.scale_mm)
+                self.mode = "blocked"
+        self._readings = self._read_gauges()
+
+    def move(self, time_s: float) -> None:
+        """Advance the motion alone by `time_s`; what bends and warms up with it follows with the next `advance`."""
         self.time_s += time_s
         if self.mode == "zero":
             zero_s = min(time_s, self.zero_hold_s)
@@ -93,13 +107,8 @@ class World:
             if time_s > 0:
                 self.start_plan() if self._rows else self.start_tour()
         if time_s > 0:
-            moved_s = self._motion.advance(time_s)
-            try:
-                self._advance_state(self._motion.position_mm, self._state.posture, time_s, moved_s)
-            except KinematicsError:
-                self._motion = SetpointMotion(self._state.scale_mm)
-                self.mode = "blocked"
-        self._readings = self._read_gauges()
+            passed_s, moved_s = self._unsolved_s
+            self._unsolved_s = passed_s + time_s, moved_s + self._motion.advance(time_s)
 
     def advance_to(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
         """Advance by `time_s`; in the first `travel_s` of it the links move straight to `scale_mm`, (n,).
@@ -244,6 +253,22 @@ class World:
                     next_step="wire a gauge to one of these",
                 )
             ) from None
+
+    def sense_scale(self, name: str) -> float:
+        """Reading (mm) of the scale `name`, scale_1 to scale_n, where the motion is now."""
+        scale_mm = self._motion.position_mm
+        for cause in self._causes:
+            scale_mm = cause.scale_reading_mm(scale_mm)
+        return float(self._sensors.scale_mm(scale_mm)[int(name.removeprefix("scale_")) - 1])
+
+    def look(self) -> EquilibriumState:
+        """The state where the motion is now; that of the last `advance` where the links cannot meet there."""
+        if self.phase == "dwelling" and np.array_equal(self._motion.position_mm, self._state.scale_mm):
+            return self._state
+        try:
+            return self._solve(self._motion.position_mm, self._state.posture)
+        except KinematicsError:
+            return self._state
 
     @property
     def names(self) -> list[str]:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
-from compd.simulation.truth.world import World
 from compd.simulation.wires.device import Sense
 
 # Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.
 _IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}
 
 
+class Sensed(Protocol):
+    """What has readings by name: a `World`, or a `LiveWorld`."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+    def sense(self, name: str) -> float: ...
+
+
 class Sensing:
     """Gives each gauge its `Sense`: values of its channels, with the gauge's own sign."""
 
-    def __init__(self, configuration: Configuration, world: World) -> None:
+    def __init__(self, configuration: Configuration, world: Sensed) -> None:
         self._world = world
         wiring = configuration.wiring
         wires = [

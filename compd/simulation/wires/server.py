@@ -18,10 +18,11 @@ from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
+from compd.simulation.wires.live_world import LiveWorld
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 
-# Step of the world: below the 25 ms in which the fastest scale display answers.
+# Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02
 CONTROL_SOCKET = "control.sock"
 # The tracker's noise does not depend on the machine's seed.
@@ -44,10 +45,10 @@ class Simulation:
         self.ports: Mapping[str, Port] = {}
         self._clock = clock
         self._tracker_rng = np.random.default_rng(TRACKER_SEED)
-        self._lock = threading.Lock()
+        self._live = LiveWorld(world, clock)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="world", daemon=True)
-        sensing = Sensing(configuration, world)
+        sensing = Sensing(configuration, self._live)
         self._ports_directory = directory / "ports"
         self.lines: Mapping[str, SimulatedLine] = {
             name: SimulatedLine(
@@ -97,12 +98,9 @@ class Simulation:
         self._running.close()
 
     def _run(self) -> None:
-        last_s = self._clock.monotonic()
+        self._live.start()
         while not self._clock.wait(self._stop, STEP_S):
-            now_s = self._clock.monotonic()
-            with self._lock:
-                self.world.advance(now_s - last_s)
-            last_s = now_s
+            self._live.step()
 
     def _device(self, gauge: str, sensing: Sensing) -> Any:
         driver = self.configuration.gauges[gauge].driver
@@ -113,9 +111,9 @@ class Simulation:
 
     def truth(self) -> Answer:
         """True tip and state of motion: the TRUTH message."""
-        with self._lock:
-            world = self.world
-            tip_mm = world.tip_M_mm() if world.tip_frame == "M" else world.tip_P_mm()
+        with self._live.now() as world:
+            state = world.look()
+            tip_mm = state.tip_M if world.tip_frame == "M" else state.tip_P
             return {
                 "class": "TRUTH",
                 "time_s": round(world.time_s, 6),
@@ -127,7 +125,7 @@ class Simulation:
                 "zero_hold_s": round(world.zero_hold_s, 3),
                 "tip_frame": world.tip_frame,
                 "tip_mm": tip_mm.tolist(),
-                "scale_mm": world.scale_mm.tolist(),
+                "scale_mm": state.scale_mm.tolist(),
                 **({} if world.plan_motion is None else {"plan": world.plan_motion.progress()}),
             }
 
@@ -136,9 +134,8 @@ class Simulation:
 
         monotonic_s : on the clock that also stamps the gauges' readings.
         """
-        with self._lock:
-            world = self.world
-            tip_mm = TRACKER.measure(world.reference_tip_mm(), self._tracker_rng)
+        with self._live.now() as world:
+            tip_mm = TRACKER.measure(world.look().shown, self._tracker_rng)
             return {
                 "class": "MEASURED",
                 "instrument": "laser tracker",
@@ -151,31 +148,31 @@ class Simulation:
             }
 
     def _drive(self, message: Mapping[str, Any]) -> Answer:
-        with self._lock:
-            self.world.command(message["scale_mm"])
+        with self._live.now() as world:
+            world.command(message["scale_mm"])
         return self.truth()
 
     def _tour(self, _: Mapping[str, Any]) -> Answer:
-        with self._lock:
-            self.world.start_tour()
+        with self._live.now() as world:
+            world.start_tour()
         return self.truth()
 
     def _plan(self, _: Mapping[str, Any]) -> Answer:
-        with self._lock:
-            self.world.start_plan()
+        with self._live.now() as world:
+            world.start_plan()
         return self.truth()
 
     def _tip_for(self, message: Mapping[str, Any]) -> Answer:
-        with self._lock:
-            tip_mm = self.world.tip_for(message["scale_mm"])
+        with self._live.now() as world:
+            tip_mm = world.tip_for(message["scale_mm"])
         return {"class": "TIP", "tip_frame": self.world.tip_frame, "tip_mm": tip_mm.tolist()}
 
     def _load(self, message: Mapping[str, Any]) -> Answer:
         force_M_N = np.array(message["force_M_N"], dtype=float)
         if force_M_N.shape != (3,) or not np.all(np.isfinite(force_M_N)):
             raise ValueError("force_M_N: three finite numbers, N")
-        with self._lock:
-            self.world.force_M_N = force_M_N
+        with self._live.now() as world:
+            world.force_M_N = force_M_N
         return self.truth()
 
     def _heat(self, message: Mapping[str, Any]) -> Answer:
@@ -186,8 +183,8 @@ class Simulation:
         ring_W, platform_W, tool_W, lamps_W = (
             _watts(message[name]) for name in ("ring_W", "platform_W", "tool_W", "lamps_W")
         )
-        with self._lock:
-            self.world.heat(Heat(np.array(drives_W), ring_W, np.array(cabinet_W), platform_W, tool_W, lamps_W))
+        with self._live.now() as world:
+            world.heat(Heat(np.array(drives_W), ring_W, np.array(cabinet_W), platform_W, tool_W, lamps_W))
         return self.truth()
 
     def _fault(self, message: Mapping[str, Any]) -> Answer:
