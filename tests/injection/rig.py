@@ -37,6 +37,7 @@ RATE_HZ = 100.0
 # For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.
 SETTLED_S = 0.3
 TRUTH_EVERY_S = 0.05
+MACHINE_ZERO = "machine-zero.json"
 
 
 @dataclass
@@ -255,9 +256,16 @@ class InjectedMachine:
         if not self.daemon.alive:
             self.restart()
 
-    def restart(self) -> None:
-        """End the daemon, in whatever state it is, and start it anew."""
+    def restart(self, forget: bool = False) -> None:
+        """End the daemon, in whatever state it is, and start it anew.
+
+        forget : what it knows of its gauges but for machine zero, so that they are believed as they are.
+        """
         self.daemon.stop()
+        if forget:
+            for path in (self.directory / "state").iterdir():
+                if path.name != MACHINE_ZERO:
+                    path.unlink()
         self.daemon.__enter__()
 
     def until_ok(self, watcher: Watcher, patience_s: float = PATIENCE_S) -> bool:

@@ -61,7 +61,7 @@ def settle(machine: InjectedMachine) -> None:
     machine.repair()
     machine.truth.forget()
     machine.truth.drive(REST_MM)
-    for way_out in (lambda: None, lambda: accept(machine), machine.restart):
+    for way_out in (lambda: None, lambda: accept(machine), lambda: machine.restart(forget=True)):
         way_out()
         with machine.watched() as watcher:
             if machine.until_ok(watcher, SETTLED_WITHIN_S):

@@ -88,7 +88,7 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
     if ended and not any(case.lost for case in cases):
         summary.broken.append(f"{[case.id for case in cases]}: the connection ended")
     if restarted:
-        machine.restart()
+        machine.restart(forget=True)
     elif not ended:
         after = _counts(machine)
         summary.cycles += max(0, after["cycles"] - before["cycles"])
