@@ -130,6 +130,7 @@ def test_a_crash_in_the_shared_process_is_held_and_comes_back(machine: Machine, 
         assert is_valid(held)
         assert held["reason"]
         machine.misdeeds.end()
+        controller.target(tip_B0_mm=AT_ZERO_B0_MM)  # again: it grows old
         after = watcher.now
         watcher.until("ok by itself", is_ok, after)
     entry = until("a new process", lambda: started_again(together, "acquisition", before))
