@@ -15,7 +15,7 @@ from tests.injection.matrix import MATRIX
 # Written by `python -m tests.injection --write docs/faults.json`.
 MEASURED = Path(__file__).parent.parent / "faults.json"
 
-HEADER = ["what fails", "what must happen", "way out", "largest error", "valid", "shown after", "`ok` again after"]
+HEADER = ["what fails", "what must happen", "way out", "largest error", "valid", "shown after, `ok` again after"]
 
 
 @cache
@@ -47,8 +47,8 @@ drives. The columns on the right are from one run of
 - *largest error* of any setpoint that was valid, from the beginning of the fault until the state was `ok` again.
   Without any fault it is 0.3 um, the noise of the gauges;
 - *valid*: the share of the setpoints that were valid while the fault lasted;
-- *shown after*: from the beginning of the fault until the state and the reason said so;
-- *`ok` again after*: from the end of the fault, or from `compd accept`.
+- *shown after*: from the beginning of the fault until state and reason said so; *`ok` again after*: from the end of the
+  fault, or from `compd accept`. A dash: there was nothing to measure.
 
 [Limits and stale gauges](../explanation/limits-and-stale-gauges.md) explains the states,
 [the daemon's processes](../explanation/processes.md) who guards whom. `tests/system/test_fault_matrix.py` runs the
@@ -83,9 +83,8 @@ def _row(case: Case) -> list[str]:
         _must(case),
         "the service manager starts it again" if case.lost else case.way.value,
         _number(outcome.get("worst_um"), "um", 2),
-        "" if outcome.get("valid_share") is None else f"{outcome['valid_share']:.0%}".replace("nan%", ""),
-        _number(outcome.get("shown_s"), "s", 2),
-        _number(outcome.get("back_s"), "s", 2),
+        _number(outcome.get("valid_share", math.nan) * 100, "%", 0),
+        f"{_number(outcome.get('shown_s'), 's', 2)}, {_number(outcome.get('back_s'), 's', 2)}",
     ]
 
 
@@ -110,4 +109,4 @@ def _outcome(case: Case) -> dict[str, Any]:
 
 
 def _number(value: float | None, unit: str, decimals: int) -> str:
-    return "" if value is None or math.isnan(value) else f"{value:.{decimals}f} {unit}"
+    return "-" if value is None or math.isnan(value) else f"{value:.{decimals}f} {unit}"
