@@ -18,6 +18,7 @@ A controller also says where the tip shall be, and commands its drives with the 
     with connect("/run/compd/compd.sock") as client:
         client.target(tip_B0_mm=[10.0, 0.0, -500.0])
         for setpoint in client.watch():
+            client.target(tip_B0_mm=[10.0, 0.0, -500.0])  # the next one, or the same again: a target grows old
             if setpoint["valid"] and setpoint["mode"] == "machine_tool":
                 drive_to(setpoint["scale_setpoint_mm"])
 
@@ -25,6 +26,7 @@ Messages are dictionaries with the keys of the protocol. Lengths are in mm, angl
 daemon's monotonic clock; a vector's name ends in its frame and unit. What is unknown is absent from a message, so a
 key that not every setpoint has is read with `get`. A setpoint must not be used later than its `valid_until`: on the
 daemon's computer compare it with `time.monotonic()`, elsewhere count `valid_until - time_s` from the moment of arrival.
+A target grows old too: a controller repeats it, see `Client.target`.
 
 Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 """
@@ -48,16 +50,18 @@ _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listen
 Message = dict[str, Any]
 
 
-def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Client:
+def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token: str | None = None) -> Client:
     """Connect to the running daemon.
 
     Parameters
     ----------
     address : str or Path
         ``"host:port"``, or the path of the daemon's Unix socket. What reads or writes files of the daemon's computer
-        (`Client.readings`, `Client.zero`, `Client.model`) is allowed over the Unix socket alone.
+        (`Client.readings`, `Client.zero`, `Client.model`), and `Client.accept`, is allowed over the Unix socket alone.
     timeout_s : float
         For connecting, and for each answer and each setpoint, s.
+    token : str, optional
+        Over TCP, what is in the daemon's file `sockets.tcp.token_file`, where it has one.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
     Raises
     ------
     DaemonError
-        Where the address is none, no daemon answers there, or it has too many clients.
+        Where the address is none, no daemon answers there, it has too many clients, or it needs another token.
 
     Examples
     --------
@@ -101,7 +105,7 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0) -> Cl
             Problem(where=text, what=f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
         ) from error
     try:
-        return Client(connection, text)
+        return Client(connection, text, token)
     except DaemonError:
         connection.close()
         raise
@@ -120,13 +124,26 @@ class Client:
         The daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
     """
 
-    def __init__(self, connection: socket.socket, address: str) -> None:
-        """`connection`: an open socket with its timeout set; `address`: the name of the other end in errors."""
+    def __init__(self, connection: socket.socket, address: str, token: str | None = None) -> None:
+        """`connection`: an open socket with its timeout set; `address`: the name of the other end in errors; `token`:
+        as in `connect`."""
         self._connection = connection
         self._address = address
         self._lines = connection.makefile("rb")
         self._setpoints: deque[Message] = deque()
-        self.version = self._await("VERSION")
+        _, greeting = self._read()
+        if greeting["class"] == "AUTH":
+            if token is None:
+                raise DaemonError(
+                    Problem(
+                        where=address,
+                        what="the daemon wants a token before anything else",
+                        next_step="give the one in its file `sockets.tcp.token_file`: connect(..., token=...), "
+                        "`compd watch --token-file`",
+                    )
+                )
+            greeting = self._ask({"class": "AUTH", "token": token.strip()}, "VERSION")
+        self.version = greeting
 
     def watch(self, rate_hz: float | None = None) -> Iterator[Message]:
         """Iterate over SETPOINT messages, without end.
@@ -191,8 +208,10 @@ class Client:
     ) -> None:
         """Set the tip's target, as the controller; the next setpoint is computed for it.
 
-        The first client with a target is the controller until it disconnects or calls `release`. There is no answer:
-        where the daemon refuses the target, the method that reads next raises DaemonError.
+        The first client with a target is the controller until it disconnects or calls `release`. A target may be used
+        for `sockets.target.valid_for_s` (5 s unless configured): repeat it more often than that, also while the machine
+        stands still, or the setpoints become invalid. There is no answer: where the daemon refuses the target, the
+        method that reads next raises DaemonError.
 
         Parameters
         ----------
@@ -214,10 +233,12 @@ class Client:
     def release(self) -> None:
         """Give the controller's role back: the daemon returns to CMM mode.
 
+        Over the Unix socket it takes the role from whichever client has it.
+
         Raises
         ------
         DaemonError
-            Where this client is not the controller.
+            Where this client is not the controller, or nobody is.
         """
         self._ask({"class": "RELEASE"}, "RELEASE")
 
@@ -236,20 +257,49 @@ class Client:
         """
         return self._ask({"class": "STATUS"}, "STATUS")
 
-    def zero(self) -> Message:
+    def zero(self, replace: bool = False) -> Message:
         """Take machine zero, with the machine at rest at its zero position. Unix socket only; takes about a second.
+
+        Parameters
+        ----------
+        replace : bool
+            Take it also where a gauge differs by more than 0.5 mm from the machine zero until now, or is not believed.
 
         Returns
         -------
         dict
-            ZERO with `taken_at`, `path` of the file, and `readings_mm` by channel.
+            ZERO with `taken_at`, `path` of the file, `readings_mm` by channel and, where there was a machine zero
+            before, `changed_mm` by channel.
 
         Raises
         ------
         DaemonError
-            Where a gauge cannot be read, the machine moves, or the file cannot be written.
+            Where a gauge cannot be read, the machine moves, or the file cannot be written; and where it needs
+            `replace`: the problem's value is then "zero_differs".
         """
-        return self._ask({"class": "ZERO"}, "ZERO")
+        return self._ask({"class": "ZERO", "replace": True} if replace else {"class": "ZERO"}, "ZERO")
+
+    def accept(self, gauge: str) -> Message:
+        """Let the daemon believe a gauge again that jumped, or came back with another value. Unix socket only.
+
+        Look at the gauge first: what it reads from now on is taken as it is.
+
+        Parameters
+        ----------
+        gauge : str
+            A gauge, one channel of it as ``"gauge.channel"``, or ``"all"``.
+
+        Returns
+        -------
+        dict
+            ACCEPT with `gauges`: the channels that were not believed until now.
+
+        Raises
+        ------
+        DaemonError
+            Where there is no such gauge.
+        """
+        return self._ask({"class": "ACCEPT", "gauge": gauge}, "ACCEPT")
 
     def model(self, file: str | None = None, shadow: bool = False) -> Message:
         """Ask which models the daemon runs with; with `file`, adopt that model first. Unix socket only.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -51,6 +53,25 @@ def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -
             temporary.unlink(missing_ok=True)
     for directory in {path.parent for path in contents}:
         sync_directory(directory)
+
+
+def read_small_file(path: Path, limit_bytes: int) -> bytes:
+    """The content of a regular file of at most `limit_bytes`; a pipe or a device is never waited for.
+
+    Raises OSError, also for what is no regular file, or is longer.
+    """
+    return read_descriptor(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), limit_bytes)
+
+
+def read_descriptor(descriptor: int, limit_bytes: int) -> bytes:
+    """What `read_small_file` does, for a file that is open; it is closed in any case."""
+    with open(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "it is not a regular file")
+        content = file.read(limit_bytes + 1)
+    if len(content) > limit_bytes:
+        raise OSError(errno.EFBIG, f"it has more than {limit_bytes} bytes")
+    return content
 
 
 def write_new_file(path: Path, content: str | bytes) -> None:

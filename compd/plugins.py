@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import stat
 import sys
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
@@ -17,6 +16,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
+from compd.file_trust import own_users, trust_problem
 
 GAUGES = "compd.gauges"
 SIMULATED_GAUGES = "compd.simulated_gauges"
@@ -119,37 +119,32 @@ def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
 def load_module(file: Path, where: str, kind: str) -> ModuleType:
     """Execute a person's own file; one that others may write could run anything as the daemon, and is refused.
 
-    file : absolute.  kind : what is sought in it, for messages.  Raises PluginError.
+    file : absolute.  kind : what is sought in it, for messages.  Raises PluginError, whatever the file's code does.
     """
     try:
-        mode = file.stat().st_mode
-    except OSError as error:
+        real = file.resolve(strict=True)
+        problem = trust_problem(real, where, kind, own_users())
+    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
+        why = getattr(error, "strerror", None) or str(error)
         raise PluginError(
-            Problem(where=where, what=f"cannot read the {kind}'s file: {error.strerror}", value=str(file))
+            Problem(where=where, what=f"cannot read the {kind}'s file: {why}", value=str(file))
         ) from error
-    if mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PluginError(
-            Problem(
-                where=where,
-                what=f"the {kind}'s file may be written by group or others",
-                value=str(file),
-                allowed="mode 644 or stricter",
-                next_step=f"chmod go-w {file}",
-            )
-        )
+    if problem is not None:
+        raise PluginError(problem)
     # one name per path: its classes look their own module up by it (pydantic resolves annotations there)
     module_name = "compd_file_" + re.sub(r"\W", "_", str(file))
-    spec = importlib.util.spec_from_file_location(module_name, file)
-    if spec is None or spec.loader is None:
+    spec = importlib.util.spec_from_file_location(module_name, real)
+    if spec is None or spec.loader is None or not real.is_file():
         raise PluginError(Problem(where=where, what="not a Python file", value=str(file)))
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
-    except (ImportError, SyntaxError, AttributeError) as error:
+    except (Exception, SystemExit) as error:
         raise _unloadable(str(file), where, kind, error) from error
     return module
 
 
-def _unloadable(value: str, where: str, kind: str, error: Exception) -> PluginError:
-    return PluginError(Problem(where=where, what=f"the {kind}'s file cannot be loaded: {error}", value=value))
+def _unloadable(value: str, where: str, kind: str, error: BaseException) -> PluginError:
+    name = "" if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: "
+    return PluginError(Problem(where=where, what=f"the {kind}'s file cannot be loaded: {name}{error}", value=value))

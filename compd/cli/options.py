@@ -24,6 +24,7 @@ EffectsOption = Annotated[
         "that comes with compd. May be repeated.",
     ),
 ]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Write over a file that is something else.")]
 
 
 def unix_address(address: str) -> str:

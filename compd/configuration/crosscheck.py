@@ -31,6 +31,7 @@ class Sections:
     drivers: Mapping[str, type[Gauge[Any]]]
     wiring: Any
     acquisition: Any = None
+    sockets: Any = None
 
 
 def problems(sections: Sections) -> list[Problem]:
@@ -70,7 +71,7 @@ def warnings(sections: Sections) -> list[Problem]:
         for name in sections.gauges
         if whole and name not in wired_gauges
     ]
-    return [*unused, *_shared_process_warnings(sections)]
+    return [*unused, *_shared_process_warnings(sections), *_open_port_warnings(sections)]
 
 
 def resolve_channel(
@@ -177,6 +178,20 @@ def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
                 value=options.driver,
                 next_step=f"write `{options.line}` under `acquisition: own_process:`",
             )
+
+
+def _open_port_warnings(sections: Sections) -> Iterator[Problem]:
+    """A TCP port that other computers can reach."""
+    tcp = None if sections.sockets is None else sections.sockets.tcp
+    if tcp is not None and tcp.is_open:
+        yield Problem(
+            where=sections.document.where(("sockets", "tcp", "host")),
+            what="OPEN TO THE NETWORK: other computers can watch and, with the token, move this machine; nothing "
+            "on the way is encrypted, the token neither",
+            value=f"{tcp.host}, allowed from {', '.join(tcp.allow)}",
+            next_step="let compd listen on 127.0.0.1 and a proxy with TLS on the network, or keep this network to the "
+            "machine; `target: {unix_only: true}` under `sockets:` lets other computers only watch",
+        )
 
 
 def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:

@@ -23,6 +23,7 @@ from compd.configuration.operation import (
     LoopSettings,
     SocketSettings,
     StateSettings,
+    TargetSettings,
     VoteSettings,
     Wiring,
 )
@@ -211,6 +212,9 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "acceleration_mm_per_s2": None,
     "absolute": None,
     "trust_after_loss": False,
+    "allow": [],
+    "token_file": None,
+    "target": TargetSettings().model_dump(mode="json"),
 }
 
 
@@ -298,6 +302,7 @@ def examine(path: Path) -> Examined:
         drivers,
         part["wiring"],
         part["acquisition"],
+        part["sockets"],
     )
     problems += crosscheck.problems(checked)
     warnings = in_order([*crosscheck.warnings(checked), *implausible(document, part, gauges)])
@@ -395,9 +400,9 @@ def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[
 
     def plain(value: Any) -> Any:
         if isinstance(value, BaseModel):
-            value = _said(value.model_dump(mode="json"))
+            value = value.model_dump(mode="json")
         if isinstance(value, Mapping):
-            return {k: plain(v) for k, v in value.items() if k not in without}
+            return {k: plain(v) for k, v in _said(value).items() if k not in without}
         return [plain(v) for v in value] if isinstance(value, list) else value
 
     text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)

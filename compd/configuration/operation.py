@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, Self, get_args
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
-from compd.configuration.section import AbsolutePath, Positive, Section, Text
+from compd.configuration.section import AbsolutePath, Positive, Section, Text, refusal
 
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
@@ -155,9 +155,23 @@ class VoteSettings(Section):
 class TcpSocket(Section):
     """Clients over TCP."""
 
-    host: str = Field(default="127.0.0.1", description="address to listen on; loopback unless you write another")
+    host: str = Field(
+        default="127.0.0.1",
+        description="address to listen on; any other than loopback needs `allow` and `token_file`",
+    )
     port: Annotated[int, Field(ge=0, le=65535)] = Field(
         default=7750, description="TCP port to listen on; 0: any free port"
+    )
+    allow: tuple[str, ...] = Field(
+        default=(),
+        description="addresses and networks (10.1.2.0/24) from which clients may connect; left out: every address that "
+        "reaches the port",
+    )
+    token_file: str | None = Field(
+        default=None,
+        pattern=r"^/",
+        description="absolute path of a file, of mode 600, with a secret of 16 characters or more that every TCP "
+        "client sends in its first line, `AUTH`; left out: none",
     )
 
     @field_validator("host")
@@ -166,6 +180,30 @@ class TcpSocket(Section):
         if host != "localhost":
             ipaddress.ip_address(host)
         return host
+
+    @field_validator("allow")
+    @classmethod
+    def _are_networks(cls, allow: tuple[str, ...]) -> tuple[str, ...]:
+        for text in allow:
+            ipaddress.ip_network(text)
+        return allow
+
+    @model_validator(mode="after")
+    def _is_guarded(self) -> Self:
+        missing = [name for name in ("allow", "token_file") if not getattr(self, name)]
+        if self.is_open and missing:
+            raise refusal(
+                f"host {self.host} can be reached from other computers, and {' and '.join(missing)} "
+                f"{'is' if len(missing) == 1 else 'are'} missing",
+                "`allow` and `token_file` under `tcp:`, or host 127.0.0.1",
+                "read docs/how-to/connect-a-controller.md, From another computer",
+            )
+        return self
+
+    @property
+    def is_open(self) -> bool:
+        """Whether other computers can reach it."""
+        return self.host != "localhost" and not ipaddress.ip_address(self.host).is_loopback
 
 
 class UnixSocket(Section):
@@ -181,6 +219,17 @@ class UdpTarget(Section):
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="UDP port of the controller")
 
 
+class TargetSettings(Section):
+    """What a controller's `TARGET` counts; the section may be left out."""
+
+    valid_for_s: Positive = Field(
+        default=5.0,
+        description="how long a target may be used: a controller that sends none for so long gets `stop`, until it "
+        "sends one again or its role ends",
+    )
+    unix_only: bool = Field(default=False, description="true: only clients of the Unix socket may send one")
+
+
 class SocketSettings(Section):
     """Where clients connect."""
 
@@ -189,6 +238,7 @@ class SocketSettings(Section):
     udp: UdpTarget | None = Field(
         default=None, description="where every setpoint goes as a packet of fixed size; left out: none is sent"
     )
+    target: TargetSettings = Field(default=TargetSettings(), description="what a controller may do")
     valid_for_s: Positive = Field(description="how long a setpoint may be used: valid_until = time + this")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 import stat
 from collections.abc import Iterator
@@ -69,24 +68,7 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
                     next_step=f"as root: install -d -o USER {path}; USER is who runs the daemon",
                 )
             )
-    return [*warnings, *_open_socket_warnings(document, sockets)]
-
-
-def is_loopback(host: str) -> bool:
-    """Whether an address is of this computer alone."""
-    return host == "localhost" or ipaddress.ip_address(host).is_loopback
-
-
-def _open_socket_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:
-    if sockets is None or sockets.tcp is None or is_loopback(sockets.tcp.host):
-        return
-    yield Problem(
-        where=document.where(("sockets", "tcp", "host")),
-        what="other computers reach this port: whoever does may become the controller and set targets",
-        value=sockets.tcp.host,
-        allowed="127.0.0.1, or ::1, for this computer alone",
-        next_step="keep it to 127.0.0.1, or see that the network has nobody else in it",
-    )
+    return warnings
 
 
 def _directories(

@@ -109,12 +109,10 @@ def run_session(
         start_s = time.monotonic()
         while (elapsed_s := time.monotonic() - start_s) < seconds:
             target_mm = _next_target(configuration, random)
-            if tool_moves:
-                daemon.target(tip_B0_mm=_in_B0(configuration, target_mm).tolist())
-            else:
-                daemon.target(tip_P_mm=target_mm.tolist())
+            target = {"tip_B0_mm": _in_B0(configuration, target_mm)} if tool_moves else {"tip_P_mm": target_mm}
             arrived_s = math.inf
             for setpoint in setpoints:
+                daemon.target(**{key: tip_mm.tolist() for key, tip_mm in target.items()})  # again: it grows old
                 session.setpoints.append(setpoint)
                 elapsed_s = time.monotonic() - start_s
                 on_change(session, elapsed_s, setpoint)

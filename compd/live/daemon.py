@@ -44,8 +44,10 @@ from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.requests import Requests, TargetKeys
+from compd.live.service.request import TargetKeys
+from compd.live.service.requests import Requests
 from compd.live.service.status_message import StatusReport
+from compd.live.service.tcp_access import TcpAccess
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
 from compd.model.machine import MachineModel
@@ -85,6 +87,7 @@ class Daemon:
         # compiles what the loop calls, so that its processes have it from their first cycle
         try_model(pipeline.settings.model, (), str(configuration.path))
         sockets = configuration.sockets
+        access = TcpAccess.of(sockets.tcp)
         packets = UdpSender(sockets.udp) if sockets.udp is not None else None
         try:
             self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
@@ -129,6 +132,7 @@ class Daemon:
             Path(configuration.state.directory),
             configuration.zero_hash,
             clock,
+            self.trust.accept,
         )
         last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
         if before is None or before.trust is not self.trust:
@@ -168,6 +172,10 @@ class Daemon:
             ReadingsMessage(self._wires, self.latest.channels),
             model_switch.start,
             lambda: adopted.summary,
+            self.trust.accept,
+            sockets.target,
+            access,
+            clock,
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
         self.service = ServiceProcess(

@@ -19,7 +19,7 @@ from compd.paper.frame_experiment import (
     crossing_mm,
     order,
 )
-from compd.report.page import COLOURS, Panel, style_figure, write_page
+from compd.report.page import COLOURS, Panel, check_page_path, style_figure, write_page
 from compd.report.page_table import PageTable
 from compd.units import UM_PER_MM
 
@@ -151,6 +151,7 @@ def panels(result: FrameResult) -> list[Panel]:
 def write_frame_page(result: FrameResult, path: Path) -> None:
     """Write sentences, pictures and table as one HTML file; its directory is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    check_page_path(path)
     verdict = f"{_order_text(result)} {_crossing_text(result)}"
     write_page(path, title(result), verdict, panels(result), _FOOTER)
 

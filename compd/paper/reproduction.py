@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.report.page import Panel, write_page
+from compd.report.page import Panel, check_page_path, write_page
 from compd.report.page_table import PageTable
 
 HEAD = ("", "without", "with", "reduction", "the paper")
@@ -62,6 +62,7 @@ class Reproduction:
     def write_page(self, path: Path) -> None:
         """Write verdict, pictures and table as one HTML file; its directory is made."""
         path.parent.mkdir(parents=True, exist_ok=True)
+        check_page_path(path)
         numbers = Panel(
             "In numbers",
             "What was measured here, beside what the paper states.",

@@ -21,6 +21,7 @@ from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
 from compd.errors import CompdError, Problem
+from compd.output_file import check_replaceable
 from compd.report.page_table import PageTable
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
@@ -33,6 +34,9 @@ _PLOTLY_CONFIG = {
     "showSendToCloud": False,
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
 }
+
+# In the head of every page: its generator; in those of releases before 0.6 the style of their text.
+_PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
 
 # Name of plotly's script where pages share it.
 SHARED_SCRIPT = "plotly.min.js"
@@ -59,12 +63,16 @@ class Panel:
     content: Figure | PageTable | PageText
 
 
-def check_page_path(path: Path) -> None:
-    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it."""
+def check_page_path(path: Path, overwrite: bool | None = None) -> None:
+    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it.
+
+    overwrite : whether to write over a file that is no page of compd; another page is replaced in any case.
+    """
     if not path.parent.is_dir():
         raise CompdError(
             Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
         )
+    check_replaceable(path, _PAGE_MARKS, "a page of compd", overwrite)
 
 
 def write_page(

@@ -113,6 +113,8 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
         "ERROR": refused,
         "RELEASE": client.ask({"class": "RELEASE"}, "RELEASE"),
         "ZERO": zero,
+        "ACCEPT": client.ask({"class": "ACCEPT", "gauge": "all"}, "ACCEPT"),
+        "AUTH": client.ask({"class": "AUTH", "token": "hvNhV6l3Zk3lY0cJ4lV5Wg"}, "VERSION"),
         "STATUS": client.ask({"class": "STATUS"}, "STATUS"),
         "VERSION": client.ask({"class": "VERSION"}, "VERSION"),
         "MODEL": client.ask({"class": "MODEL"}, "MODEL"),

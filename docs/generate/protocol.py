@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import inspect
 
-from compd.configuration.operation import TcpSocket
+from compd.configuration.operation import TargetSettings, TcpSocket
 from compd.live.loop.packet_layout import PACKET_FIELDS, PACKET_SIZE
 from compd.live.loop.states import Mode
 from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES
 from compd.live.service.message_keys import ErrorKeys, ReadingsKeys, SentMessage, SetpointKeys, StatusKeys, VersionKeys
 from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL, ErrorCode
-from compd.live.service.publisher import MAX_CLIENTS
-from compd.live.service.requests import REQUESTS, Asker, Request
+from compd.live.service.request import Asker, Request
+from compd.live.service.requests import REQUESTS
+from compd.live.service.seats import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
 from docs.generate.live_examples import Exchange, exchanges, shown
 from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema
@@ -59,8 +60,17 @@ setpoint, `stop`, and closes the connection ([the daemon's processes](../explana
 **Keep up.** The daemon waits for no client. It disconnects one that is {MAX_BEHIND_BYTES // 1024} KiB behind,
 {MAX_READINGS_BEHIND_BYTES // 1024**2} MiB while it watches readings.
 
-**One client is the controller:** the first that sends a valid `TARGET`, until it sends `RELEASE` or its connection
-ends. The mode then returns to `{Mode.CMM}`.
+**One client is the controller:** the first that sends a valid `TARGET`, until it sends `RELEASE`, a client of the Unix
+socket does, or its connection ends. The mode then returns to `{Mode.CMM}`.
+
+**Repeat the target.** It grows old: `{TargetSettings().valid_for_s:g} s` after the last `TARGET`, unless
+[configured](#configuration-sockets-target) otherwise, setpoints are invalid (`stop`) until the next one comes.
+
+**Wait your turn.** The daemon answers one request of each client in turn, the controller's first, and sends setpoints
+before them: who asks without end waits for the answers, and delays nobody else's setpoints.
+
+**Show the token first** where one is [configured](#configuration-sockets-tcp): a TCP client is then greeted by `AUTH`
+in place of `VERSION`.
 
 **Answers come in the order of the questions**, except `ZERO`, `MODEL` with a file, and setpoints, which come when they
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
@@ -102,7 +112,12 @@ def page() -> str:
             [
                 ["length of a line that a client sends", f"{MAX_LINE_BYTES} bytes, without its newline"],
                 ["absolute value of a number that a client sends", f"{LARGEST_NUMBER:g}"],
-                ["clients at once", str(MAX_CLIENTS)],
+                ["clients at once", f"{MAX_CLIENTS}, of which {MAX_TCP_CLIENTS} over TCP"],
+                [
+                    "TCP client that neither watches, nor asks, nor is the controller",
+                    f"{IDLE_AFTER_S:g} s, then closed",
+                ],
+                ["TCP client that has to show a token", f"{AUTH_WITHIN_S:g} s, then closed"],
                 ["unsent bytes, setpoints", f"{MAX_BEHIND_BYTES} bytes"],
                 ["unsent bytes, readings", f"{MAX_READINGS_BEHIND_BYTES} bytes"],
             ],

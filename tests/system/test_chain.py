@@ -44,10 +44,12 @@ class Chain:
 
     def settle(self, target_M_mm: list[float]) -> Setpoint:
         """Send the target, drive to the setpoints until the machine rests there with every gauge read anew."""
-        self.daemon.target(tip_B0_mm=[target_M_mm[0], target_M_mm[1], target_M_mm[2] - 700.0])
+        target_B0_mm = [target_M_mm[0], target_M_mm[1], target_M_mm[2] - 700.0]
+        self.daemon.target(tip_B0_mm=target_B0_mm)
         at_rest: list[float] = []
 
         def rests(setpoint: Setpoint) -> bool:
+            self.daemon.target(tip_B0_mm=target_B0_mm)  # again: it grows old
             if not setpoint["valid"] or setpoint["mode"] != "machine_tool":
                 return False
             truth = self.machine.ask("DRIVE", scale_mm=setpoint["scale_setpoint_mm"])

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compd.cli.options import OverwriteOption
+
 if TYPE_CHECKING:
     from compd.commissioning.gauge_statistics import GaugeStatistics
     from compd.commissioning.open_gauge import GaugeTarget
@@ -167,12 +169,16 @@ def learn(
         list[str] | None, typer.Option(help="An error reply and its quality: 'ERR0=sensor_fault'.")
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
     from compd.commissioning.capture import capture_live, read_capture
     from compd.commissioning.describe import learn_gauge
     from compd.commissioning.open_gauge import PortArguments, byte_line_settings
+    from compd.output_file import check_replaceable
 
+    if to is not None:
+        check_replaceable(to, (b"learned_gauge:",), "a description of a gauge", overwrite)
     if capture is not None:
         request, captured = read_capture(capture)
     elif port:

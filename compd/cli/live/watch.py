@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import threading
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -14,11 +17,17 @@ from rich.text import Text
 
 from compd.cli.options import unix_address
 from compd.client import DEFAULT_ADDRESS, Client, connect
+from compd.clock import Clock, MonotonicClock
+from compd.errors import CompdError
 from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
 _STATUS_EVERY_S = 1.0
+# Setpoints that are read, so that a silence is noticed before the eye would; up to three periods may pass without one.
+_LEAST_RATE_HZ = 40.0
+_PERIODS = 3.0
+_LOOK_EVERY_S = 0.1
 
 
 def watch(
@@ -28,14 +37,19 @@ def watch(
     rate_hz: Annotated[float, typer.Option(min=0.1, help="Setpoints per second.")] = 10.0,
     count: Annotated[int, typer.Option(min=0, help="Stop after so many setpoints; 0 = until Ctrl-C.")] = 0,
     json_lines: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one per line.")] = False,
+    token_file: Annotated[
+        Path | None, typer.Option(help="File with the daemon's token, where it wants one of TCP clients.")
+    ] = None,
 ) -> None:
     """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
-    with connect(unix_address(address)) as client:
+    token = None if token_file is None else token_file.read_text(encoding="utf-8")
+    address = unix_address(address)
+    with connect(address, token=token) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)
             else:
-                _show(client, rate_hz, count)
+                _show(client, rate_hz, count, same_clock="/" in address)
         except KeyboardInterrupt:
             return
 
@@ -50,21 +64,106 @@ def _print_lines(client: Client, rate_hz: float, count: int) -> None:
             return
 
 
-def _show(client: Client, rate_hz: float, count: int) -> None:
-    status = client.status()
-    asked_s = status["time_s"]
+class NewestSetpoint:
+    """The newest setpoint of a client and the daemon's state, followed by a thread of its own.
+
+    A setpoint is shown no longer than its `valid_until`: whatever has stopped, what looks alive is alive.
+    """
+
+    def __init__(self, client: Client, rate_hz: float, clock: Clock, same_clock: bool) -> None:
+        """`rate_hz`: at which the picture is to change; setpoints are read more often, so that a silence shows.
+        `same_clock`: whether `clock` is the daemon's, on its own computer."""
+        self._client = client
+        self._rate_hz = max(rate_hz, _LEAST_RATE_HZ)
+        self._clock = clock
+        self._same_clock = same_clock
+        self._change = threading.Condition()
+        self._setpoint: dict[str, Any] | None = None
+        self._status: dict[str, Any] = {}
+        self._expires_s = math.inf
+        self._error: CompdError | None = None
+        threading.Thread(target=self._follow, name="watch", daemon=True).start()
+
+    def picture(self) -> RenderableType | None:
+        """What is true now; None before the first setpoint."""
+        with self._change:
+            if self._setpoint is None:
+                return None
+            return view(self._client.version, self._setpoint, self._status, self._late_s())
+
+    @property
+    def has_expired(self) -> bool:
+        """Whether nothing of the newest setpoint may be shown any more."""
+        with self._change:
+            return self._late_s() is not None
+
+    def _late_s(self) -> float | None:
+        late_s = self._clock.monotonic() - self._expires_s
+        return late_s if late_s >= 0 else None
+
+    def wait(self, timeout_s: float) -> None:
+        """Until the connection is lost, or `timeout_s` seconds. Raises the DaemonError with which it was lost."""
+        with self._change:
+            if self._error is None:
+                self._change.wait(timeout_s)
+            if self._error is not None:
+                raise self._error
+
+    def _follow(self) -> None:
+        try:
+            status = self._client.status()
+            asked_s = status["time_s"]
+            for setpoint in self._client.watch(self._rate_hz):
+                if setpoint["time_s"] - asked_s >= _STATUS_EVERY_S:
+                    status = self._client.status()
+                    asked_s = setpoint["time_s"]
+                rate_hz = min(self._rate_hz, status["loop"]["rate_hz"])
+                lasts_s = max(setpoint["valid_until"] - setpoint["time_s"], _PERIODS / rate_hz)
+                expires_s = self._clock.monotonic() + lasts_s
+                if self._same_clock and setpoint["valid"]:  # it may have waited: this program was suspended
+                    expires_s = min(expires_s, setpoint["valid_until"])
+                with self._change:
+                    self._setpoint, self._status, self._expires_s = setpoint, status, expires_s
+        except CompdError as error:
+            with self._change:
+                self._error, self._expires_s = error, min(self._expires_s, self._clock.monotonic())
+                self._change.notify_all()
+
+
+def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
+    clock = MonotonicClock()
+    newest = NewestSetpoint(client, rate_hz, clock, same_clock)
+    shown, due_s = 0, clock.monotonic()
     with Live(console=Console(), auto_refresh=False) as live:
-        for number, setpoint in enumerate(client.watch(rate_hz), start=1):
-            if setpoint["time_s"] - asked_s >= _STATUS_EVERY_S:
-                status = client.status()
-                asked_s = setpoint["time_s"]
-            live.update(view(client.version, setpoint, status), refresh=True)
-            if number == count:
-                return
+        try:
+            while not count or shown < count:
+                newest.wait(min(1 / rate_hz, _LOOK_EVERY_S))
+                is_due = clock.monotonic() >= due_s
+                if (is_due or newest.has_expired) and (picture := newest.picture()) is not None:
+                    live.update(picture, refresh=True)
+                    shown += is_due
+                    due_s += 1 / rate_hz if is_due else 0.0
+        except CompdError:
+            if (picture := newest.picture()) is not None:
+                live.update(picture, refresh=True)  # no number stays on the screen
+            raise
 
 
-def view(version: dict[str, Any], setpoint: dict[str, Any], status: dict[str, Any]) -> RenderableType:
-    """One picture of the daemon: what a VERSION, a SETPOINT and a STATUS message say."""
+def view(
+    version: dict[str, Any], setpoint: dict[str, Any], status: dict[str, Any], late_s: float | None = None
+) -> RenderableType:
+    """One picture of the daemon: what a VERSION, a SETPOINT and a STATUS message say.
+
+    late_s : how long ago the setpoint expired, and none came after it, s; nothing of it is shown then.
+    """
+    if late_s is not None:
+        return Text.assemble(
+            (version["machine"], "bold"),
+            "  ",
+            ("NO SETPOINT", "bold red"),
+            f"  the last one, {setpoint['seq']}, has expired {max(late_s, 0.1):.1f} s ago",
+            ("\nthe daemon, its computer or the network has stopped", "red"),
+        )
     parts: list[RenderableType] = [_headline(version, setpoint)]
     if setpoint["reason"]:
         parts.append(Text(setpoint["reason"], style=state_colour(setpoint["state"])))

@@ -2,25 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET, unix_address
+from compd.units import UM_PER_MM
 
 # The daemon looks at the gauges for a second; a slow disk may take as long again.
 _TIMEOUT_S = 15.0
+# Gauges whose difference is printed; the others differ less.
+_SHOWN = 9
 
 
 def zero(
     address: Annotated[
         str, typer.Argument(help="The daemon's Unix socket, or the configuration (YAML) that names it.")
     ] = DEFAULT_SOCKET,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Do not ask where a gauge is far from the zero before, or not believed.")
+    ] = False,
 ) -> None:
     """Take machine zero: bring the machine to its zero position, let it stand still, then run this."""
     from compd.client import connect
+    from compd.errors import DaemonError
 
     with connect(unix_address(address), _TIMEOUT_S) as client:
-        answer = client.zero()
+        try:
+            answer = client.zero(replace=yes)
+        except DaemonError as error:
+            if error.problems[0].value != "zero_differs":
+                raise
+            typer.echo(error.problems[0].what, err=True)
+            typer.confirm("Is the machine at its zero position, and is this to be its zero (else --yes)?", abort=True)
+            answer = client.zero(replace=True)
     typer.echo(f"machine zero taken at {answer['taken_at']} from {len(answer['readings_mm'])} gauges")
+    if "changed_mm" in answer:
+        typer.echo(changes_text(answer["changed_mm"]))
     typer.echo(f"kept in {answer['path']}")
+
+
+def changes_text(changed_mm: Mapping[str, float]) -> str:
+    """By how much the gauges differ from the machine zero before: channel -> mm, the largest ones first."""
+    largest = sorted(changed_mm, key=lambda channel: -abs(changed_mm[channel]))
+    width = max(map(len, largest), default=0)
+    lines = ["against the zero before, which is kept as machine-zero.json.old:"]
+    lines += [f"  {channel:<{width}} {changed_mm[channel] * UM_PER_MM:+11.2f} um" for channel in largest[:_SHOWN]]
+    if others := largest[_SHOWN:]:
+        lines.append(f"  and {len(others)} others, up to {abs(changed_mm[others[0]]) * UM_PER_MM:.2f} um")
+    return "\n".join(lines)

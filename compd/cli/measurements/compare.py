@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import MachineOption
+from compd.cli.options import MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from compd.comparison.comparison import Comparison
@@ -30,12 +30,17 @@ def compare(
     html: Annotated[
         Path | None, typer.Option("--html", help="Write the page with the pictures; works offline.")
     ] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
     from compd.api.diagnosis import compare as compare_recording
     from compd.comparison.open import open_recording
     from compd.errors import CompdError, Problem
 
+    if html is not None:
+        from compd.report.page import check_page_path
+
+        check_page_path(html, overwrite)
     problems: list[Problem] = []
     comparisons: list[Comparison] = []
     for path in recordings:
@@ -47,9 +52,7 @@ def compare(
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
         from compd.report.comparison_page import write_comparison_page
-        from compd.report.page import check_page_path
 
-        check_page_path(html)
         write_comparison_page(html, comparisons)
     if as_json:
         results = [comparison.as_json() for comparison in comparisons]

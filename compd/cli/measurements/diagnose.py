@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption
+from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 
 def diagnose(
@@ -26,6 +26,7 @@ def diagnose(
     effects: EffectsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Learn which physical effect is missing: twelve lines with the verdict and what to do next, then the evidence."""
     from rich.console import Console
@@ -39,7 +40,7 @@ def diagnose(
     if html is not None:
         from compd.report.page import check_page_path
 
-        check_page_path(html)
+        check_page_path(html, overwrite)
     sealed = [open_recording(path, machine) for path in recordings[1:]]
     aligned = open_recording(recordings[0], machine)
     with steps_shown(quiet=as_json) as progress:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption
+from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -53,6 +53,7 @@ def show(
     ] = None,
     effects: EffectsOption = None,
     html: Annotated[Path | None, typer.Option("--html", help="Draw the effect's signature into this page.")] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
     from rich.console import Console
@@ -60,6 +61,10 @@ def show(
     from compd.configuration.shipped import load_machine
     from compd.model.library.effects_file import gather_effects, named_effect
 
+    if html is not None:
+        from compd.report.page import check_page_path
+
+        check_page_path(html, overwrite)
     shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
     # an effect of one's own may be of another machine than the shipped one

@@ -7,10 +7,13 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.options import OverwriteOption
+
 
 def ledger(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="The model file.")],
     html: Annotated[Path | None, typer.Option("--html", help="Draw the falling error into this page.")] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Print every step that changed a model: what, on which recording, the error before and after."""
     from rich.console import Console
@@ -36,6 +39,6 @@ def ledger(
         table.add_row(*row, "#" * max(1, round(16 * step.rms_after_um / largest)))
     console.print(table)
     if html is not None:
-        check_page_path(html)
+        check_page_path(html, overwrite)
         write_ledger_page(html, stored)
         typer.echo(f"The falling error as a picture: {html}")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption
+from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 
 def plan(
@@ -44,12 +44,17 @@ def plan(
             "May be repeated.",
         ),
     ] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds, other settings) on which two rival effects differ most."""
     from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
+    from compd.output_file import check_replaceable
+    from compd.recording.plan_file import PURPOSE_COLUMN
 
     first, second = _pair(rivals)
+    if out is not None:
+        check_replaceable(out, (f"{PURPOSE_COLUMN},".encode(),), "a plan", overwrite)
     box = None if workspace is None else _numbers("--workspace", workspace, 6)
     heat = None if temperature is None else _numbers("--temperature", temperature, 2)
     planned = plan_measurement(

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.options import OverwriteOption
 from compd.units import UM_PER_MM
 
 _ANSWER_TIMEOUT_S = 15.0
@@ -20,6 +21,7 @@ def tracker(
     out: Annotated[Path, typer.Option(help="The export, a CSV for `compd join`.")],
     seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
     rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Measurements per second.")] = 20.0,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
 
@@ -29,12 +31,14 @@ def tracker(
 
     from compd.client import connect
     from compd.errors import CompdError, Problem
+    from compd.output_file import check_replaceable
     from compd.simulation.wires.control_client import ControlClient
 
     if not out.parent.is_dir():
         raise CompdError(
             Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
         )
+    check_replaceable(out, (), "an export", overwrite)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     looks, apart_mm, at_rest = [], [], 0
     with (

@@ -56,7 +56,12 @@ def check(
     if what_cannot_be_seen:
         print_blind_spots(configuration)
         return
-    warnings = [*configuration.warnings, *print_lines(configuration), *_print_cycle(configuration)]
+    warnings = [
+        *configuration.warnings,
+        *print_lines(configuration),
+        *_print_cycle(configuration),
+        *socket_warnings(configuration),
+    ]
     print_problems(warnings, "warning: ", sys.stdout)
     wiring = configuration.wiring
     own_process = configuration.acquisition.own_process
@@ -124,6 +129,22 @@ def _print_cycle(configuration: Configuration) -> list[Problem]:
         f"and one is due every {1e3 / configuration.loop.rate_hz:.2f} ms."
     )
     return cycle_warnings(configuration, cycle)
+
+
+def socket_warnings(configuration: Configuration) -> list[Problem]:
+    """What on this computer would keep the daemon from listening: the Unix socket's path, the token's file."""
+    from compd.errors import DaemonError
+    from compd.live.service.listeners import unix_path_problem
+    from compd.live.service.tcp_access import TcpAccess
+
+    warnings = []
+    if (problem := unix_path_problem(Path(configuration.sockets.unix.path))) is not None:
+        warnings.append(problem)
+    try:
+        TcpAccess.of(configuration.sockets.tcp)
+    except DaemonError as error:
+        warnings += error.problems
+    return warnings
 
 
 def _list_drivers() -> None:

@@ -25,7 +25,10 @@ def demo(
     from compd.configuration.shipped import shipped_configuration
     from compd.demo.page import progress, summarise, verdict, write_demo_page
     from compd.demo.session import SPEEDUP, run_demo
+    from compd.report.page import check_page_path
 
+    page.parent.mkdir(parents=True, exist_ok=True)
+    check_page_path(page)
     console = Console()
     configuration = load(config or shipped_configuration("tripod-cmm.yaml"))
     console.print(
@@ -41,6 +44,5 @@ def demo(
         session = run_demo(configuration, seconds, seed, show)
     console.print(summarise(session))
     console.print(verdict(session))
-    page.parent.mkdir(parents=True, exist_ok=True)
     write_demo_page(page, session)
     console.print(f"The same as pictures: {page}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from compd.errors import StateError
@@ -19,10 +20,12 @@ class Target:
     tip_mm : (3), in {B0}; with the tool on the plate the place on the work, in {P}.
     rotation_B0_rad : (3), rotation vector of {P} in {B0}; None for the attitude at machine zero. The attitude of a
         tripod follows from its tip.
+    valid_until_s : monotonic time (s) after which it is too old to be used; inf for never.
     """
 
     tip_mm: tuple[float, ...]
     rotation_B0_rad: tuple[float, ...] | None = None
+    valid_until_s: float = math.inf
 
 
 class Commands:

@@ -35,6 +35,11 @@ from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 
+TARGET_TOO_OLD = (
+    "the controller's target is too old (sockets.target.valid_for_s): it sends one again, or its role ends by "
+    "`compd release`"
+)
+
 
 class _Outcome(NamedTuple):
     """State and reason of a setpoint, with its values where they are valid.
@@ -67,12 +72,18 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
     models = inputs.models or settings.without_effects
     if models is not state.models:
         state = adopt_models(state, models)
-    outcome, next_state = _compute(state, inputs, models, settings)
+    now_s = inputs.snapshot.time_s
+    mode, target_until_s = Mode.CMM, math.inf
+    if inputs.target is not None:
+        mode, target_until_s = Mode.MACHINE_TOOL, inputs.target.valid_until_s
+    if now_s > target_until_s:
+        outcome, next_state = _Outcome(State.STOP, TARGET_TOO_OLD), state
+    else:
+        outcome, next_state = _compute(state, inputs, models, settings)
     if outcome.values is None and next_state.tip_correction_mm is not None:
         next_state = next_state._replace(tip_correction_mm=None)
-    now_s = inputs.snapshot.time_s
-    valid_until_s = now_s if outcome.values is None else min(now_s + settings.valid_for_s, outcome.expires_s)
-    mode = Mode.CMM if inputs.target is None else Mode.MACHINE_TOOL
+    expires_s = min(now_s + settings.valid_for_s, outcome.expires_s, target_until_s)
+    valid_until_s = now_s if outcome.values is None else expires_s
     age_s = now_s - outcome.oldest_s
     # positional, as in `_setpoint_values`: keywords cost twice the time
     setpoint = Setpoint(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,10 +12,14 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
-from compd.files import write_files
+from compd.files import read_small_file, write_files
 
 FILE_NAME = "machine-zero.json"
-_FORMAT = 1
+# The machine zero before the present one, as its file was.
+OLD_FILE_NAME = "machine-zero.json.old"
+# Format 1, of releases before 0.6, has no checksum.
+_FORMAT = 2
+_LARGEST_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
 
 
@@ -23,10 +28,11 @@ class _ZeroFile(BaseModel):
 
     model_config = ConfigDict(strict=True)
 
-    format: Literal[1]
+    format: Literal[1, 2]
     zero_hash: str
     taken_at: str
     readings_mm: dict[str, FiniteFloat]
+    checksum: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,16 +54,31 @@ class MachineZero:
         """Plain data from which `MachineZero(**data)` makes the same zero again."""
         return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
 
+    @property
+    def checksum(self) -> str:
+        """First 16 hexadecimal digits of the SHA-256 of its content: a digit that was changed by hand shows."""
+        text = json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def changes_mm(self, before: MachineZero) -> dict[str, float]:
+        """By how much each gauge reads more here than in `before`, by channel, mm; of the channels that both have."""
+        return {
+            channel: reading_mm - before.readings_mm[channel]
+            for channel, reading_mm in self.readings_mm.items()
+            if channel in before.readings_mm
+        }
+
     def save(self, directory: Path) -> Path:
         """Write the file in this directory, and return its path. After a power cut it is the old one or the new one.
 
-        Raises StateError when the disk refuses.
+        The file that was there stays beside it as OLD_FILE_NAME. Raises StateError when the disk refuses.
         """
         path = directory / FILE_NAME
-        text = json.dumps({"format": _FORMAT, **self.to_json()}, indent=1, allow_nan=False) + "\n"
+        content = {"format": _FORMAT, **self.to_json(), "checksum": self.checksum}
+        text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            write_files({path: text})
+            write_files({**_old_file(directory), path: text})
         except OSError as error:
             raise StateError(
                 Problem(
@@ -67,6 +88,17 @@ class MachineZero:
                 )
             ) from error
         return path
+
+
+def _old_file(directory: Path) -> dict[Path, bytes]:
+    """The machine zero in this directory until now, to be kept: path and content; nothing where there is none.
+
+    Raises OSError where it is there and cannot be kept.
+    """
+    try:
+        return {directory / OLD_FILE_NAME: read_small_file(directory / FILE_NAME, _LARGEST_FILE_BYTES)}
+    except FileNotFoundError:
+        return {}
 
 
 def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> MachineZero:
@@ -80,19 +112,19 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
     Raises
     ------
     StateError
-        There is no file, it cannot be read or is damaged, a later release wrote it, it was taken with another
-        geometry, other gauges or another wiring, or it lacks a channel.
+        There is no file, it cannot be read, is damaged or was changed by hand, a later release wrote it, it was taken
+        with another geometry, other gauges or another wiring, or it lacks a channel.
     """
     path = directory / FILE_NAME
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_small_file(path, _LARGEST_FILE_BYTES).decode())
     except FileNotFoundError as error:
         raise StateError(
             Problem(where=str(path), what="machine zero has never been taken", next_step=_TAKE_ONE)
         ) from error
     except OSError as error:
         raise StateError(Problem(where=str(path), what=f"machine zero cannot be read: {error.strerror}")) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise StateError(
             Problem(where=str(path), what=f"machine zero is not JSON: {error}", next_step=_TAKE_ONE)
         ) from error
@@ -137,4 +169,15 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    return MachineZero(file.zero_hash, file.taken_at, file.readings_mm)
+    zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm)
+    if file.format == _FORMAT and file.checksum != zero.checksum:
+        raise StateError(
+            Problem(
+                where=str(path),
+                what="was changed after it was written: its checksum does not fit",
+                value=file.checksum or "no checksum",
+                allowed=zero.checksum,
+                next_step=f"{_TAKE_ONE}; the one before it is in {OLD_FILE_NAME}",
+            )
+        )
+    return zero

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,17 +16,18 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import Problem, StateError
+from compd.file_trust import own_users, trust_problem
+from compd.files import read_small_file
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
+from compd.model_document import LARGEST_FILE_BYTES
 from compd.model_file import read_model_file
 
 _HASH_DIGITS = 16
-# Exceptions by which an effect of a user's own code may fail.
-_FAULTS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
 class ModelText(NamedTuple):
@@ -39,22 +41,43 @@ class ModelText(NamedTuple):
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a file. Raises StateError where it cannot be read."""
+        """Read a file. Raises StateError where it cannot be read, is no regular file, or has more than 1 MB."""
         try:
-            return cls(str(path), path.read_bytes())
+            return cls(str(path), read_small_file(path, LARGEST_FILE_BYTES))
         except OSError as error:
-            raise StateError(
-                Problem(
-                    where=str(path),
-                    what=f"cannot be read: {error.strerror}",
-                    next_step="give the absolute path of a model file that the daemon's user may read",
-                )
-            ) from error
+            raise _unreadable(path, error) from error
+
+    @classmethod
+    def read_owned(cls, path: Path, user: int) -> Self:
+        """Read a file that a client names; besides root and the daemon's user, `user` may own it.
+
+        Raises StateError as `read` does, and where somebody else could have put another file in its place.
+        """
+        try:
+            real = path.resolve(strict=True)
+            if not real.is_file():
+                raise OSError(errno.EINVAL, "it is not a regular file")
+            problem = trust_problem(real, str(path), "model", own_users() | {user})
+        except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
+            raise _unreadable(path, error) from error
+        if problem is not None:
+            raise StateError(problem)
+        return cls(str(path), cls.read(real).content)
 
     @property
     def hash(self) -> str:
         """First digits of the SHA-256 of its content."""
         return hashlib.sha256(self.content).hexdigest()[:_HASH_DIGITS]
+
+
+def _unreadable(path: Path, error: Exception) -> StateError:
+    return StateError(
+        Problem(
+            where=str(path),
+            what=f"cannot be read: {getattr(error, 'strerror', None) or error}",
+            next_step="give the absolute path of a model file that the daemon's user may read",
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +256,7 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
     try:
         _, warm = compensate_cmm(machine, values, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, values._replace(time_s=1.0), warm)
-    except _FAULTS as error:
+    except (Exception, SystemExit) as error:  # an effect of a user's own code may do anything
         raise StateError(
             Problem(
                 where=where, what=f"an effect fails: {type(error).__name__}: {error}", next_step="mend it, or remove it"

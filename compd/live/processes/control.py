@@ -35,7 +35,7 @@ class Control:
     realtime : what the system granted to the loop. Written by the loop that has the turn.
     processes : STATUS's part about the processes. Written by the supervisor.
     headline : one line about the machine's state, for the service manager. Written by the service.
-    model_request : (number, file, whether as the shadow). Written by the service.
+    model_request : (number, file, whether as the shadow, user who asks). Written by the service.
     model_answer : (number, summary of the models, "") or (number, None, why not). Written by the successor; by the
         supervisor where that has ended.
     supervisor_woken, turn_given : event descriptors.

@@ -22,7 +22,7 @@ from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import LiveModel, ModelLoader, Models
+from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText
 from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
@@ -45,11 +45,13 @@ class ModelChange:
     """A change of models that a client asks for.
 
     number : of the request. file : "" for none. shadow : whether it is to be computed beside the applied one.
+    user : number of the user who asks; the file must be theirs, the daemon's user's or root's.
     """
 
     number: int
     file: str
     shadow: bool
+    user: int = 0
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,10 @@ class LoopProcess:
             loop = self._loop()
             self._prepare(loop)
             self._try_cycles(self._state_left(before, forget=False))
-        except (CompdError, ValueError) as error:
-            _log.warning("model refused", file=request.file, reason=str(error))
-            self.answer(request.number, None, str(error))
+        except (Exception, SystemExit) as error:  # noqa: BLE001  an effect of a user's own may do anything
+            reason = str(error) if isinstance(error, CompdError | ValueError) else f"{type(error).__name__}: {error}"
+            _log.warning("model refused", file=request.file, reason=reason)
+            self.answer(request.number, None, reason)
             return
         realtime.use_fifo(self.settings.loop.priority)
         if not control.await_turn(number, _TURN_WITHIN_S):
@@ -112,7 +115,9 @@ class LoopProcess:
 
     def _models_wanted(self, before: Models, request: ModelChange) -> Models:
         """The pair of applied model and shadow with the new one (none: no effects, or no shadow) in its place."""
-        model: LiveModel | None = self.loader.read(Path(request.file)) if request.file else None
+        model: LiveModel | None = (
+            self.loader.load(ModelText.read_owned(Path(request.file), request.user)) if request.file else None
+        )
         if request.shadow:
             return Models(before.applied, model)
         if model is not None and before.shadow is not None and model.hash == before.shadow.hash:

@@ -11,6 +11,9 @@ from compd.clock import Clock
 from compd.live.processes.child_process import ChildProcess
 from compd.live.processes.loop_process import LoopProcess, ModelChange
 
+# For reading a model file and trying it; imports of an effect's author may take seconds.
+READY_WITHIN_S = 15.0
+
 _log = structlog.get_logger()
 
 
@@ -70,6 +73,14 @@ class LoopSuccession:
         number = self._successor_number = self._next_number()
         self._successor = self._child("next loop", lambda: self._process.run_successor(number, request))
         self._successor.start()
+
+    def end_late_successor(self, now_s: float) -> None:
+        """Kill a successor that is not ready in time: an effect of a user's own may loop for ever."""
+        successor = self._successor
+        if successor is None or not successor.running or now_s - successor.started_s <= READY_WITHIN_S:
+            return
+        if self._control.successor != self._successor_number and not successor.is_debugged:
+            successor.kill(f"it was not ready within {READY_WITHIN_S:g} s, and was killed")
 
     def turn_has_changed(self) -> bool:
         """Whether the successor has taken over since the last call."""

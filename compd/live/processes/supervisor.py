@@ -172,6 +172,7 @@ class Supervisor:
         daemon = self._daemon
         if self._loop_heart.look(daemon.setpoints.count):
             self._notifier.beat(now_s)
+        self._loops.end_late_successor(now_s)
         self._service_heart.look(self._control.service_beats)
         hearts = [(self._loop_heart, self._loops.loop), (self._service_heart, self._service)]
         for process in daemon.acquisition:

@@ -27,10 +27,12 @@ class BackgroundJob:
         self._thread = threading.Thread(target=self._run, args=(work, answer), name=self._name, daemon=True)
         self._thread.start()
 
-    def join(self) -> None:
-        """Return when nothing is running."""
-        if self._thread is not None:
-            self._thread.join()
+    def join(self, timeout_s: float | None = None) -> bool:
+        """Return when nothing is running, or after `timeout_s`: whether nothing is. What still runs holds up no end."""
+        if self._thread is None:
+            return True
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
 
     def _run(self, work: Callable[[], bytes], answer: Callable[[bytes], None]) -> None:
         try:

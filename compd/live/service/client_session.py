@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import socket
-from collections.abc import Iterator
+import struct
+from collections import deque
+from contextlib import suppress
 from enum import Enum, auto
 
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
@@ -14,7 +16,10 @@ MAX_BEHIND_BYTES = 128 * 1024
 # About 1500 READINGS: 1.5 s at 1 kHz. A recorder needs all of them, however late, and runs on this computer.
 MAX_READINGS_BEHIND_BYTES = 8 * 1024 * 1024
 _RECEIVE_BYTES = 4096
+_LAST_RECEIVE_BYTES = 64 * 1024
 _LONGEST_INTERVAL_S = 1e6
+# struct ucred of unix(7): process, user, group.
+_CREDENTIALS = struct.Struct("3i")
 
 
 class Stream(Enum):
@@ -32,20 +37,31 @@ class ClientSession:
     open : False once the connection has ended.
     due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
     stream : what this client watches.
+    user : number of the user at the other end of the Unix socket; -1 over TCP.
+    authorized : whether it may ask anything but AUTH.
+    lost_role : whether its role as the controller was taken from it.
+    connected_s, asked_s : monotonic time (s) of its connection, and of its last request.
+    dismissed_s : from when on its connection is to be closed; inf for never.
     """
 
-    def __init__(self, connection: socket.socket, name: str, local: bool) -> None:
+    def __init__(self, connection: socket.socket, name: str, local: bool, now_s: float = 0.0) -> None:
         """`name`: of the other end, for the log; `local`: connected over the Unix socket, from this computer."""
         connection.setblocking(False)
         self.connection = connection
         self.name = name
         self.local = local
+        self.user = _user(connection) if local else -1
+        self.authorized = True
+        self.lost_role = False
+        self.connected_s = self.asked_s = now_s
+        self.dismissed_s = math.inf
         self.open = True
         self.due_s = math.inf
         self.stream = Stream.SETPOINTS
         self._interval_s = math.inf
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
+        self._lines: deque[bytes | ProtocolError] = deque()
         self._skipping_line = False
         self._unsent = bytearray()
 
@@ -68,11 +84,8 @@ class ClientSession:
             self.due_s = time_s + self._interval_s
         return True
 
-    def receive(self) -> Iterator[bytes | ProtocolError]:
-        """Yield the whole lines that have arrived, and an error for each that is too long.
-
-        `open` is False afterwards when the stream has ended.
-        """
+    def receive(self) -> None:
+        """Take what has arrived; whole lines wait for `next_line`. `open` is False afterwards when the stream ended."""
         try:
             data = self.connection.recv(_RECEIVE_BYTES)
         except BlockingIOError:
@@ -89,14 +102,28 @@ class ClientSession:
             if self._skipping_line:
                 self._skipping_line = False
             elif len(line) > MAX_LINE_BYTES:
-                yield _too_long()
+                self._lines.append(_too_long())
             elif line.strip():
-                yield bytes(line)
+                self._lines.append(bytes(line))
         if len(rest) > MAX_LINE_BYTES:
             self._received = bytearray()
             if not self._skipping_line:
                 self._skipping_line = True
-                yield _too_long()
+                self._lines.append(_too_long())
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether its requests are answered: it has not been dismissed."""
+        return self.dismissed_s == math.inf
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether whole lines wait. As long as they do, nothing more should be received: the client has to wait."""
+        return bool(self._lines)
+
+    def next_line(self) -> bytes | ProtocolError:
+        """The line that has waited longest, or an error in the place of one that is too long."""
+        return self._lines.popleft()
 
     def send(self, data: bytes) -> bool:
         """Send what the system takes at once and keep the rest; False when the client is too far behind."""
@@ -124,7 +151,15 @@ class ClientSession:
     def close(self) -> None:
         """Close the connection."""
         self.open = False
+        with suppress(OSError):  # with data that nobody has read the system would reset it, and the last line be lost
+            self.connection.recv(_LAST_RECEIVE_BYTES)
         self.connection.close()
+
+
+def _user(connection: socket.socket) -> int:
+    """Number of the user at the other end of a Unix socket."""
+    _, user, _ = _CREDENTIALS.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
+    return int(user)
 
 
 def _too_long() -> ProtocolError:

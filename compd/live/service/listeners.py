@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import stat
+from contextlib import suppress
 from pathlib import Path
 
 from compd.configuration.operation import SocketSettings
@@ -10,6 +12,7 @@ from compd.errors import DaemonError, Problem
 
 _UNIX_SOCKET_MODE = 0o660  # the daemon's user and group
 _BACKLOG = 16
+_OTHER_PATH = "give a path in a directory that the daemon's user may write, at which there is nothing"
 
 
 class Listeners:
@@ -27,6 +30,7 @@ class Listeners:
         Raises DaemonError where an address cannot be had; what `before` has stays as it is then.
         """
         self._settings = settings
+        self._file: tuple[int, int]
         self.unix: socket.socket
         old = before._settings if before is not None else None
         same_unix = old is not None and old.unix.path == settings.unix.path
@@ -35,12 +39,14 @@ class Listeners:
         if settings.tcp is not None:
             kept = before.tcp if before is not None and same_tcp else None
             self.tcp = kept or listen_tcp(settings.tcp.host, settings.tcp.port)
+        path = Path(settings.unix.path)
         try:
-            self.unix = before.unix if before is not None and same_unix else listen_unix(Path(settings.unix.path))
+            self.unix = before.unix if before is not None and same_unix else listen_unix(path)
         except DaemonError:
             if self.tcp is not None and not same_tcp:
                 self.tcp.close()
             raise
+        self._file = before._file if before is not None and same_unix else _identity(path)
 
     @property
     def tcp_port(self) -> int | None:
@@ -48,12 +54,15 @@ class Listeners:
         return None if self.tcp is None else self.tcp.getsockname()[1]
 
     def close(self, after: Listeners | None = None) -> None:
-        """Close the sockets, and remove that of the Unix socket from the disk, but for those that `after` has."""
+        """Close the sockets, but for those that `after` has; the Unix socket's file is removed, if it is still ours."""
         if self.tcp is not None and (after is None or after.tcp is not self.tcp):
             self.tcp.close()
         if after is None or after.unix is not self.unix:
             self.unix.close()
-            Path(self._settings.unix.path).unlink(missing_ok=True)
+            path = Path(self._settings.unix.path)
+            with suppress(OSError):
+                if _identity(path) == self._file:
+                    path.unlink()
 
 
 def listen_tcp(host: str, port: int) -> socket.socket:
@@ -76,9 +85,13 @@ def listen_unix(path: Path) -> socket.socket:
     """Listen on a Unix socket at `path`, which the daemon's user and group may use.
 
     The socket is made under another name and renamed once it listens, so that no client finds it half made; one that a
-    crash left behind is replaced. Raises DaemonError where another daemon listens there, or the path cannot be had.
+    crash left behind is replaced. Raises DaemonError where another daemon listens there, something else than a socket
+    is there, or the path cannot be had.
     """
     unfinished = path.with_name(f".{path.name}.new")
+    for place in (path, unfinished):
+        if (problem := unix_path_problem(place)) is not None:
+            raise DaemonError(problem)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         if _is_alive(path):
@@ -106,6 +119,26 @@ def listen_unix(path: Path) -> socket.socket:
         listener.close()
         raise
     return listener
+
+
+def unix_path_problem(path: Path) -> Problem | None:
+    """What is wrong with a path for a Unix socket: something else is there, which is never replaced."""
+    try:
+        is_socket = stat.S_ISSOCK(path.lstat().st_mode)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        return Problem(where=f"sockets.unix {path}", what=f"cannot be used: {error.strerror}", next_step=_OTHER_PATH)
+    if is_socket:
+        return None
+    what = "there is a file of another kind, which is not replaced"
+    return Problem(where=f"sockets.unix {path}", what=what, allowed="no file, or a socket", next_step=_OTHER_PATH)
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """Device and number of the file at this path."""
+    status = path.lstat()
+    return status.st_dev, status.st_ino
 
 
 def _is_alive(path: Path) -> bool:

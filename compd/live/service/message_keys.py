@@ -176,6 +176,9 @@ class RecordedTargetKeys(Keys):
 
     tip_mm: Vector = Field(description="the tip in {B0}, with the tool on the plate in {P}, mm")
     rotation_B0_rad: Vector | None = Field(default=None, description="rotation vector of {P} in {B0}, rad")
+    valid_until_s: float | None = Field(
+        default=None, description="after this it is too old, s on the daemon's monotonic clock; absent: never"
+    )
 
 
 class ReadingsKeys(SentMessage):

@@ -39,11 +39,22 @@ class ErrorCode(StrEnum):
     LINE_TOO_LONG = "line_too_long", f"the line has more than {MAX_LINE_BYTES} bytes; it is skipped"
     UNKNOWN_CLASS = "unknown_class", "there is no such message"
     BAD_MESSAGE = "bad_message", "a key is missing, unknown, of the wrong type or out of range"
-    ROLE_TAKEN = "role_taken", "`TARGET` while another client is the controller"
-    NOT_CONTROLLER = "not_controller", "`RELEASE` from a client that is not the controller"
+    ROLE_TAKEN = (
+        "role_taken",
+        "`TARGET` while another client is the controller, or from one that lost the role to the Unix socket",
+    )
+    NOT_CONTROLLER = (
+        "not_controller",
+        "`RELEASE` over TCP from a client that is not the controller, or while no client is",
+    )
     UNIX_ONLY = "unix_only", "asked over TCP for what only the Unix socket allows"
     BUSY = "busy", "machine zero is being taken already, or another model is being read"
     ZERO_REFUSED = "zero_refused", "a gauge was not good, the machine moved, or the disk refused; `text` says which"
+    ZERO_DIFFERS = (
+        "zero_differs",
+        "a gauge differs from the machine zero until now by more than 0.5 mm, or is not believed; `text` says which "
+        "and by how much, and nothing has changed: ask with `replace` to take it all the same",
+    )
     MODEL_REFUSED = (
         "model_refused",
         "the model file cannot be used: it is another machine's, or an effect lacks its gauge; `text` says every "
@@ -52,6 +63,11 @@ class ErrorCode(StrEnum):
     TOO_MANY_CLIENTS = (
         "too_many_clients",
         "no further client is accepted; sent instead of `VERSION`, then the connection is closed",
+    )
+    IDLE = "idle", "over TCP: watched nothing and asked nothing for a minute; then the connection is closed"
+    NOT_AUTHORIZED = (
+        "not_authorized",
+        "over TCP where a token is configured: the first line was not `AUTH` with it; then the connection is closed",
     )
 
 

@@ -25,16 +25,17 @@ class ModelSwitch:
         self._shadow = False
         self._answer: Callable[[bytes], None] | None = None
 
-    def start(self, file: str, shadow: bool, answer: Callable[[bytes], None]) -> None:
+    def start(self, file: str, shadow: bool, user: int, answer: Callable[[bytes], None]) -> None:
         """Begin to switch to the model in `file`, "" for none; `answer` gets the MODEL or ERROR line when it is done.
 
-        shadow : compute this model's correction and do not apply it. Raises ProtocolError while another is being read.
+        shadow : compute this model's correction and do not apply it. user : number of the user who asks, whose own file
+        may be used. Raises ProtocolError while another is being read.
         """
         if self._answer is not None:
             raise ProtocolError(ErrorCode.BUSY, "another model is being read")
         self._number += 1
         self._file, self._shadow, self._answer = file, shadow, answer
-        self._control.model_request.write((self._number, file, shadow))
+        self._control.model_request.write((self._number, file, shadow, user))
         self._control.wake_supervisor()
 
     def look(self) -> None:

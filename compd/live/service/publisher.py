@@ -1,8 +1,9 @@
 """The publisher: takes setpoints and cycles from their rings and sends them to clients.
 
 The loop never waits for it, and it waits for no client. Its thread sleeps until something is there that a client is due
-for, sends it to the clients that are due, and answers their requests. Where the loop makes no setpoints, it says so in
-the loop's place.
+for, and sends it to the clients that are due. Their requests come after that, one of each client in turn, and what the
+loop has made in between goes out before the next: a client that asks without end waits, and nobody else does. Where the
+loop makes no setpoints, the publisher says so in the loop's place.
 """
 
 from __future__ import annotations
@@ -27,8 +28,14 @@ from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
+from compd.live.service.seats import WRONG_TOKEN_REST_S, prepare_tcp, seat_lost, seat_refused
 
-MAX_CLIENTS = 32
+# Between two looks for clients that are to lose their place.
+_LOOK_EVERY_S = 0.25
+# The requests of all clients but the controller take at most a third of the time.
+_REST_PER_TURN = 2.0
+# The process may have been suspended in a turn.
+_LONGEST_REST_S = 0.05
 
 _log = structlog.get_logger()
 
@@ -65,6 +72,8 @@ class Publisher:
         self._unpacker = CycleUnpacker()
         self._sessions: set[ClientSession] = set()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
+        self._waiting: list[ClientSession] = []  # with lines to answer; not read from meanwhile
+        self._next_turn_s = self._next_look_s = -math.inf
         self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
         self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
         self._due_s = dict.fromkeys(Stream, math.inf)
@@ -84,9 +93,11 @@ class Publisher:
             self._selector.register(reader.ring.woken, selectors.EVENT_READ, partial(self._be_woken, reader.ring))
         self._schedule()
         while keep_on():
-            for key, events in self._selector.select(self._watch.wait_s(self._clock.monotonic())):
+            for key, events in self._selector.select(self._wait_s()):
                 key.data(events)
             self._forward()
+            self._take_turns()
+            self._look_at_seats()
             each_round()
 
     def end(self, reason: str) -> None:
@@ -105,42 +116,95 @@ class Publisher:
             "dropped_setpoints": self._setpoints.dropped + self._cycles.dropped,
         }
 
+    def _wait_s(self) -> float:
+        now_s = self._clock.monotonic()
+        wait_s = self._watch.wait_s(now_s)
+        return min(wait_s, max(self._next_turn_s - now_s, 0.0)) if self._waiting else wait_s
+
     def _accept(self, listener: socket.socket, local: bool, _events: int) -> None:
         try:
             connection, address = listener.accept()
         except OSError as error:
             _log.warning("a client could not be accepted", error=error.strerror)
             return
+        if not local and not self._requests.admits(address[0]):
+            _log.warning("a client is not allowed", client=address[0], allowed="sockets.tcp.allow")
+            connection.close()
+            return
         if not local:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        session = ClientSession(connection, "unix" if local else f"{address[0]}:{address[1]}", local)
-        if len(self._sessions) >= MAX_CLIENTS:
-            session.send(ProtocolError(ErrorCode.TOO_MANY_CLIENTS, f"{MAX_CLIENTS} clients at most").to_json())
+            prepare_tcp(connection)
+        name = "unix" if local else f"{address[0]}:{address[1]}"
+        session = ClientSession(connection, name, local, self._clock.monotonic())
+        tcp_clients = sum(not other.local for other in self._sessions)
+        if (refusal := seat_refused(local, len(self._sessions), tcp_clients)) is not None:
+            session.send(refusal.to_json())
             session.close()
             return
         self._sessions.add(session)
         self._selector.register(connection, selectors.EVENT_READ, partial(self._serve, session))
-        self._send(session, self._requests.version)
+        self._send(session, self._requests.greeting(session))
 
     def _serve(self, session: ClientSession, events: int) -> None:
-        self._forward()  # what has been computed until now is not for a client that asks only now
         if events & selectors.EVENT_WRITE:
             session.flush()
-        if events & selectors.EVENT_READ:
-            for received in session.receive():
-                reply = self._reply(session, received)
-                self._schedule()  # before the answer: a client that has it can rely on the next setpoint
-                self._send(session, reply)
+        if events & selectors.EVENT_READ and not session.has_lines:
+            session.receive()
+            if session.has_lines:
+                self._waiting.append(session)
         self._update_events(session)
-        self._schedule()
+
+    def _take_turns(self) -> None:
+        """Answer one request of each client that waits: of the controller now, of the others when they are due."""
+        start_s = self._clock.monotonic()
+        controller = self._requests.controller
+        others = start_s >= self._next_turn_s
+        turns = [session for session in self._waiting if others or session is controller]
+        for session in turns:
+            if not session.open:
+                continue
+            self._forward()  # what has been computed until now is not for a client that asks only now
+            session.asked_s = self._clock.monotonic()
+            reply = self._reply(session, session.next_line())
+            self._schedule()  # before the answer: a client that has it can rely on the next setpoint
+            self._send(session, reply)
+        if others and turns:
+            now_s = self._clock.monotonic()
+            self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _LONGEST_REST_S)
+        self._waiting = [
+            session for session in self._waiting if session.open and session.is_heard and session.has_lines
+        ]
+        for session in turns:
+            self._update_events(session)
+        if turns:
+            self._schedule()
 
     def _reply(self, session: ClientSession, received: bytes | ProtocolError) -> bytes:
-        if isinstance(received, ProtocolError):
-            return received.to_json()
         try:
+            if isinstance(received, ProtocolError):
+                raise received
             return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
-            return error.to_json()
+            if not session.authorized and session.is_heard:
+                _log.warning("a client has not shown the token", client=session.name, what=error.text)
+                session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
+            return error.to_json() if session.is_heard else b""
+
+    def _look_at_seats(self) -> None:
+        """Close the connections of clients that have lost their place."""
+        now_s = self._clock.monotonic()
+        if now_s < self._next_look_s:
+            return
+        self._next_look_s = now_s + _LOOK_EVERY_S
+        for session in list(self._sessions):
+            lost = seat_lost(session, session is self._requests.controller, now_s)
+            if now_s >= session.dismissed_s:
+                lost = ProtocolError(ErrorCode.NOT_AUTHORIZED, "the token is wrong, or AUTH was not the first line")
+            if lost is None:
+                continue
+            _log.warning("client dropped", client=session.name, reason=lost.text)
+            session.send(lost.to_json())
+            session.open = False
+            self._update_events(session)
 
     def _answer_later(self, session: ClientSession, answer: bytes) -> None:
         """Hand an answer that took time to the publisher's thread; called from any thread."""
@@ -205,15 +269,25 @@ class Publisher:
         self._update_events(session)
 
     def _update_events(self, session: ClientSession) -> None:
-        """Ask for room to write only while data wait for this client; forget a client that has gone."""
+        """Ask for what a client is ready for; forget one that has gone.
+
+        That it can be written to matters only while data wait for it. As long as its lines wait, or it has been
+        dismissed, it is not read from.
+        """
         if session not in self._sessions:
             return
-        if session.open:
-            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if session.has_unsent else 0)
-            if self._selector.get_key(session.connection).events != events:
-                self._selector.modify(session.connection, events, partial(self._serve, session))
-            return
-        self._sessions.discard(session)
-        self._selector.unregister(session.connection)
-        self._requests.release(session)
-        session.close()
+        connection = session.connection
+        registered = connection in self._selector.get_map()
+        events = selectors.EVENT_WRITE if session.has_unsent else 0
+        if not session.has_lines and session.is_heard:
+            events |= selectors.EVENT_READ
+        if registered and (not session.open or not events):
+            self._selector.unregister(connection)
+        elif session.open and events and not registered:
+            self._selector.register(connection, events, partial(self._serve, session))
+        elif session.open and events and self._selector.get_key(connection).events != events:
+            self._selector.modify(connection, events, partial(self._serve, session))
+        if not session.open:
+            self._sessions.discard(session)
+            self._requests.release(session)
+            session.close()

@@ -105,7 +105,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         message["seq"],
         Snapshot(message["time_s"], readings),
         zero,
-        None if target is None else Target(**{key: tuple(value) for key, value in target.items()}),
+        None if target is None else _parsed_target(target),
         ending=message.get("ending", ""),
     )
     return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
@@ -126,10 +126,20 @@ def _parsed_reading(data: Mapping[str, Any]) -> Reading:
 
 
 def _target(target: Target) -> dict[str, Any]:
-    tip: dict[str, Any] = {"tip_mm": target.tip_mm}
-    if target.rotation_B0_rad is None:
-        return tip
-    return tip | {"rotation_B0_rad": target.rotation_B0_rad}
+    message: dict[str, Any] = {"tip_mm": target.tip_mm}
+    if target.rotation_B0_rad is not None:
+        message["rotation_B0_rad"] = target.rotation_B0_rad
+    if target.valid_until_s < math.inf:
+        message["valid_until_s"] = target.valid_until_s
+    return message
+
+
+def _parsed_target(data: Mapping[str, Any]) -> Target:
+    """The target; one that was recorded before targets grew old is never too old."""
+    rotation = data.get("rotation_B0_rad")
+    return Target(
+        tuple(data["tip_mm"]), None if rotation is None else tuple(rotation), data.get("valid_until_s", math.inf)
+    )
 
 
 def _carried(state: CycleState, inputs: CycleInputs) -> Any:

@@ -8,21 +8,20 @@ of the answer's message.
 from __future__ import annotations
 
 import math
-import re
-from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import Enum
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+import structlog
+from pydantic import Field, ValidationError
 
+from compd.clock import Clock, MonotonicClock
+from compd.configuration.operation import TargetSettings
 from compd.live.loop.commands import Commands, Target
+from compd.live.service import local_requests
 from compd.live.service.client_session import ClientSession, Stream
 from compd.live.service.message_keys import (
     ErrorKeys,
     Keys,
-    ModelsKeys,
     ReadingsKeys,
     SentMessage,
     SetpointKeys,
@@ -40,65 +39,13 @@ from compd.live.service.messages import (
     unknown_key,
 )
 from compd.live.service.readings_message import ReadingsMessage
+from compd.live.service.request import Asker, Request, SendLater, TargetKeys
+from compd.live.service.tcp_access import TcpAccess
 
 Coordinate = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
-# In no file's name: the null character, and halves of surrogate pairs.
-_NOT_IN_PATHS = re.compile("[\0\ud800-\udfff]")
-
-# Sends a line to the client that asked, from any thread: the answer to a request that takes time.
-SendLater = Callable[[bytes], None]
-
-
-class Asker(Enum):
-    """Which clients may send a request."""
-
-    ANYBODY = "any client"
-    CONTROLLER = "the controller alone"
-    LOCAL = "clients of the Unix socket"
-
-
-@dataclass(frozen=True)
-class TargetKeys:
-    """Which keys TARGET has on this machine.
-
-    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate.
-    rotation : whether "rotation_B0_rad" is allowed: a hexapod's attitude is free, a tripod's follows from its tip.
-    """
-
-    tip: Literal["tip_B0_mm", "tip_P_mm"]
-    rotation: bool
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (self.tip, "rotation_B0_rad") if self.rotation else (self.tip,)
-
-
-class Request(BaseModel):
-    """Base of all requests; the fields of a subclass are the keys of its message.
-
-    wire_name : the message's "class".  reply : the keys of its answer; None where there is none.
-    asker : who may ask.  refusal : the text of the error that anybody else gets.
-    """
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-    wire_name: ClassVar[str]
-    reply: ClassVar[type[SentMessage] | None] = None
-    asker: ClassVar[Asker] = Asker.ANYBODY
-    refusal: ClassVar[str] = ""
-
-    @classmethod
-    def allowed_keys(cls, requests: Requests) -> tuple[str, ...]:
-        """The keys that this machine accepts, for the error about an unknown one."""
-        return tuple(cls.model_fields)
-
-    @abstractmethod
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        """Do it, on the publisher's thread, and return the answer's line; b"" where there is none or it comes later.
-
-        Raises ProtocolError where it cannot be done.
-        """
+_log = structlog.get_logger()
 
 
 class ColumnKeys(Keys):
@@ -150,8 +97,9 @@ class WatchRequest(Request):
 class TargetRequest(Request):
     """Asks for setpoints that bring the tip to this target. There is no answer; the next setpoint is for it.
 
-    The first client that sends a valid one is the controller, until it sends `RELEASE` or its connection ends. Which of
-    the two tips it gives depends on where the machine has its tool.
+    The first client that sends a valid one is the controller, until it sends `RELEASE`, a client of the Unix socket
+    does, or its connection ends. A target may be used for `sockets.target.valid_for_s`: repeat it, also while the
+    machine stands still. Which of the two tips it gives depends on where the machine has its tool.
     """
 
     wire_name = "TARGET"
@@ -175,11 +123,8 @@ class TargetRequest(Request):
         tip_mm = getattr(self, keys.tip)
         if tip_mm is None:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, f"needs {keys.tip}, three numbers")
-        if requests.controller not in {None, client}:
-            raise ProtocolError(ErrorCode.ROLE_TAKEN, "another client is the controller")
         rotation = self.rotation_B0_rad
-        requests.controller = client
-        requests.commands.target = Target(tuple(tip_mm), None if rotation is None else tuple(rotation))
+        requests.set_target(client, tuple(tip_mm), None if rotation is None else tuple(rotation))
         return b""
 
 
@@ -190,16 +135,42 @@ class ReleaseKeys(SentMessage):
 
 
 class ReleaseRequest(Request):
-    """Gives the controller's role back: the mode is CMM again."""
+    """Gives the controller's role back: the mode is CMM again.
+
+    A client of the Unix socket ends with it the role of whoever has it. A controller that loses its role in this way
+    gets the error `role_taken` for every further `TARGET`, until it connects again.
+    """
 
     wire_name = "RELEASE"
     reply = ReleaseKeys
     asker = Asker.CONTROLLER
-    refusal = "only the controller can release its role"
+    refusal = "only the controller, or a client of the Unix socket, can end the controller's role"
 
     def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        requests.release(client)
+        requests.end_role(client)
         return line({"class": self.wire_name})
+
+
+class AuthKeys(SentMessage):
+    """Greets a TCP client in place of VERSION where a token is configured: send AUTH with it."""
+
+    wire_name = "AUTH"
+
+
+class AuthRequest(Request):
+    """Shows that this client may use TCP; the first line of every client where a token is configured.
+
+    The daemon greets such a client with `AUTH` in place of `VERSION`. With a wrong token, or without one, the
+    connection is closed.
+    """
+
+    wire_name = "AUTH"
+    reply = VersionKeys
+    token: str = Field(description="what is in the file `sockets.tcp.token_file`", repr=False)
+
+    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+        requests.authorize(client, self.token)
+        return requests.version
 
 
 class StatusRequest(Request):
@@ -222,85 +193,21 @@ class VersionRequest(Request):
         return requests.version
 
 
-class ZeroKeys(SentMessage):
-    """Answers ZERO when machine zero has been taken."""
-
-    wire_name = "ZERO"
-    taken_at: str = Field(description="when, UTC, ISO 8601")
-    path: str = Field(description="the file in which it is kept")
-    readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
-
-
-class ZeroRequest(Request):
-    """Takes machine zero, with the machine at rest at its zero position. The answer comes after about a second.
-
-    It does not come in turn: other answers may come before it.
-    """
-
-    wire_name = "ZERO"
-    reply = ZeroKeys
-    asker = Asker.LOCAL
-    refusal = "machine zero is taken over the Unix socket only"
-
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        requests.take_zero(send_later)
-        return b""
-
-
-class ModelKeys(SentMessage, ModelsKeys):
-    """Answers MODEL."""
-
-    wire_name = "MODEL"
-
-
-class ModelRequest(Request):
-    """Asks which models the daemon runs with; with `file` the daemon adopts that one first.
-
-    With a file the answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
-    `model_refused` comes, and nothing has changed. An adopted model survives a crash of the loop and lasts until the
-    daemon starts anew. Only clients of the Unix socket may ask, because request and answer name files of the daemon's
-    computer.
-    """
-
-    wire_name = "MODEL"
-    reply = ModelKeys
-    asker = Asker.LOCAL
-    refusal = "models are asked for and adopted over the Unix socket only"
-    file: str = Field(
-        default="", description='absolute path of a model file to adopt, "" for none; left out: only tell the models'
-    )
-    shadow: bool = Field(default=False, description="true: compute this model's correction and do not apply it")
-
-    @field_validator("file")
-    @classmethod
-    def _absolute(cls, file: str) -> str:
-        if file and (not file.startswith("/") or _NOT_IN_PATHS.search(file)):
-            raise ValueError(f'file is {file[:200]!r}, allowed: an absolute path, or "" for none')
-        return file
-
-    @model_validator(mode="after")
-    def _named(self) -> Self:
-        if self.model_fields_set == {"shadow"}:
-            raise ValueError("needs file, a text (shadow: true or false)")
-        return self
-
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        if requests.switch_model is None:
-            raise ProtocolError(ErrorCode.UNIX_ONLY, self.refusal)
-        if self.model_fields_set:
-            requests.switch_model(self.file, self.shadow, send_later)
-            return b""
-        return line({"class": self.wire_name, **requests.models()})
-
-
-REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in Request.__subclasses__()}
+# Those of any client first, whatever the order of the modules.
+_KINDS = sorted(Request.__subclasses__(), key=lambda kind: kind.__module__ == local_requests.__name__)
+REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in _KINDS}
 _SENT: tuple[type[SentMessage], ...] = (
     *(kind.reply for kind in REQUESTS.values() if kind.reply is not None),
+    AuthKeys,
     ErrorKeys,
     SetpointKeys,
     ReadingsKeys,
 )
 SENT_MESSAGES: Mapping[str, type[SentMessage]] = {kind.wire_name: kind for kind in _SENT}
+
+
+def _accept_nothing(gauge: str) -> Sequence[str]:
+    return ()
 
 
 class Requests:
@@ -315,16 +222,23 @@ class Requests:
         target_keys: TargetKeys,
         commands: Commands,
         status: Callable[[], Mapping[str, Any]],
-        take_zero: Callable[[SendLater], None],
+        take_zero: Callable[[bool, SendLater], None],
         readings: ReadingsMessage | None = None,
-        switch_model: Callable[[str, bool, SendLater], None] | None = None,
+        switch_model: Callable[[str, bool, int, SendLater], None] | None = None,
         models: Callable[[], Mapping[str, Any]] = dict,
+        accept: Callable[[str], Sequence[str]] = _accept_nothing,
+        targets: TargetSettings | None = None,
+        access: TcpAccess | None = None,
+        clock: Clock | None = None,
     ) -> None:
         """`version`: the VERSION message; `status`: makes the STATUS message; `readings`: makes READINGS messages;
-        `models`: summary of the models.
+        `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
 
-        `take_zero` starts to take machine zero, `switch_model` (file, shadow) to adopt a model; both answer later,
-        and raise ProtocolError (busy) while another such request is being worked on.
+        `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (file, shadow,
+        user who asks) to adopt a model; both answer later, and raise ProtocolError (busy) while another such request is
+        being worked on. `accept` makes the acquisition believe a gauge, "gauge.channel" or "all" again, and returns the
+        channels that it did not believe; it raises ValueError, with a text for the client, for a name that is none.
+        `access`: who may use TCP; None: everybody who reaches it.
         """
         self.version = line(version)
         self.target_keys = target_keys
@@ -334,7 +248,28 @@ class Requests:
         self.readings = readings
         self.switch_model = switch_model
         self.models = models
+        self.accept = accept
         self.controller: ClientSession | None = None
+        self._targets = targets or TargetSettings()
+        self._access = access
+        self._clock = clock or MonotonicClock()
+
+    def greeting(self, client: ClientSession) -> bytes:
+        """The first line for a client: VERSION, or AUTH where it has to show a token."""
+        client.authorized = client.local or self._access is None or not self._access.needs_token
+        return self.version if client.authorized else line({"class": AuthKeys.wire_name})
+
+    def admits(self, address: str) -> bool:
+        """Whether a client at this IP address may connect over TCP at all."""
+        return self._access is None or self._access.admits(address)
+
+    def authorize(self, client: ClientSession, token: str) -> None:
+        """Let a client in that shows the token. Raises ProtocolError (not_authorized) for another one."""
+        if client.authorized:
+            return
+        if self._access is None or not self._access.knows(token):
+            raise ProtocolError(ErrorCode.NOT_AUTHORIZED, "this is not the token")
+        client.authorized = True
 
     def answer(self, client: ClientSession, data: bytes, send_later: SendLater) -> bytes:
         """The answer to one line; b"" where there is none or it comes by `send_later`.
@@ -342,17 +277,53 @@ class Requests:
         Raises ProtocolError for a request that cannot be followed.
         """
         request = self._read(data)
-        if request.asker is Asker.CONTROLLER and self.controller is not client:
+        if not client.authorized and not isinstance(request, AuthRequest):
+            raise ProtocolError(ErrorCode.NOT_AUTHORIZED, "the first line must be AUTH with the token")
+        if request.asker is Asker.CONTROLLER and self.controller is not client and not client.local:
             raise ProtocolError(ErrorCode.NOT_CONTROLLER, request.refusal)
         if request.asker is Asker.LOCAL and not client.local:
             raise ProtocolError(ErrorCode.UNIX_ONLY, request.refusal)
         return request.answer(self, client, send_later)
+
+    def set_target(
+        self, client: ClientSession, tip_mm: tuple[float, ...], rotation_B0_rad: tuple[float, ...] | None
+    ) -> None:
+        """Take a target, and with it `client` as the controller. Raises ProtocolError where it may not be."""
+        if self._targets.unix_only and not client.local:
+            raise ProtocolError(
+                ErrorCode.UNIX_ONLY, "targets are given over the Unix socket only (sockets.target.unix_only)"
+            )
+        if client.lost_role:
+            raise ProtocolError(
+                ErrorCode.ROLE_TAKEN, "the role was taken from this client over the Unix socket: connect again"
+            )
+        if self.controller not in {None, client}:
+            raise ProtocolError(ErrorCode.ROLE_TAKEN, "another client is the controller")
+        if self.controller is None:
+            _log.info("controller", client=client.name)
+        self.controller = client
+        valid_until_s = self._clock.monotonic() + self._targets.valid_for_s
+        self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s)
+
+    def end_role(self, client: ClientSession) -> None:
+        """End the controller's role, which `client` has or, over the Unix socket, takes from whoever has it.
+
+        Raises ProtocolError (not_controller) where nobody has it.
+        """
+        controller = self.controller
+        if controller is None:
+            raise ProtocolError(ErrorCode.NOT_CONTROLLER, "no client is the controller")
+        if controller is not client:
+            controller.lost_role = True
+            _log.warning("the controller's role was taken from it", controller=controller.name, by=client.name)
+        self.release(controller)
 
     def release(self, client: ClientSession) -> None:
         """Take the controller's role from `client`, if it has it: without a controller the mode is CMM."""
         if self.controller is client:
             self.controller = None
             self.commands.target = None
+            _log.info("no controller any more", before=client.name)
 
     def _read(self, data: bytes) -> Request:
         name, keys = parse(data)

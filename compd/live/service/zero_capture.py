@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,6 +12,8 @@ import structlog
 
 from compd.clock import Clock
 from compd.errors import Problem, StateError
+from compd.gauge import Quality
+from compd.json_text import omit_unknown
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.wiring import MachineWires
@@ -24,6 +26,14 @@ _WINDOW_S = 1.0
 _LOOK_EVERY_S = 0.02
 # A machine at rest stays within a few steps of its gauges; one that moves leaves this in milliseconds.
 REST_TOLERANCE_MM = 0.005
+# A machine that comes to its zero position again is nearer than this to where it was.
+LARGEST_CHANGE_MM = 0.5
+# A gauge that has been accepted is believed from its next answers on.
+_BELIEVED_WITHIN_S = 3.0
+# The disk may hang; the daemon's end waits no longer for it.
+_END_WITHIN_S = 0.5
+# Differences that an error names: the largest.
+_NAMED = 6
 
 _log = structlog.get_logger()
 
@@ -35,8 +45,17 @@ class ZeroCapture:
     """
 
     def __init__(
-        self, wires: MachineWires, latest: Latest, commands: Commands, directory: Path, zero_hash: str, clock: Clock
+        self,
+        wires: MachineWires,
+        latest: Latest,
+        commands: Commands,
+        directory: Path,
+        zero_hash: str,
+        clock: Clock,
+        accept: Callable[[str], object] = lambda gauge: None,
     ) -> None:
+        """`accept`: as in `Requests`; who takes zero has looked at the machine, and accepts every gauge."""
+        self._accept = accept
         self._wires = wires
         self._latest = latest
         self._commands = commands
@@ -46,27 +65,97 @@ class ZeroCapture:
         self._stop = threading.Event()
         self._job = BackgroundJob("zero", "machine zero is being taken already")
 
-    def start(self, answer: Callable[[bytes], None]) -> None:
-        """Begin; `answer` gets the ZERO or ERROR line at the end. Raises ProtocolError while one is being taken."""
-        self._job.start(self._capture, answer)
+    def start(self, replace: bool, answer: Callable[[bytes], None]) -> None:
+        """Begin; `answer` gets the ZERO or ERROR line at the end. Raises ProtocolError while one is being taken.
+
+        replace : take it also where a gauge differs from the zero until now by more than LARGEST_CHANGE_MM, or is not
+        believed.
+        """
+        self._job.start(lambda: self._capture(replace), answer)
 
     def stop(self) -> None:
-        """Give up a zero that is being taken; return when its thread has ended."""
+        """Give up a zero that is being taken; return when its thread has ended, or the disk has not let it for long."""
         self._stop.set()
-        self._job.join()
+        if not self._job.join(_END_WITHIN_S):
+            _log.warning("machine zero is still being taken, and is given up")
 
-    def _capture(self) -> bytes:
+    def _capture(self, replace: bool) -> bytes:
         try:
-            zero = MachineZero(self._zero_hash, datetime.now(UTC).isoformat(timespec="seconds"), self.sample())
+            zero, changed_mm = self._measure(replace)
             path = zero.save(self._directory)
+        except ProtocolError as error:
+            _log.warning("machine zero differs", reason=error.text)
+            return error.to_json()
         except StateError as error:
             _log.warning("machine zero refused", reason=str(error))
             return ProtocolError(ErrorCode.ZERO_REFUSED, str(error)).to_json()
+        except Exception as error:  # noqa: BLE001  the client gets an answer whatever happens
+            _log.exception("machine zero refused")
+            return ProtocolError(ErrorCode.ZERO_REFUSED, f"{type(error).__name__}: {error}").to_json()
         self._commands.zero = zero
-        _log.info("machine zero taken", path=str(path))
-        return line(
-            {"class": "ZERO", "taken_at": zero.taken_at, "path": str(path), "readings_mm": dict(zero.readings_mm)}
-        )
+        self._accept("all")
+        _log.info("machine zero taken", path=str(path), changed_mm=_named(changed_mm) if changed_mm else "")
+        answer = {
+            "class": "ZERO",
+            "taken_at": zero.taken_at,
+            "path": str(path),
+            "readings_mm": dict(zero.readings_mm),
+            "changed_mm": {channel: round(change_mm, 7) for channel, change_mm in changed_mm.items()} or None,
+        }
+        return line(omit_unknown(answer))
+
+    def _measure(self, replace: bool) -> tuple[MachineZero, dict[str, float]]:
+        """A new machine zero, and by how much it differs from the one until now, by channel, mm.
+
+        Raises StateError where it cannot be taken, ProtocolError (zero_differs) where it needs `replace`.
+        """
+        before = self._commands.zero
+        if distrusted := self._distrusted():
+            if not replace:
+                raise ProtocolError(
+                    ErrorCode.ZERO_DIFFERS,
+                    f"not believed: {'; '.join(distrusted)}. Machine zero takes every gauge as it reads now",
+                )
+            # They are believed again before it is known whether zero can be taken: with the one until now their
+            # readings would be wrong by whatever they have lost.
+            self._commands.zero = StateError(
+                Problem(
+                    where="machine zero",
+                    what="gauges were accepted in order to take it",
+                    value=", ".join(text.partition(" ")[0] for text in distrusted),
+                    next_step="where it was refused, take it again: `compd zero`",
+                )
+            )
+            self._accept("all")
+            self._wait_until_believed()
+        taken_at = datetime.now(UTC).isoformat(timespec="seconds")
+        zero = MachineZero(self._zero_hash, taken_at, self.sample())
+        if not isinstance(before, MachineZero):
+            return zero, {}
+        changed_mm = zero.changes_mm(before)
+        if not replace and any(abs(change_mm) > LARGEST_CHANGE_MM for change_mm in changed_mm.values()):
+            raise ProtocolError(
+                ErrorCode.ZERO_DIFFERS,
+                f"more than {LARGEST_CHANGE_MM:g} mm from the machine zero of {before.taken_at}: {_named(changed_mm)}",
+            )
+        return zero, changed_mm
+
+    def _distrusted(self) -> list[str]:
+        """Each length gauge that is not believed, with the reason."""
+        readings = self._latest.snapshot(self._clock.monotonic()).readings
+        of_wires = [(wire.channel, readings[wire.slot]) for wire in self._wires.length_wires]
+        return [
+            f"{channel} ({reading.detail or 'no reason given'})"
+            for channel, reading in of_wires
+            if reading.quality is Quality.DISTRUSTED
+        ]
+
+    def _wait_until_believed(self) -> None:
+        """Until no length gauge is distrusted, or too long; what is not believed then is refused as not read."""
+        end_s = self._clock.monotonic() + _BELIEVED_WITHIN_S
+        while self._distrusted() and self._clock.monotonic() < end_s:
+            if self._clock.wait(self._stop, _LOOK_EVERY_S):
+                return
 
     def sample(self) -> dict[str, float]:
         """Mean raw reading (mm) of every length gauge, by channel, over `_WINDOW_S`; each reading counts once.
@@ -109,3 +198,10 @@ class ZeroCapture:
                     )
                 )
         return {channel: sum(readings.values()) / len(readings) for channel, readings in values_mm.items()}
+
+
+def _named(changes_mm: Mapping[str, float]) -> str:
+    """The largest changes, by channel, in words."""
+    largest = sorted(changes_mm, key=lambda channel: -abs(changes_mm[channel]))
+    named = ", ".join(f"{channel} {changes_mm[channel]:+.4f} mm" for channel in largest[:_NAMED])
+    return named + (f" and {len(largest) - _NAMED} more" if len(largest) > _NAMED else "")

@@ -12,6 +12,7 @@ import yaml
 from compd.configuration import Configuration, load
 from compd.configuration.document import read_document
 from compd.errors import ConfigurationError, Problem
+from compd.output_file import check_replaceable
 
 Port = str | tuple[str, int]
 LOOPBACK = "127.0.0.1"
@@ -71,4 +72,5 @@ def _free_port(wanted: int) -> int:
 
 def _write(path: Path, original: Path, data: dict[str, Any]) -> None:
     head = f"# {original.name} with the ports of a simulated machine; written by `compd simulate`, gone with it.\n"
+    check_replaceable(path, (b"written by `compd simulate`",), "a configuration of a simulated machine")
     path.write_text(head + yaml.safe_dump(data, sort_keys=False, width=110), encoding="utf-8")

@@ -332,3 +332,18 @@ def test_an_unusable_thermometer_is_nan_and_stops_nothing(tripod):
     assert math.isnan(read.values[0])
     assert read.values[1] == 20.0
     assert "temperature_room_degC (cabinet.room): sensor_fault" in read.lost
+
+
+def test_a_target_that_is_too_old_is_a_stop_until_another_comes_and_never_cmm_mode(tripod):
+    tripod.settle()
+    now_s = tripod.step().time_s
+    tripod.commands.target = Target((10.0, -20.0, -500.0), valid_until_s=now_s + 3 * PERIOD_S)
+    states = [tripod.step() for _ in range(6)]
+    assert [setpoint.valid for setpoint in states] == [True, True, True, False, False, False]
+    assert all(setpoint.valid_until_s <= now_s + 3 * PERIOD_S + 1e-9 for setpoint in states[:3]), (
+        "nor is it used longer"
+    )
+    assert {(setpoint.state, setpoint.mode) for setpoint in states[3:]} == {(State.STOP, Mode.MACHINE_TOOL)}
+    assert "the controller's target is too old" in states[-1].reason
+    tripod.commands.target = Target((10.0, -20.0, -500.0), valid_until_s=now_s + 60)
+    assert tripod.step().valid

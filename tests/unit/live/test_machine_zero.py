@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from compd.configuration import load
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
-from compd.live.loop.machine_zero import FILE_NAME, MachineZero, load_zero
+from compd.live.loop.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
@@ -37,7 +38,7 @@ def test_what_is_saved_is_what_is_loaded(tmp_path):
         ("", "not JSON"),
         ('{"format": 1, "zero_hash": "abc"', "not JSON"),
         ("[]", "not a machine zero"),
-        ('{"format": 2, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
+        ('{"format": 3, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
         ('{"zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "format: is not a machine zero: Field required"),
         ('{"format": 1, "zero_hash": 7, "taken_at": "", "readings_mm": {}}', "zero_hash: is not a machine zero"),
         (
@@ -116,7 +117,10 @@ class Taking:
         self.value_mm = lambda channel, read: 3.0 + 0.001 * (-1) ** read
         self.quality = lambda channel, read: Quality.OK
         self.answers = []
-        self.taker = ZeroCapture(self.wires, self.latest, self.commands, directory, configuration.zero_hash, self)
+        self.accepted = []
+        self.taker = ZeroCapture(
+            self.wires, self.latest, self.commands, directory, configuration.zero_hash, self, self.accept
+        )
         self._read()
 
     def monotonic(self):
@@ -134,8 +138,11 @@ class Taking:
             reading = good(self.value_mm(channel, self.reads), self.now_s)
             self.latest.put(self.latest.index[channel], reading if quality is Quality.OK else bad(self.now_s, quality))
 
-    def take(self):
-        self.taker.start(self.answers.append)
+    def accept(self, gauge):
+        self.accepted.append(gauge)
+
+    def take(self, replace=False):
+        self.taker.start(replace, self.answers.append)
         self.taker._job.join()
         return json.loads(self.answers[-1])
 
@@ -190,3 +197,151 @@ def test_a_disk_that_refuses_is_told_and_the_old_zero_stays(tmp_path):
     assert answer["code"] == "zero_refused"
     assert "cannot be written" in answer["text"]
     assert taking.commands.zero is before
+
+
+def test_a_digit_that_was_changed_by_hand_is_refused(tmp_path):
+    path = ZERO.save(tmp_path)
+    path.write_text(path.read_text().replace("1.25", "1.26"))
+    with pytest.raises(StateError, match="changed after it was written"):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+    content = json.loads(path.read_text())
+    del content["checksum"]
+    path.write_text(json.dumps(content))
+    with pytest.raises(StateError, match="no checksum"):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+
+
+def test_a_file_of_an_earlier_release_has_no_checksum_and_is_used(tmp_path):
+    (tmp_path / FILE_NAME).write_text(json.dumps({"format": 1, **ZERO.to_json()}))
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda path: path.write_text("[" * 100_000), "not JSON"),
+        (lambda path: path.write_text('{"a":' * 100_000), "not JSON"),
+        (os.mkfifo, "it is not a regular file"),
+        (lambda path: path.symlink_to("/dev/zero"), "it is not a regular file"),
+        (lambda path: path.write_bytes(b"\xff\xfe"), "not JSON"),
+        (lambda path: path.write_text(" " * 1_000_001), "more than 1000000 bytes"),
+    ],
+)
+def test_a_file_that_is_none_is_an_error_and_neither_hangs_nor_fills_the_memory(tmp_path, make, says):
+    make(tmp_path / FILE_NAME)
+    with pytest.raises(StateError, match=says):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+
+
+def test_the_zero_before_is_kept_beside_the_new_one(tmp_path):
+    first = ZERO.save(tmp_path).read_bytes()
+    later = replace(ZERO, taken_at="2026-01-02T00:00:00+00:00")
+    second = later.save(tmp_path).read_bytes()
+    assert (tmp_path / OLD_FILE_NAME).read_bytes() == first
+    ZERO.save(tmp_path)
+    assert (tmp_path / OLD_FILE_NAME).read_bytes() == second
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+
+
+def test_a_full_disk_leaves_both_files_as_they_were_and_no_other(tmp_path, monkeypatch):
+    ZERO.save(tmp_path)
+    replace(ZERO, taken_at="2026-01-02T00:00:00+00:00").save(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StateError, match="No space left"):
+        ZERO.save(tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_zero_far_from_the_one_before_needs_to_be_confirmed(tmp_path):
+    taking = Taking(tmp_path)
+    first = taking.take()
+    assert "changed_mm" not in first, "there was none before"
+    taking.value_mm = lambda channel, read: 8.0 if channel == "scale_1.position" else 3.0
+    taking._read()
+    refused = taking.take()
+    assert (refused["class"], refused["code"]) == ("ERROR", "zero_differs")
+    assert "scale_1.position +5.0000 mm" in refused["text"]
+    assert taking.commands.zero.readings_mm["scale_1.position"] == pytest.approx(3.0, abs=1e-3)
+    assert not (tmp_path / OLD_FILE_NAME).exists()
+    assert taking.accepted == ["all"], "by the first alone"
+    taken = taking.take(replace=True)
+    assert taken["changed_mm"]["scale_1.position"] == pytest.approx(5.0, abs=1e-3)
+    assert taken["changed_mm"]["joints.1"] == pytest.approx(0.0, abs=1e-3)
+    assert taking.accepted == ["all", "all"]
+    taking.value_mm = lambda channel, read: 8.4 if channel == "scale_1.position" else 3.0
+    taking._read()
+    assert taking.take()["class"] == "ZERO", "0.4 mm is not asked about"
+
+
+def test_a_gauge_that_is_not_believed_is_accepted_only_where_that_is_confirmed(tmp_path):
+    """It came back 5 mm away: with the machine zero until now, its readings would be wrong by as much."""
+    taking = Taking(tmp_path)
+    taking.take()
+    before = taking.commands.zero
+    taking.accepted.clear()
+    zeros_at_acceptance = []
+
+    def accept(gauge):
+        taking.accepted.append(gauge)
+        zeros_at_acceptance.append(taking.commands.zero)
+        taking.quality = lambda channel, read: Quality.OK
+
+    taking.taker._accept = accept
+    taking.quality = lambda channel, read: Quality.DISTRUSTED if channel == "scale_1.position" else Quality.OK
+    taking.value_mm = lambda channel, read: 8.0 if channel == "scale_1.position" else 3.0
+    taking._read()
+    refused = taking.take()
+    assert refused["code"] == "zero_differs"
+    assert "not believed: scale_1.position" in refused["text"]
+    assert taking.commands.zero is before
+    assert taking.accepted == []
+    taken = taking.take(replace=True)
+    assert taken["class"] == "ZERO"
+    assert isinstance(zeros_at_acceptance[0], StateError), "no zero while it is believed and the old zero is wrong"
+    assert taking.commands.zero.readings_mm["scale_1.position"] == pytest.approx(8.0)
+
+
+def test_a_gauge_that_was_accepted_for_a_zero_that_is_then_refused_leaves_no_zero(tmp_path):
+    taking = Taking(tmp_path)
+    taking.take()
+    taking.quality = lambda channel, read: Quality.DISTRUSTED if channel == "scale_1.position" else Quality.OK
+    taking._read()
+
+    def accept(gauge):
+        taking.quality = lambda channel, read: Quality.OK
+        taking.value_mm = lambda channel, read: read * 1.0  # it moves
+
+    taking.taker._accept = accept
+    assert taking.take(replace=True)["code"] == "zero_refused"
+    assert isinstance(taking.commands.zero, StateError)
+    assert "compd zero" in str(taking.commands.zero)
+
+
+def test_whatever_goes_wrong_is_answered(tmp_path, monkeypatch):
+    taking = Taking(tmp_path)
+    monkeypatch.setattr(MachineZero, "save", lambda *_: 1 / 0)
+    assert taking.take()["code"] == "zero_refused"
+
+
+def test_the_end_does_not_wait_for_a_disk_that_hangs(tmp_path, monkeypatch):
+    taking = Taking(tmp_path)
+    saving, disk = threading.Event(), threading.Event()
+
+    def save(zero, directory):
+        saving.set()
+        disk.wait()
+        return directory
+
+    monkeypatch.setattr(MachineZero, "save", save)
+    monkeypatch.setattr("compd.live.service.zero_capture._END_WITHIN_S", 0.01)
+    taking.taker.start(False, taking.answers.append)
+    assert saving.wait(20)
+    taking.taker.stop()
+    assert taking.answers == []
+    disk.set()
+    assert taking.taker._job.join(20)

@@ -2,148 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
-import socket
 import threading
-from contextlib import closing
 
 import numpy as np
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.configuration.operation import SocketSettings
-from compd.errors import DaemonError, Problem, StateError
-from compd.live.loop.commands import Commands
-from compd.live.loop.sent_cycle import SentSetpoint
-from compd.live.loop.setpoint import Setpoint, SetpointValues
-from compd.live.loop.states import Mode, State
-from compd.live.memory.shared_ring import ENTRIES, SharedRing
-from compd.live.service.listeners import Listeners
+from compd.live.loop.states import State
 from compd.live.service.messages import MAX_LINE_BYTES, line
-from compd.live.service.publisher import Publisher
-from compd.live.service.requests import REQUESTS, Asker, Requests, TargetKeys
-
-PERIOD_S = 0.005
-TIMEOUT_S = 20
-VERSION = {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00"}
-NO_ZERO = StateError(Problem(where="zero", what="none"))
-
-
-def setpoint(seq: int, time_s: float | None = None) -> Setpoint:
-    three = np.array([1.0, 2.0, 3.0])
-    numbers = SetpointValues(
-        three, three, None, three, three, three, three, three, three, {"joints": three, "frame": three}
-    )
-    time_s = seq * PERIOD_S if time_s is None else time_s
-    return Setpoint(seq, time_s, time_s + 0.1, 0.01, State.OK, "", Mode.CMM, numbers)
-
-
-class Peer:
-    """A client made of a socket and nothing else."""
-
-    def __init__(self, family, address, receive_buffer=None):
-        self.socket = socket.socket(family, socket.SOCK_STREAM)
-        if receive_buffer:
-            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.settimeout(TIMEOUT_S)
-        self.socket.connect(address)
-        self.file = self.socket.makefile("rb")
-        self.version = self.read()
-
-    def send(self, message):
-        self.socket.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
-
-    def read(self):
-        received = self.file.readline()
-        assert received.endswith(b"\n"), f"closed after {received!r}"
-        return json.loads(received)
-
-    def ask(self, message):
-        self.send(message)
-        return self.read()
-
-    def close(self):
-        self.file.close()
-        self.socket.close()
-
-
-class LoopIsWell:
-    """In the place of the watch: the setpoints of these tests have times of their own."""
-
-    limit_s = 1.0
-
-    def admits(self, seq, time_s):
-        return True
-
-    def wait_s(self, now_s):
-        return self.limit_s
-
-    def missing(self, now_s):
-        return None
-
-    def stop(self, now_s, reason):
-        return Setpoint(10**6, now_s, now_s, math.nan, State.STOP, reason, Mode.CMM, None)
-
-
-class Service:
-    """A publisher on real sockets, with the loop's side in the test's hands."""
-
-    def __init__(self, directory, target_keys):
-        self.path = directory / "s" / "compd.sock"
-        sockets = SocketSettings(tcp={"port": 0}, unix={"path": str(self.path)}, valid_for_s=0.1)
-        self.commands = Commands(NO_ZERO)
-        self.observed = []
-        self.zeros = []
-        self.models = []
-        self.listeners = Listeners(sockets)
-        self.ring = SharedRing()
-        self.publisher = Publisher(
-            self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, MonotonicClock(), [self.observed.append]
-        )
-        requests = Requests(
-            VERSION,
-            target_keys,
-            self.commands,
-            lambda: {"class": "STATUS"},
-            self.zeros.append,
-            switch_model=lambda *arguments: self.models.append(arguments),
-        )
-        self.stopping = threading.Event()
-        self.thread = threading.Thread(target=self.run, args=(requests,))
-        self.thread.start()
-        self.peers = []
-
-    def run(self, requests):
-        self.publisher.run(requests, lambda: not self.stopping.is_set(), lambda: None)
-        self.publisher.end("the test is over")
-
-    def deliver(self, setpoint):
-        self.ring.put(setpoint.time_s, setpoint.state.code, SentSetpoint.of(setpoint, None).pack())
-
-    def unix(self, **options):
-        return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))
-
-    def tcp(self, **options):
-        return self._peer(Peer(socket.AF_INET, ("127.0.0.1", self.listeners.tcp_port), **options))
-
-    def _peer(self, peer):
-        self.peers.append(peer)
-        return peer
-
-    def close(self):
-        for peer in self.peers:
-            peer.close()
-        self.stopping.set()
-        self.ring.wake_reader()
-        self.thread.join()
-        self.listeners.close()
-
-
-@pytest.fixture
-def service(tmp_path):
-    with closing(Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as service:
-        yield service
+from compd.live.service.requests import REQUESTS, Asker
+from tests.support.service import PERIOD_S, VERSION, setpoint
 
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
@@ -272,7 +140,7 @@ def test_a_model_is_switched_over_the_unix_socket_alone(service):
     local.send({"class": "MODEL", "file": "/m.yaml", "shadow": True})
     local.send({"class": "MODEL", "file": ""})
     local.ask({"class": "STATUS"})
-    assert [(file, shadow) for file, shadow, _ in service.models] == [("/m.yaml", True), ("", False)]
+    assert [(file, shadow) for file, shadow, _, _ in service.models] == [("/m.yaml", True), ("", False)]
 
 
 def test_every_request_documents_itself_and_each_of_its_keys():
@@ -289,131 +157,24 @@ def test_a_message_may_come_in_pieces_and_several_in_one_piece(service):
     assert [peer.read()["class"] for _ in range(3)] == ["VERSION", "STATUS", "VERSION"]
 
 
-def test_the_first_client_with_a_target_is_the_controller_until_it_releases(service):
-    first, second = service.tcp(), service.unix()
-    target = {"class": "TARGET", "tip_B0_mm": [1, 2.5, -510]}
-    first.send(target)
-    assert first.ask({"class": "STATUS"})["class"] == "STATUS"
-    assert service.commands.target is not None
-    assert service.commands.target.tip_mm == (1.0, 2.5, -510.0)
-    assert second.ask(target)["code"] == "role_taken"
-    assert second.ask({"class": "RELEASE"})["code"] == "not_controller"
-    assert first.ask({"class": "RELEASE"}) == {"class": "RELEASE"}
-    assert service.commands.target is None
-    second.send(target)
-    second.ask({"class": "STATUS"})
-    assert service.commands.target is not None
-
-
-def test_a_controller_that_goes_leaves_cmm_mode_behind(service):
-    first, second = service.tcp(), service.tcp()
-    first.send({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})
-    first.ask({"class": "STATUS"})
-    assert service.commands.target is not None
-    first.close()
-    # the publisher sees the end of that stream no later than it answers the newcomer after it
-    second.ask({"class": "STATUS"})
-    service.tcp().ask({"class": "STATUS"})
-    assert service.commands.target is None
-
-
-def test_a_hexapod_and_a_tool_on_the_plate_take_their_own_targets(tmp_path):
-    with closing(Service(tmp_path / "h", TargetKeys("tip_B0_mm", rotation=True))) as hexapod:
-        peer = hexapod.unix()
-        peer.send({"class": "TARGET", "tip_B0_mm": [1, 2, 3], "rotation_B0_rad": [0, 0.1, 0]})
-        peer.ask({"class": "STATUS"})
-        assert hexapod.commands.target is not None
-        assert hexapod.commands.target.rotation_B0_rad == (0.0, 0.1, 0.0)
-    with closing(Service(tmp_path / "p", TargetKeys("tip_P_mm", rotation=False))) as plate:
-        peer = plate.unix()
-        assert peer.ask({"class": "TARGET", "tip_B0_mm": [1, 2, 3]})["code"] == "bad_message"
-        peer.send({"class": "TARGET", "tip_P_mm": [1, 2, 3]})
-        peer.ask({"class": "STATUS"})
-        assert plate.commands.target is not None
-
-
 def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(service):
     assert service.tcp().ask({"class": "ZERO"})["code"] == "unix_only"
     assert service.zeros == []
     peer = service.unix()
     peer.send({"class": "ZERO"})
     assert peer.ask({"class": "STATUS"})["class"] == "STATUS", "the publisher does not wait for it"
-    (answer,) = service.zeros
+    ((_, answer),) = service.zeros
     threading.Thread(target=answer, args=(line({"class": "ZERO", "taken_at": "now"}),)).start()
     assert peer.read() == {"class": "ZERO", "taken_at": "now"}
 
 
-def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(service):
-    slow, good = service.unix(), service.tcp()
-    slow.ask({"class": "WATCH"})
-    good.ask({"class": "WATCH"})
-    now_s = MonotonicClock().monotonic()
-    seq = 0
-    while not service.publisher.dropped_clients:
-        seq += 1
-        assert seq < 50_000, "the slow client was never dropped"
-        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
-        assert good.read()["seq"] == seq
-    assert service.publisher.summary()["dropped_setpoints"] == 0
-    good.ask({"class": "STATUS"})
-    assert service.publisher.summary()["clients"] == 1
-    while slow.socket.recv(65536):
-        pass  # what was on its way, then the end of the stream
-
-
-def test_a_full_queue_drops_the_oldest_and_counts_them(service):
-    peer = service.tcp()
-    entered, leave = threading.Event(), threading.Event()
-
-    def hold_up(setpoint):
-        entered.set()
-        assert leave.wait(TIMEOUT_S)
-
-    service.publisher._observers = (hold_up,)
-    peer.ask({"class": "WATCH"})
-    now_s = MonotonicClock().monotonic()
-    service.deliver(setpoint(0, now_s))
-    assert entered.wait(TIMEOUT_S)
-    for seq in range(1, 601):
-        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
-    leave.set()
-    assert peer.read()["seq"] == 0
-    dropped = peer.read()["seq"] - 1
-    assert 600 - ENTRIES <= dropped <= 600 - ENTRIES + 20, "all but what the ring has, less a margin"
-    assert service.publisher.summary()["dropped_setpoints"] == dropped
-
-
-def test_beyond_the_last_seat_a_client_is_told_and_closed(service):
-    seated = [service.unix() for _ in range(32)]
-    extra = service.tcp()
-    assert extra.version["code"] == "too_many_clients"
-    assert extra.file.read() == b""
-    seated[0].close()
-    seated[1].ask({"class": "STATUS"})
-    service.unix().ask({"class": "STATUS"})
-
-
-def test_the_unix_socket_is_for_user_and_group_and_goes_with_the_daemon(tmp_path):
-    service = Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
-    assert service.path.stat().st_mode & 0o777 == 0o660
-    with pytest.raises(DaemonError, match="another daemon is listening"):
-        Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))
-    service.close()
-    assert not service.path.exists()
-
-
-def test_a_socket_that_a_crash_left_behind_is_replaced(tmp_path):
-    path = tmp_path / "s" / "compd.sock"
-    path.parent.mkdir()
-    with socket.socket(socket.AF_UNIX) as crashed:
-        crashed.bind(str(path))
-    with closing(Service(tmp_path, TargetKeys("tip_B0_mm", rotation=False))) as service:
-        assert service.unix().version == VERSION
-
-
-def test_a_port_that_is_taken_is_named(tmp_path):
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        sockets = SocketSettings(tcp={"port": port}, unix={"path": str(tmp_path / "s")}, valid_for_s=0.1)
-        with pytest.raises(DaemonError, match=str(port)):
-            Listeners(sockets)
+def test_gauges_are_accepted_over_the_unix_socket_alone(service):
+    assert service.tcp().ask({"class": "ACCEPT", "gauge": "all"})["code"] == "unix_only"
+    peer = service.unix()
+    assert peer.ask({"class": "ACCEPT", "gauge": "scale_1"}) == {"class": "ACCEPT", "gauges": ["scale_1.position"]}
+    assert peer.ask({"class": "ACCEPT", "gauge": "all"}) == {"class": "ACCEPT", "gauges": ["joints.1", "joints.2"]}
+    assert peer.ask({"class": "ACCEPT", "gauge": "all"}) == {"class": "ACCEPT", "gauges": []}
+    unknown = peer.ask({"class": "ACCEPT", "gauge": "scale_9"})
+    assert (unknown["code"], unknown["text"]) == ("bad_message", "no gauge scale_9; there are ")
+    for gauge in ({}, {"gauge": ""}, {"gauge": 1}):
+        assert peer.ask({"class": "ACCEPT", **gauge})["code"] == "bad_message"

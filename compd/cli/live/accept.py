@@ -1,0 +1,48 @@
+"""`compd accept`: a person has looked at a gauge that the daemon does not believe."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+
+_TIMEOUT_S = 15.0
+
+
+def accept(
+    gauges: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[GAUGE]...",
+            help="A gauge, one channel as gauge.channel, or `all`; left out: tell which are not believed, and why.",
+        ),
+    ] = None,
+    daemon: DaemonOption = DEFAULT_SOCKET,
+) -> None:
+    """Believe a gauge again that jumped or came back with another value; look at it first, and reference it."""
+    from compd.client import connect
+
+    with connect(unix_address(daemon), _TIMEOUT_S) as client:
+        for gauge in gauges or ():
+            channels = client.accept(gauge)["gauges"]
+            typer.echo(
+                f"{gauge}: {', '.join(channels)} believed again" if channels else f"{gauge}: was believed already"
+            )
+        if not gauges:
+            setpoint = next(client.watch())
+            for line in not_believed(client.status(), setpoint):
+                typer.echo(line)
+
+
+def not_believed(status: dict[str, Any], setpoint: dict[str, Any]) -> list[str]:
+    """What STATUS and SETPOINT say of gauges that are not believed, for people, with what to type."""
+    distrusted = [gauge for gauge in status["gauges"] if gauge["quality"] == "distrusted"]
+    lines = [f"{gauge['channel']}: {gauge.get('detail', 'no reason given')}" for gauge in distrusted]
+    if setpoint["state"] == "fault":
+        lines.append(f"fault: {setpoint['reason']}")
+    if not lines:
+        return ["every gauge is believed"]
+    names = list(dict.fromkeys(gauge["channel"].partition(".")[0] for gauge in distrusted))
+    return [*lines, "", "When you have looked at it:", *(f"    compd accept {name}" for name in [*names, "all"])]

@@ -1,0 +1,127 @@
+"""What only clients of the Unix socket may ask: requests that change what the daemon computes with."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Annotated, Self
+
+import structlog
+from pydantic import Field, field_validator, model_validator
+
+from compd.live.service.client_session import ClientSession
+from compd.live.service.message_keys import ModelsKeys, SentMessage
+from compd.live.service.messages import ErrorCode, ProtocolError, line
+from compd.live.service.request import Asker, Request, SendLater
+
+if TYPE_CHECKING:
+    from compd.live.service.requests import Requests
+
+# In no file's name: the null character, and halves of surrogate pairs.
+_NOT_IN_PATHS = re.compile("[\0\ud800-\udfff]")
+
+_log = structlog.get_logger()
+
+
+class AcceptKeys(SentMessage):
+    """Answers ACCEPT."""
+
+    wire_name = "ACCEPT"
+    gauges: list[str] = Field(description="channels that are believed again by it; empty where all were already")
+
+
+class AcceptRequest(Request):
+    """Makes the daemon believe a gauge again that jumped, or came back with another value.
+
+    A person asks it after looking at the gauge: what it reads from now on is taken as it is.
+    """
+
+    wire_name = "ACCEPT"
+    reply = AcceptKeys
+    asker = Asker.LOCAL
+    refusal = "gauges are accepted over the Unix socket only"
+    gauge: Annotated[str, Field(min_length=1)] = Field(description='a gauge, one channel as "gauge.channel", or "all"')
+
+    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+        try:
+            channels = list(requests.accept(self.gauge))
+        except ValueError as error:
+            raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
+        _log.warning("gauges accepted", asked=self.gauge, channels=channels, client=client.name)
+        return line({"class": self.wire_name, "gauges": channels})
+
+
+class ZeroKeys(SentMessage):
+    """Answers ZERO when machine zero has been taken."""
+
+    wire_name = "ZERO"
+    taken_at: str = Field(description="when, UTC, ISO 8601")
+    path: str = Field(description="the file in which it is kept")
+    readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
+    changed_mm: dict[str, float] | None = Field(
+        default=None,
+        description="by how much each gauge differs from the machine zero before, mm; absent where there was none",
+    )
+
+
+class ZeroRequest(Request):
+    """Takes machine zero, with the machine at rest at its zero position. The answer comes after about a second.
+
+    It does not come in turn: other answers may come before it. Where a gauge differs by more than 0.5 mm from the
+    machine zero until now, or is not believed, an error with the code `zero_differs` says so, and nothing has changed.
+    """
+
+    wire_name = "ZERO"
+    reply = ZeroKeys
+    asker = Asker.LOCAL
+    refusal = "machine zero is taken over the Unix socket only"
+    replace: bool = Field(default=False, description="true: take it whatever the machine zero before it was")
+
+    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+        requests.take_zero(self.replace, send_later)
+        return b""
+
+
+class ModelKeys(SentMessage, ModelsKeys):
+    """Answers MODEL."""
+
+    wire_name = "MODEL"
+
+
+class ModelRequest(Request):
+    """Asks which models the daemon runs with; with `file` the daemon adopts that one first.
+
+    With a file the answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
+    `model_refused` comes, and nothing has changed. An adopted model survives a crash of the loop and lasts until the
+    daemon starts anew. Only clients of the Unix socket may ask, because request and answer name files of the daemon's
+    computer.
+    """
+
+    wire_name = "MODEL"
+    reply = ModelKeys
+    asker = Asker.LOCAL
+    refusal = "models are asked for and adopted over the Unix socket only"
+    file: str = Field(
+        default="", description='absolute path of a model file to adopt, "" for none; left out: only tell the models'
+    )
+    shadow: bool = Field(default=False, description="true: compute this model's correction and do not apply it")
+
+    @field_validator("file")
+    @classmethod
+    def _absolute(cls, file: str) -> str:
+        if file and (not file.startswith("/") or _NOT_IN_PATHS.search(file)):
+            raise ValueError(f'file is {file[:200]!r}, allowed: an absolute path, or "" for none')
+        return file
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if self.model_fields_set == {"shadow"}:
+            raise ValueError("needs file, a text (shadow: true or false)")
+        return self
+
+    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+        if requests.switch_model is None:
+            raise ProtocolError(ErrorCode.UNIX_ONLY, self.refusal)
+        if self.model_fields_set:
+            requests.switch_model(self.file, self.shadow, client.user, send_later)
+            return b""
+        return line({"class": self.wire_name, **requests.models()})

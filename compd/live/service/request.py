@@ -1,0 +1,70 @@
+"""What every request of a client has: its name on the wire, its keys, who may ask, and its answer."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from compd.live.service.client_session import ClientSession
+from compd.live.service.message_keys import SentMessage
+
+if TYPE_CHECKING:
+    from compd.live.service.requests import Requests
+
+# Sends a line to the client that asked, from any thread: the answer to a request that takes time.
+SendLater = Callable[[bytes], None]
+
+
+class Asker(Enum):
+    """Which clients may send a request."""
+
+    ANYBODY = "any client"
+    CONTROLLER = "the controller, and clients of the Unix socket"
+    LOCAL = "clients of the Unix socket"
+
+
+@dataclass(frozen=True)
+class TargetKeys:
+    """Which keys TARGET has on this machine.
+
+    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate.
+    rotation : whether "rotation_B0_rad" is allowed: a hexapod's attitude is free, a tripod's follows from its tip.
+    """
+
+    tip: Literal["tip_B0_mm", "tip_P_mm"]
+    rotation: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (self.tip, "rotation_B0_rad") if self.rotation else (self.tip,)
+
+
+class Request(BaseModel):
+    """Base of all requests; the fields of a subclass are the keys of its message.
+
+    wire_name : the message's "class".  reply : the keys of its answer; None where there is none.
+    asker : who may ask.  refusal : the text of the error that anybody else gets.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    wire_name: ClassVar[str]
+    reply: ClassVar[type[SentMessage] | None] = None
+    asker: ClassVar[Asker] = Asker.ANYBODY
+    refusal: ClassVar[str] = ""
+
+    @classmethod
+    def allowed_keys(cls, requests: Requests) -> tuple[str, ...]:
+        """The keys that this machine accepts, for the error about an unknown one."""
+        return tuple(cls.model_fields)
+
+    @abstractmethod
+    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+        """Do it, on the publisher's thread, and return the answer's line; b"" where there is none or it comes later.
+
+        Raises ProtocolError where it cannot be done.
+        """

@@ -1,0 +1,35 @@
+"""A file that a command is to write: what is there already is not written over, unless compd has made it itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from compd.errors import CompdError, Problem
+
+# Enough for the head of a page.
+_HEAD_BYTES = 4096
+
+
+def check_replaceable(path: Path, marks: Sequence[bytes], what: str, overwrite: bool | None = None) -> None:
+    """Raise CompdError where a file is there that a command must not write over: a recording, or anybody's.
+
+    Parameters
+    ----------
+    path : of the file that is to be written; nothing need be there.
+    marks : what the first bytes of a file of this kind contain, any of them; () where each is a measurement of its own.
+    what : the kind, for the message: "a page of compd".
+    overwrite : whether the person wants it replaced all the same; None where the command has no such option. What is
+        no regular file is never replaced.
+    """
+    problem = None
+    if path.is_file():
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+        if head and not overwrite and not any(mark in head for mark in marks):
+            problem = f"is there already, and is not {what}" if marks else "is there already"
+    elif path.exists():
+        problem = "is not a file"
+    if problem is not None:
+        next_step = "choose another name, or " + ("remove it" if overwrite is None else "write over it: --overwrite")
+        raise CompdError(Problem(where=str(path), what=problem, next_step=next_step))
