@@ -15,7 +15,7 @@ from tests.injection.matrix import MATRIX
 # Written by `python -m tests.injection --write docs/faults.json`.
 MEASURED = Path(__file__).parent.parent / "faults.json"
 
-HEADER = ["what fails", "what must happen", "way out", "largest error", "valid", "shown after, `ok` again after"]
+HEADER = ["what fails", "what must happen, and the way out", "largest error, valid", "shown, `ok` again after"]
 
 
 @cache
@@ -80,10 +80,8 @@ def _row(case: Case) -> list[str]:
     outcome = _outcome(case)
     return [
         f"{escape(case.fault)}<br>*{escape(case.injected)}*",
-        _must(case),
-        "the service manager starts it again" if case.lost else case.way.value,
-        _number(outcome.get("worst_um"), "um", 2),
-        _number(outcome.get("valid_share", math.nan) * 100, "%", 0),
+        f"{_must(case)}<br>Way out: {'the service manager starts it again' if case.lost else case.way.value}",
+        f"{_number(outcome.get('worst_um'), 'um', 2)}, {_number(outcome.get('valid_share', math.nan) * 100, '%', 0)}",
         f"{_number(outcome.get('shown_s'), 's', 2)}, {_number(outcome.get('back_s'), 's', 2)}",
     ]
 
