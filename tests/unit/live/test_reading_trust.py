@@ -228,6 +228,23 @@ def test_silence_until_the_last_reading_is_stale_is_a_loss(shop):
     assert "came back 0.020 mm away" in shop.reading("scale_1").detail
 
 
+def test_a_gauge_that_is_accepted_while_it_is_asked_is_believed(shop):
+    """The request comes at any time, most likely in the middle of a poll."""
+    shop.poll(20)
+    shop.shows["scale_1"] = lambda _: 5.0
+    shop.poll(2)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+
+    def accepted_meanwhile(time_s: float) -> float:
+        shop.shows["scale_1"] = lambda _: 5.0
+        shop.memory.accept("scale_1")
+        return 5.0
+
+    shop.shows["scale_1"] = accepted_meanwhile
+    shop.poll(2)
+    assert shop.reading("scale_1").ok
+
+
 def test_an_absolute_gauge_needs_no_acceptance():
     shop = Shop(returns_by_itself=True)
     shop.poll(20)
