@@ -154,6 +154,7 @@ def _list_drivers() -> None:
     from compd.plugins import GAUGES, load, names
 
     table = Table("driver", "needs a line that carries", "what it is")
+    table.columns[0].no_wrap = True
     for name in names(GAUGES):
         driver = load(GAUGES, name, name)
         table.add_row(name, driver.line_kind, (driver.__doc__ or "").strip().splitlines()[0])
@@ -164,6 +165,8 @@ def _print_budgets(budgets: Sequence[LineBudget]) -> None:
     """Bytes, milliseconds and rate per line."""
     from rich.console import Console
     from rich.table import Table
+
+    from compd.report.terminal_table import keep_words_whole
 
     table = Table(
         "line",
@@ -189,7 +192,8 @@ def _print_budgets(budgets: Sequence[LineBudget]) -> None:
             f"{budget.usual_s * 1e3:.1f}" if budget.known else "?",
             _rates(budget.usual_hz, budget.ideal_hz),
         )
-    Console().print(table)
+    console = Console()
+    console.print(keep_words_whole(table, console.width))
 
 
 def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
