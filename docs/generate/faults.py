@@ -8,9 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from docs.generate.markdown import codes, escape, heading, join, table, target
+import yaml
+
+from docs.generate.markdown import codes, escape, fence, heading, join, table, target
 from tests.injection.case import Case, Way
 from tests.injection.matrix import MATRIX
+from tests.injection.rig import NOISE_UM, VOTES
 
 # Written by `python -m tests.injection --write docs/faults.json`.
 MEASURED = Path(__file__).parent.parent / "faults.json"
@@ -41,7 +44,10 @@ def _introduction() -> str:
 ... a gauge, a line, a process or a client fails. Each row of these tables is a test: an injector between the simulated
 tripod of `config/tripod-cmm.yaml` and the daemon does it to whole replies on real ports, and every setpoint that says
 `valid` is compared with the true tip of the simulated machine. The machine stands still, unless a row says that it
-drives. The columns on the right are from one run of
+drives. Its owner has added to the configuration:
+
+{fence(yaml.safe_dump({"gauges": {name: {"noise_um": um} for name, um in NOISE_UM.items()}, "votes": VOTES}), "yaml")}
+The columns on the right are from one run of
 `{measured()["command"]}` on {measured()["date"]}:
 
 - *largest error* of any setpoint that was valid, from the beginning of the fault until the state was `ok` again.

@@ -37,6 +37,14 @@ RATE_HZ = 100.0
 # For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.
 SETTLED_S = 0.3
 TRUTH_EVERY_S = 0.05
+# What an owner adds to the shipped configuration, so that the gauges are compared with each other. Of the frame's
+# comparators the noise is larger than the last digit.
+NOISE_UM = {"frame_u": 0.02, "cabinet": 0.02}
+VOTES = {
+    "joint_pair_um": 30.0,
+    "tip_mm_per_s": 200.0,
+    "frame": {"temperature": "temperature_frame_degC", "expansion_ppm_per_K": 10.5, "tolerance_um": 15.0},
+}
 MACHINE_ZERO = "machine-zero.json"
 
 
@@ -198,6 +206,9 @@ class InjectedMachine:
             "valid_for_s": 0.1,
         }
         data["state"] = {"directory": str(self.directory / "state")}
+        for gauge, noise_um in NOISE_UM.items():
+            data["gauges"][gauge]["noise_um"] = noise_um
+        data["votes"] = VOTES
         for section, values in self._changes.items():
             data.setdefault(section, {}).update(values)
         path = self.directory / "machine.yaml"

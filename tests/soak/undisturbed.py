@@ -39,6 +39,8 @@ THERMAL_STEP_S = 2.0
 DWELL_STEP_S = 0.1
 # What the devices show: a display's and a unit's last digit. Floats in registers have no step.
 STEP_MM = {"heidenhain_nd28x": 1e-4, "keyence_gt2_dlrs1a": 1e-4}
+# Of a line and a gauge; nothing fails here.
+REST_AFTER_FAULT_S, STALE_S = 0.2, 0.5
 STARTED_AT = "2026-01-01T00:00:00+00:00"
 
 
@@ -132,7 +134,7 @@ class TimeLapse:
         self.memory = length_memory(configuration, pipeline.wires)
         trust = length_trust(configuration, pipeline.wires, self.memory)
         self._polled = [
-            PolledGauge(name, gauge, self._latest, (0.5, 1.0), self._clock, trust)
+            PolledGauge(name, gauge, self._latest, REST_AFTER_FAULT_S, STALE_S, self._clock, trust)
             for name, gauge in self._gauges.items()
         ]
         self._unsolved_s = 0.0
