@@ -36,7 +36,6 @@ LATE_S, LATE_SHARE = 0.15, 0.002
 TOUR_S = REST_S = 900.0
 # While the machine rests its parts move with the temperature alone: it is enough to compute them so often, s.
 THERMAL_STEP_S = 2.0
-DWELL_STEP_S = 0.1
 # What the devices show: a display's and a unit's last digit. Floats in registers have no step.
 STEP_MM = {"heidenhain_nd28x": 1e-4, "keyence_gt2_dlrs1a": 1e-4}
 # Of a line and a gauge; nothing fails here.
@@ -188,15 +187,13 @@ class TimeLapse:
             round_s += self._chance.uniform(0.0, LATE_S)
         self._clock.now_s += round_s
         self._unsolved_s += round_s
-        world = self._world
-        rests = world.phase == "dwelling" and world.mode != "zero"
-        # on a tour not so long that the next departure is missed
-        step_s = 0.0 if not rests else DWELL_STEP_S if world.mode == "tour" else THERMAL_STEP_S
-        if self._unsolved_s >= step_s:
-            world.advance(self._unsolved_s)
+        # at rest its parts move with the temperature alone; on a tour it departs at any time
+        rests = self._world.mode == "commanded" and self._world.phase == "dwelling"
+        if self._unsolved_s >= (THERMAL_STEP_S if rests else 0.0):
+            self._world.advance(self._unsolved_s)
             self._unsolved_s = 0.0
         else:
-            world.advance(0.0)  # the gauges are read again, with other noise
+            self._world.advance(0.0)  # the gauges are read again, with other noise
 
     def _poll(self) -> None:
         """Every gauge once; a second answer where one is asked for comes after a poll's time."""
