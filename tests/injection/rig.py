@@ -206,9 +206,7 @@ class InjectedMachine:
             "valid_for_s": 0.1,
         }
         data["state"] = {"directory": str(self.directory / "state")}
-        for gauge, noise_um in NOISE_UM.items():
-            data["gauges"][gauge]["noise_um"] = noise_um
-        data["votes"] = VOTES
+        add_votes(data)
         for section, values in self._changes.items():
             data.setdefault(section, {}).update(values)
         path = self.directory / "machine.yaml"
@@ -287,6 +285,13 @@ class InjectedMachine:
                 return True
             watcher._end.wait(0.02)
         return False
+
+
+def add_votes(configuration: dict[str, Any]) -> None:
+    """Let the gauges of a configuration document be compared with each other, as far as they can."""
+    for gauge, noise_um in NOISE_UM.items():
+        configuration["gauges"][gauge]["noise_um"] = noise_um
+    configuration["votes"] = VOTES
 
 
 def _takes_zero(client: Any) -> bool:

@@ -10,9 +10,10 @@ import argparse
 import logging
 
 import structlog
+import yaml
 
 from tests.injection.matrix import MATRIX
-from tests.injection.rig import TRIPOD, InjectedMachine
+from tests.injection.rig import TRIPOD, InjectedMachine, add_votes
 from tests.soak.soak import soak
 from tests.soak.summary import unseen_ids
 from tests.soak.undisturbed import TimeLapse
@@ -43,7 +44,12 @@ def main() -> int:
 
 def _without_faults(hours: float, seed: int) -> int:
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
-    result = TimeLapse(CONFIG / TRIPOD, seed).run(hours, _say)
+    data = yaml.safe_load((CONFIG / TRIPOD).read_text())
+    add_votes(data)
+    with run_directory() as directory:
+        path = directory / TRIPOD
+        path.write_text(yaml.safe_dump(data))
+        result = TimeLapse(path, seed).run(hours, _say)
     print(result.text())
     return 1 if result.alarms else 0
 
