@@ -1,4 +1,4 @@
-"""The next measurement: the rows on which two rival effects differ most, within limits."""
+"""The next measurement: the rows on which rival effects differ most, within limits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Range: TypeAlias = tuple[float, float]
 
 def plan_measurement(
     recording: Recorded,
-    rivals: tuple[str, str],
+    rivals: Sequence[str],
     *,
     rows: int = 40,
     model: Model = None,
@@ -35,14 +35,14 @@ def plan_measurement(
     speed_mm_per_s: float | None = None,
     limits: Mapping[str, Range] | None = None,
 ) -> MeasurementPlan:
-    """Plan the rows (poses, loads, temperatures, speeds) on which two rival effects differ most.
+    """Plan the rows (poses, loads, temperatures, speeds) on which rival effects differ most.
 
     Parameters
     ----------
     recording : AlignedRecording, str or Path
-        What was measured so far; both effects are fitted on it.
-    rivals : (str, str)
-        Ids of two effects that the recording cannot tell apart, as a diagnosis names them.
+        What was measured so far; the effects are fitted on it.
+    rivals : sequence of str
+        Ids of two effects or more that the recording cannot tell apart, as a diagnosis names them.
     rows : int
         How many rows may be measured at most.
     model : ModelFile, str or Path, optional
@@ -67,13 +67,13 @@ def plan_measurement(
     Returns
     -------
     MeasurementPlan
-        The rows, and by how much the two effects will differ on them.
+        The rows, by how much the effects will differ on them, and the pairs that no rows within the limits tell apart.
 
     Raises
     ------
     CompdError
-        Where the rivals are not two different effects, or one of them is in the model already; where a limit is no
-        rising pair, negative, or for another kind of machine; where the effects cannot be fitted on this recording.
+        Where the rivals are not two different effects or more, or one of them is in the model already; where a limit is
+        no rising pair, negative, or for another kind of machine; where the effects cannot be fitted on this recording.
     RecordingError
         Where a place within the limits cannot be reached.
 
@@ -92,18 +92,18 @@ def plan_measurement(
     30 -> 36
     >>> plan.write("next.csv")
     """
-    if len(rivals) != 2 or rivals[0] == rivals[1]:
+    if len(rivals) < 2 or len(set(rivals)) < len(rivals):
         raise CompdError(
             Problem(
                 where="rivals",
-                what="needs two effects",
+                what="needs two effects or more",
                 value=",".join(rivals),
-                allowed="two different ids",
+                allowed="different ids",
                 next_step="a diagnosis names rivals",
             )
         )
     own = gather_effects(effects)
-    first, second, *others = (named_effect(name, "rivals", own) for name in (*rivals, *beside))
+    contending, others = ([named_effect(name, "rivals", own) for name in names] for names in (rivals, beside))
     aligned = opened_recording(recording)
     file = opened_model(model, aligned)
     present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in (*rivals, *beside)]
@@ -122,8 +122,8 @@ def plan_measurement(
     fitted = file.fitted
     for effect in others:
         fitted = search_constants(aligned, fitted, effect, sigma_um).fitted
-    pair = [search_constants(aligned, fitted, effect, sigma_um).fitted for effect in (first, second)]
-    return plan_fitted_rivals(aligned, pair[0][:-1], (pair[0][-1], pair[1][-1]), sigma_um, given, rows)
+    models = [search_constants(aligned, fitted, effect, sigma_um).fitted for effect in contending]
+    return plan_fitted_rivals(aligned, models[0][:-1], [model[-1] for model in models], sigma_um, given, rows)
 
 
 def _plan_limits(

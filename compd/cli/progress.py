@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Self, TypeVar
+
+if TYPE_CHECKING:
+    from compd.clock import Clock
+
+Item = TypeVar("Item")
+# A terminal that shows a number more often is not read better.
+_SHOWN_EVERY_S = 0.2
 
 
 @contextmanager
@@ -16,3 +24,38 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda said: bar.update(task, description=said)
+
+
+class ElapsedShown:
+    """How far a measurement is that takes a given time, or goes on until Ctrl-C; a context manager."""
+
+    def __init__(self, for_s: float | None, clock: Clock) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._clock = clock
+        self._console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+        columns = (BarColumn(bar_width=20), TextColumn("{task.description}"), TimeElapsedColumn())
+        self._bar = Progress(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
+        self._task = self._bar.add_task("", total=for_s)
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def say(self, text: str) -> None:
+        """Print a sentence on standard error, above the bar."""
+        self._console.print(text)
+
+    def show(self, items: Iterable[Item], so_far: Callable[[], str]) -> Iterator[Item]:
+        """The items as they come; the time and `so_far()` are shown meanwhile."""
+        start_s = shown_s = self._clock.monotonic()
+        for item in items:
+            now_s = self._clock.monotonic()
+            if now_s - shown_s >= _SHOWN_EVERY_S:
+                self._bar.update(self._task, completed=now_s - start_s, description=so_far())
+                shown_s = now_s
+            yield item

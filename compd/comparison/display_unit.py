@@ -10,13 +10,13 @@ number in um is shown as it is, with the recording's unit, and a place in mm is 
 from __future__ import annotations
 
 from compd.arrays import FloatArray
+from compd.number_text import number_text
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 
 def format_error(value: float, unit: str = "um", figures: int = 2) -> str:
     """A value with its unit, with so many figures and without powers of ten where it is large: "0.12 um", "1234 um"."""
-    text = f"{value:.{figures}g}"
-    return f"{value:.0f} {unit}" if "e+" in text else f"{text} {unit}"
+    return number_text(value, unit, figures)
 
 
 def place_unit(unit: str) -> str:

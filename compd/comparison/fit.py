@@ -22,7 +22,7 @@ Example::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +40,9 @@ from compd.errors import CompdError, Problem
 from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
 
+_LOOK_AT_FORMULA = (
+    "look at its formula: exp of a large number, a root or logarithm of a negative one, or a division by 0 has no value"
+)
 # The prediction is linear in what effects add to within 1e-5: two steps do, a tenth would mean a defect.
 STEPS = 10
 # Rounds of finding outliers: they settle in two or three.
@@ -110,7 +113,11 @@ def fit(
     if outlier is not None:
         usable = usable & ~outlier
     G_um = np.concatenate([own_um, nuisance_beside(aligned, initial, own_um, usable)], axis=2)
-    _check_rows(aligned, usable, G_um.shape[2])
+    without_value = {
+        effect.effect.id: int((aligned.usable.mask & ~np.isfinite(column).all(axis=(1, 2))).sum())
+        for effect, column in zip(initial, columns_um, strict=True)
+    }
+    _check_rows(aligned, usable, G_um.shape[2], without_value)
 
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in initial)])
     nuisance = np.zeros(G_um.shape[2] - len(theta))
@@ -154,16 +161,20 @@ def fit(
     )
 
 
-def _check_rows(aligned: AlignedRecording, usable: BoolArray, parameters: int) -> None:
+def _check_rows(
+    aligned: AlignedRecording, usable: BoolArray, parameters: int, without_value: Mapping[str, int]
+) -> None:
+    """without_value : by effect, on how many rows, which are usable but for that, it is not a finite number."""
     measured = int(usable.sum()) * len(aligned.labels)
     if measured <= parameters:
+        lacking = [f"{name} has no finite value in {rows} of them" for name, rows in without_value.items() if rows]
         raise CompdError(
             Problem(
                 where=str(aligned.recording.path),
                 what=f"{measured} measured values for {parameters} numbers to fit",
-                value=f"{int(usable.sum())} rows of {aligned.recording.rows} are usable",
+                value="; ".join([f"{int(usable.sum())} rows of {aligned.recording.rows} are usable", *lacking]),
                 allowed="more values than numbers",
-                next_step="`compd recording check` says which rows are left out",
+                next_step=_LOOK_AT_FORMULA if lacking else "`compd recording check` says which rows are left out",
             )
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 from collections.abc import Collection, Mapping
 
 from compd.errors import Problem
@@ -59,6 +61,10 @@ _GAUGE_OF_QUANTITY = {
     "humidity": "a hygrometer",
 }
 
+# `difflib` ratio above which two names are taken for spellings of one: "humdity_pct", not "force_x_N".
+_ALIKE = 0.85
+_NUMBER = re.compile(r"\d+")
+
 
 def needed_quantities(effect: Effect, links: int) -> list[str]:
     """The measured quantities that the effect needs, by their full names."""
@@ -85,7 +91,8 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
         Problem(
             where=f"effect {effect.id}",
             what=f"needs {name}, which no gauge measures",
-            next_step=_gauge_to_add(name, "kinematics" in available),
+            next_step=(name in effect.needs and _similar(name, available))
+            or _gauge_to_add(name, "kinematics" in available),
         )
         for name in _missing_quantities(effect, available, links)
     ]
@@ -135,6 +142,15 @@ def _missing_quantities(effect: Effect, available: Collection[str], links: int) 
     of_axes = {need: [need.format(axis=axis) for axis in "xyz"] for need in effect.needs if "{axis}" in need}
     enough = {name for names in of_axes.values() if any(name in available for name in names) for name in names}
     return [name for name in needed_quantities(effect, links) if name not in available and name not in enough]
+
+
+def _similar(name: str, available: Collection[str]) -> str:
+    """The available quantity that was probably meant: the name without its unit, or written otherwise; "" for none."""
+    with_unit = sorted(quantity for quantity in available if quantity.rpartition("_")[0] == name)
+    # link 2 is not a way to write link 3
+    others = [quantity for quantity in sorted(available) if _NUMBER.sub("", quantity) != _NUMBER.sub("", name)]
+    alike = with_unit or difflib.get_close_matches(name, others, n=1, cutoff=_ALIKE)
+    return f"did you mean {' or '.join(alike)}?" if alike else ""
 
 
 def _gauge_to_add(name: str, wired: bool) -> str:

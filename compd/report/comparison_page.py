@@ -13,6 +13,7 @@ from compd.comparison.comparison import Comparison
 from compd.comparison.covariates import covariates
 from compd.comparison.display_unit import format_error
 from compd.model_file import parameter_estimates
+from compd.number_text import number_text
 from compd.report.figures import (
     plot_contributions,
     plot_histogram,
@@ -187,6 +188,11 @@ def _shown(comparison: Comparison, value_um: float) -> str:
     return format_error(value_um, comparison.aligned.unit, 3)
 
 
+def _three(value: float) -> str:
+    """A value with three figures, also where the last ones are 0."""
+    return number_text(value, digits=3)
+
+
 def _floor(comparison: Comparison) -> str:
     return f"{_shown(comparison, comparison.floor.um)} ({comparison.floor.source})"
 
@@ -195,21 +201,21 @@ def _axis(comparison: Comparison, label: str) -> str:
     if label not in comparison.aligned.labels:
         return "-"
     size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
-    return f"{rms(size):.3g} / {np.quantile(size, 0.95):.3g} / {_shown(comparison, size.max())}"
+    return f"{_three(rms(size))} / {_three(np.quantile(size, 0.95))} / {_shown(comparison, size.max())}"
 
 
 def _constant(comparison: Comparison) -> str:
     """The constant of each coordinate that was fitted along; "-" for a machine in its own frame."""
     if not comparison.aligned.registration_columns.size:
         return "-"
-    return " / ".join(f"{value:.3g}" for value in comparison.constant_um) + f" {comparison.aligned.unit}"
+    return " / ".join(map(_three, comparison.constant_um)) + f" {comparison.aligned.unit}"
 
 
 def _distance(comparison: Comparison) -> str:
     if comparison.aligned.of_links or len(comparison.aligned.labels) < 3:
         return "-"
     distance = comparison.distance_um[comparison.used]
-    return f"{rms(distance):.3g} / {np.quantile(distance, 0.95):.3g} / {_shown(comparison, distance.max())}"
+    return f"{_three(rms(distance))} / {_three(np.quantile(distance, 0.95))} / {_shown(comparison, distance.max())}"
 
 
 def _without(comparison: Comparison, name: str) -> str:

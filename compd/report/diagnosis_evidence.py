@@ -20,6 +20,7 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
 from compd.report.page_table import PageTable
+from compd.report.planned_rows import planned_rows_table
 
 # Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
 YAML_WIDTH = 76
@@ -165,8 +166,15 @@ def _plain(effect: Mapping[str, Any]) -> dict[str, Any]:
 
 def next_table(diagnosis: Diagnosis) -> PageTable | None:
     """Rows to measure, or what to vary and why; None where nothing is proposed."""
-    if not diagnosis.next_measurement:
+    rows = diagnosis.next_measurement
+    if not rows:
         return None
-    names = list(dict.fromkeys(name for row in diagnosis.next_measurement for name in row))
-    rows = [[str(row.get(name, "")) for name in names] for row in diagnosis.next_measurement]
-    return PageTable(names, rows)
+    if all("measure" in row for row in rows):
+        return PageTable(("measure", "why"), [(str(row["measure"]), str(row.get("why", ""))) for row in rows])
+    return planned_rows_table(rows)
+
+
+def plan_command(diagnosis: Diagnosis, step: DiagnosisStep) -> str:
+    """The command that plans the rows which tell a step from all its rivals."""
+    names = ",".join([step.effect.id, *(rival.name for rival in step.rivals)])
+    return f"compd plan {diagnosis.before.aligned.recording.path} --rivals {names} --rows 40 --out next.csv"

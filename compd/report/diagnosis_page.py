@@ -126,6 +126,7 @@ def _table_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     if untested.rows:
         panels.append(Panel("Effects that these rows cannot test", "", untested))
     if coming is not None:
-        rows = "Rows that tell the most, in any order." if "measure" not in coming.head else ""
-        panels.append(Panel("What to measure next", rows, coming))
+        planned = "measure" not in coming.head
+        text = f"Rows that tell the most. {coming.caption}".rstrip() if planned else ""
+        panels.append(Panel("What to measure next", text, coming))
     return panels

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
@@ -13,17 +14,21 @@ from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.summary_lines import WIDTH, summary_lines
+from compd.recording.plan_file import PURPOSE_COLUMN
 from compd.report.diagnosis_evidence import (
     candidates_table,
     constant_table,
     findings_table,
     formula_list,
     gross_rows_text,
+    next_table,
+    plan_command,
     step_rows,
     untested_table,
     without_gain,
 )
 from compd.report.page_table import PageTable
+from compd.report.terminal_table import keep_words_whole
 
 # Findings that are listed; --json has them all.
 SHOWN = 8
@@ -95,16 +100,18 @@ def _print_next(console: Console, diagnosis: Diagnosis) -> None:
     if not diagnosis.next_measurement:
         return
     _heading(console, "Next")
-    for row in diagnosis.next_measurement:
-        if "measure" in row:
+    planned = not any("measure" in row for row in diagnosis.next_measurement)
+    table = next_table(diagnosis)
+    if planned and table is not None:
+        _print_planned_rows(console, table)
+        if table.caption:
+            _paragraph(console, table.caption)
+    else:
+        for row in diagnosis.next_measurement:
             _paragraph(console, f"{row['measure']}: {row['why']}" if row.get("why") else str(row["measure"]))
-        else:
-            console.print(Text("    " + ", ".join(f"{name} {value}" for name, value in row.items())), soft_wrap=True)
-    path = diagnosis.before.aligned.recording.path
     for step in diagnosis.steps:
-        if step.rivals and any("measure" not in row for row in diagnosis.next_measurement):
-            pair = f"{step.effect.id},{step.rivals[0].name}"
-            console.print(Text(f"    more: compd plan {path} --rivals {pair} --rows 40"), soft_wrap=True)
+        if step.rivals and planned:
+            console.print(Text(f"    more: {plan_command(diagnosis, step)}"), soft_wrap=True)
 
 
 def _heading(console: Console, text: str) -> None:
@@ -126,12 +133,26 @@ def _print_pairs(console: Console, pairs: Iterable[Sequence[str]]) -> None:
     console.print(Padding(grid, (0, 0, 0, 4)))
 
 
+def _print_planned_rows(console: Console, table: PageTable) -> None:
+    """A purpose only in the first of its rows."""
+    shown = Table(*table.head, box=SIMPLE_HEAD)
+    for column, name in zip(shown.columns, table.head, strict=True):
+        column.justify = "left" if name == PURPOSE_COLUMN else "right"
+    last = ""
+    for row in table.rows:
+        cells = dict(zip(table.head, row, strict=True))
+        purpose = cells.get(PURPOSE_COLUMN, "")
+        if PURPOSE_COLUMN in cells and purpose == last:
+            cells[PURPOSE_COLUMN] = ""
+        last = purpose
+        shown.add_row(*map(Text, cells.values()))
+    console.print(keep_words_whole(shown, console.width))
+
+
 def _print_table(console: Console, table: PageTable) -> None:
     shown = Table(*table.head)
     for column, is_numeric in zip(shown.columns, table.numeric, strict=True):
         column.justify = "right" if is_numeric else "left"
-    # an id is to be copied whole; a sentence leaves room for the other columns
-    shown.columns[0].no_wrap = not any(" " in row[0] for row in table.rows)
     for row in table.rows:
         shown.add_row(*(Text(cell) for cell in row))
-    console.print(shown)
+    console.print(keep_words_whole(shown, console.width))

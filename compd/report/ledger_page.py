@@ -10,6 +10,7 @@ from plotly.graph_objects import Figure, Scatter
 
 from compd.comparison.display_unit import format_error
 from compd.model_document import StoredModel
+from compd.number_text import number_text
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
 
@@ -51,9 +52,9 @@ def ledger_rows(model: StoredModel) -> list[list[str]]:
             str(k),
             f"{step.kind} {step.effect}".rstrip() + (" (undone)" if step.undone else ""),
             step.recording,
-            f"{step.rms_before_um:.3g}",
-            f"{step.rms_after_um:.3g}",
-            f"{step.noise_floor_um:.3g}",
+            number_text(step.rms_before_um, digits=3),
+            number_text(step.rms_after_um, digits=3),
+            number_text(step.noise_floor_um, digits=3),
             step.unit,
             step.date[:10],
         ]

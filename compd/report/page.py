@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -22,6 +23,7 @@ from plotly.offline import get_plotlyjs
 
 from compd.errors import CompdError, Problem
 from compd.output_file import check_replaceable
+from compd.release import __version__
 from compd.report.page_table import PageTable
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
@@ -78,12 +80,13 @@ def check_page_path(path: Path, overwrite: bool | None = None) -> None:
 def write_page(
     path: Path, title: str, verdict: str | PageText, panels: Sequence[Panel], footer: str, shared_script: bool = False
 ) -> None:
-    """Write the page to `path`; all texts are escaped.
+    """Write the page to `path`; all texts are escaped. Its footer ends with the date and the release of compd.
 
     verdict : a sentence or two, or lines.
-    shared_script : plotly's script (4.8 MB) is inside the page, which is then a single file. True writes it to
-    SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
+    shared_script : plotly's script (4.8 MB) is inside a page with figures, which is then a single file. True writes it
+    to SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
     """
+    has_figure = any(isinstance(panel.content, Figure) for panel in panels)
     if shared_script:
         path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
@@ -100,9 +103,9 @@ def write_page(
             }
             for number, panel in enumerate(panels)
         ],
-        footer=footer,
-        shared_script=SHARED_SCRIPT if shared_script else "",
-        plotly_script="" if shared_script else get_plotlyjs(),
+        footer=f"{footer} Written on {datetime.now(UTC):%Y-%m-%d} by compd {__version__}.".strip(),
+        shared_script=SHARED_SCRIPT if shared_script and has_figure else "",
+        plotly_script=get_plotlyjs() if has_figure and not shared_script else "",
     )
     path.write_text(page, encoding="utf-8")
 

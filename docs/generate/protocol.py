@@ -33,7 +33,8 @@ _NAMES_OF_TYPES |= {"d": "float64"}
 INTRODUCTION = f"""\
 The daemon listens on TCP ({TcpSocket().host}:{TcpSocket().port} unless [configured](#configuration-sockets) otherwise)
 and on a Unix socket (`sockets.unix.path`). Both speak the same protocol, version {PROTOCOL}: one JSON object per line,
-UTF-8, ended by `\\n`. Every message has its name under the key `class`. Any language that opens a socket and reads JSON
+UTF-8, ended by `\\n`. An empty line is ignored; an object in which a key stands twice is an error. Every message has
+its name under the key `class`. Any language that opens a socket and reads JSON
 will do; in Python, [`compd.client`](python.md) does it for you.
 [Connect a controller](../how-to/connect-a-controller.md) goes from the first line to the corrected drive command.
 

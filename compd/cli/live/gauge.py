@@ -35,12 +35,15 @@ def list_gauges() -> None:
     from rich.table import Table
 
     from compd.commissioning.catalogue import catalogue
+    from compd.report.terminal_table import keep_words_whole
 
-    table = Table("driver", "line carries", "what it is", "options it needs", "simulated")
-    for entry in catalogue():
-        options = ", ".join(entry.needed_options)
-        table.add_row(entry.name, entry.line_kind, entry.title, options, "yes" if entry.simulated else "no")
-    Console().print(table)
+    entries = catalogue()
+    table = Table("driver", "line carries", "what it is", "options it needs")
+    for entry in entries:
+        title = entry.title if entry.simulated else f"{entry.title} Not simulated."
+        table.add_row(entry.name, entry.line_kind, title, ", ".join(entry.needed_options))
+    console = Console()
+    console.print(keep_words_whole(table, console.width))
     typer.echo("An unknown gauge: `compd gauge learn`; docs/how-to/describe-a-gauge.md says the rest.")
 
 
@@ -51,14 +54,16 @@ def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge
     from rich.markup import escape
     from rich.table import Table
 
+    from compd.cli.reflow import reflowed
     from compd.commissioning.catalogue import driver_description
 
     description = driver_description(name)
     console = Console()
-    console.print(description.text, markup=False)
+    console.print(reflowed(description.text), markup=False, highlight=False)
     table = Table("option", "needed", "meaning", title="Options", title_justify="left")
+    table.columns[0].no_wrap = True
     for option in description.options:
-        needed = "yes" if option.needed else f"no: {option.default}"
+        needed = "yes" if option.needed else "no" if option.default == "None" else f"no: {option.default}"
         table.add_row(option.name, escape(needed), escape(option.meaning))
     console.print(table)
 
@@ -168,6 +173,12 @@ def learn(
     error: Annotated[
         list[str] | None, typer.Option(help="An error reply and its quality: 'ERR0=sensor_fault'.")
     ] = None,
+    ignore: Annotated[
+        str, typer.Option(help="Letters and signs that vary beside a number and do not touch its value: 'UGLE'.")
+    ] = "",
+    decimals: Annotated[
+        int | None, typer.Option(min=1, help="Decimals that the display shows, where more digits follow.")
+    ] = None,
     to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
@@ -191,7 +202,7 @@ def learn(
         reply_text, _, quality = assignment.partition("=")
         errors[reply_text.encode("latin-1")] = quality
     channels = [name.strip() for name in names.split(",") if name.strip()]
-    description, values = learn_gauge(request, captured, unit, channels, errors)
+    description, values = learn_gauge(request, captured, unit, channels, errors, ignore, decimals)
     for reply, value in zip(captured, values, strict=True):
         typer.echo(f"# {reply!r} -> {value}")
     for note in description.notes:

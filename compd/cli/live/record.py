@@ -39,9 +39,14 @@ def record(
         WhenFull, typer.Option(help="At the limit: end the recording, or delete its oldest part and say so.")
     ] = WhenFull.STOP,
 ) -> None:
-    """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs."""
+    """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs.
+
+    When the daemon ends and starts again, the recording goes on in a new part.
+    """
+    from compd.cli.progress import ElapsedShown
     from compd.client import connect
     from compd.clock import MonotonicClock
+    from compd.live.record.readings_feed import ReadingsFeed
     from compd.live.record.recorder import Recorder, RecordingLimits
 
     keeping = RecordingLimits(
@@ -49,19 +54,22 @@ def record(
     )
     for_s = burst if burst is not None else seconds
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with connect(unix_address(address), max(_TIMEOUT_S, 3 / rate_hz)) as client:
-        lines = client.readings(None if burst is not None else rate_hz)
-        _, watch = next(lines)
-        recorder = Recorder(
-            name, client.version, watch, keeping, lambda text: typer.echo(text, err=True), MonotonicClock()
+    clock, socket_path = MonotonicClock(), unix_address(address)
+    with ElapsedShown(for_s, clock) as shown:
+        feed = ReadingsFeed(
+            lambda: connect(socket_path, max(_TIMEOUT_S, 3 / rate_hz)),
+            None if burst is not None else rate_hz,
+            shown.say,
+            clock,
         )
+        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock)
         recorder.start()
         try:
-            recorder.follow(lines, for_s)
+            recorder.follow(shown.show(feed.messages(for_s), lambda: f"{recorder.rows} rows"))
         except KeyboardInterrupt:
             pass  # the usual end
         finally:
             try:
                 recorder.close()
             finally:
-                typer.echo(recorder.summary(), err=True)
+                shown.say(recorder.summary())

@@ -19,19 +19,13 @@ def replay(
 ) -> None:
     """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
 
-    Exit code 1 when one differs.
+    Exit code 1 when one differs, or when rows of the CSV have no cycle.
     """
     from compd.configuration import load
     from compd.live.record.replay import RecordedCycles, ReplayedCycle, replay_cycles
 
     configuration = load(machine)
     transcripts = RecordedCycles(name)
-    if others := transcripts.config_hashes() - {configuration.config_hash}:
-        typer.echo(
-            f"warning: recorded with another configuration ({', '.join(sorted(others))}, this is "
-            f"{configuration.config_hash}): setpoints may differ by that",
-            err=True,
-        )
     cycles = differing = 0
     first: ReplayedCycle | None = None
     for cycle in replay_cycles(configuration, transcripts, model or ()):
@@ -43,10 +37,20 @@ def replay(
             typer.echo(cycle.replayed, nl=False)
     if transcripts.torn_lines:
         typer.echo(f"{transcripts.torn_lines} torn line at the end left out: the recorder was killed", err=True)
+    lacking = transcripts.rows_without_cycle()
+    for table, rows in lacking.items():
+        typer.echo(f"{table}: {rows} rows have no cycle beside them, and cannot be replayed", err=True)
+    others = transcripts.config_hashes() - {configuration.config_hash}
+    another = f"recorded with another configuration ({', '.join(sorted(others))}, this is {configuration.config_hash})"
     if first is None:
-        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent", err=True)
+        same = f", though {another}" if others else ""
+        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent{same}", err=True)
+        if lacking:
+            raise typer.Exit(1)
         return
     typer.echo(f"{differing} of {cycles} setpoints differ; the first is tick {first.tick}, {first.where}", err=True)
     typer.echo(f"    sent     {first.sent.decode().rstrip()}", err=True)
     typer.echo(f"    replayed {first.replayed.decode().rstrip()}", err=True)
+    if others:
+        typer.echo(another, err=True)
     raise typer.Exit(1)

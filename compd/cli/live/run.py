@@ -8,14 +8,19 @@ from typing import Annotated
 import typer
 
 from compd.cli.loading import loading
+from compd.cli.waiting import wait_for_file
 
 
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
-    """Run the daemon: read the gauges, compute, publish, until SIGTERM or Ctrl-C."""
+    """Run the daemon: read the gauges, compute, publish, until SIGTERM or Ctrl-C.
+
+    A configuration that is not there yet is waited for, for half a minute: `compd simulate` may be about to write it.
+    """
     with loading():
         from compd.live.run import run as run_daemon
         from compd.machine_check import load_whole
 
+        wait_for_file(config)
         configuration = load_whole(config)
     failed = run_daemon(configuration)
     if failed:

@@ -15,7 +15,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compd.cli.options import unix_address
+from compd.cli.waiting import connect_patiently
 from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.clock import Clock, MonotonicClock
 from compd.errors import CompdError
@@ -23,6 +23,10 @@ from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
+# A full bar is the largest correction, but never less than this: noise is no bar.
+_LEAST_FULL_BAR_MM = 1e-3
+# Sources of the correction in the table of the links; every other is an effect, with a row of its own.
+_OWN_COLUMN = ("joints", "frame")
 _STATUS_EVERY_S = 1.0
 # Setpoints that are read, so that a silence is noticed before the eye would; up to three periods may pass without one.
 _LEAST_RATE_HZ = 40.0
@@ -44,8 +48,7 @@ def watch(
 ) -> None:
     """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
     token = None if token_file is None else token_file.read_text(encoding="utf-8")
-    address = unix_address(address)
-    with connect(address, token=token) as client:
+    with connect_patiently(address, lambda path: connect(path, token=token)) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)
@@ -147,7 +150,8 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
     clock = MonotonicClock()
     newest = NewestSetpoint(client, rate_hz, clock, same_clock)
     shown, due_s = 0, clock.monotonic()
-    with Live(console=Console(), auto_refresh=False) as live:
+    console = Console()
+    with Live(console=console, auto_refresh=False) as live:
         try:
             while not count or shown < count:
                 newest.wait(min(1 / rate_hz, _LOOK_EVERY_S))
@@ -162,6 +166,8 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
             raise
         finally:
             newest.end()
+    if not console.is_terminal:
+        console.print()  # `Live` leaves the last line open
 
 
 def view(
@@ -184,11 +190,12 @@ def view(
         parts.append(Text(setpoint["reason"], style=state_colour(setpoint["state"])))
     if setpoint["valid"] and state_named(setpoint["state"]) is not None:
         parts += [_position(setpoint), _corrections(setpoint)]
+        if any(name not in _OWN_COLUMN for name in setpoint["sources_mm"]):
+            parts.append(_effects(setpoint))
     parts.append(_loop(status))
     if ended := _ended_processes(status):
         parts.append(Text(f"started anew: {ended}", style="yellow"))
-    if lost := [gauge for gauge in status["gauges"] if gauge["quality"] != "ok"]:
-        parts.append(Text("not good: " + ", ".join(f"{g['channel']} {g['quality']}" for g in lost), style="red"))
+    parts += [Text(f"not good: {text}", style="red") for text in lost_gauges(status["gauges"])]
     return Group(*parts)
 
 
@@ -214,31 +221,59 @@ def _headline(version: dict[str, Any], setpoint: dict[str, Any]) -> Text:
 def _position(setpoint: dict[str, Any]) -> Table:
     table = Table("", "x", "y", "z", box=None, pad_edge=False)
     tip = "tip_P_mm" if "tip_P_mm" in setpoint else "tip_M_mm"
-    table.add_row(f"{tip.removesuffix('_mm')}, mm", *(f"{value:12.5f}" for value in setpoint[tip]))
+    table.add_row(f"{tip.removesuffix('_mm')}, mm", *(f"{value + 0.0:12.5f}" for value in setpoint[tip]))
     frame = setpoint["frame"]
-    table.add_row("frame moved, um", *(f"{value * UM_PER_MM:12.2f}" for value in frame["displacement_M_mm"]))
-    table.add_row("frame turned, urad", *(f"{value * 1e6:12.2f}" for value in frame["rotation_M_rad"]))
+    table.add_row(
+        "frame moved, um", *(f"{_hundredths(value * UM_PER_MM):12.2f}" for value in frame["displacement_M_mm"])
+    )
+    table.add_row("frame turned, urad", *(f"{_hundredths(value * 1e6):12.2f}" for value in frame["rotation_M_rad"]))
     return table
 
 
 def _corrections(setpoint: dict[str, Any]) -> Table:
-    sources = setpoint["sources_mm"]
+    """One row per link, with the sources that every machine may have."""
+    sources = {name: values for name, values in setpoint["sources_mm"].items() if name in _OWN_COLUMN}
     corrections = setpoint["correction_mm"]
     table = Table(
         "link", "length, mm", "correction, um", "", *(f"{name}, um" for name in sources), box=None, pad_edge=False
     )
     for column in table.columns[:3] + table.columns[4:]:
         column.justify = "right"
-    largest = max(map(abs, corrections))
+    largest_mm = max(_LEAST_FULL_BAR_MM, *map(abs, corrections))
     for i, correction in enumerate(corrections):
         table.add_row(
             str(i + 1),
             f"{setpoint['link_length_mm'][i]:.5f}",
-            f"{correction * UM_PER_MM:+.2f}",
-            bar(correction, largest),
-            *(f"{values[i] * UM_PER_MM:+.2f}" for values in sources.values()),
+            _signed_um(correction),
+            bar(correction, largest_mm),
+            *(_signed_um(values[i]) for values in sources.values()),
         )
     return table
+
+
+def _effects(setpoint: dict[str, Any]) -> Table:
+    """One row per effect of the model: its name is whole however many links there are."""
+    links = range(1, len(setpoint["correction_mm"]) + 1)
+    table = Table(
+        "effect, um", *(f"link {number}" for number in links), box=None, pad_edge=False, collapse_padding=True
+    )
+    table.columns[0].overflow = "fold"
+    for column in table.columns[1:]:
+        column.justify = "right"
+        column.no_wrap = True
+    for name, values in setpoint["sources_mm"].items():
+        if name not in _OWN_COLUMN:
+            table.add_row(name, *map(_signed_um, values))
+    return table
+
+
+def _signed_um(value_mm: float) -> str:
+    return f"{_hundredths(value_mm * UM_PER_MM):+.2f}"
+
+
+def _hundredths(value: float) -> float:
+    """Rounded to two decimals; never -0."""
+    return round(value, 2) + 0.0
 
 
 def bar(value: float, largest: float) -> Text:
@@ -249,20 +284,41 @@ def bar(value: float, largest: float) -> Text:
     return Text((left if value < 0 else " " * half) + "│" + (right if value >= 0 else " " * half), style="cyan")
 
 
+def lost_gauges(gauges: Sequence[dict[str, Any]]) -> list[str]:
+    """One text for all channels of a gauge that are not good for the same reason: "joints: line_lost (all 9)"."""
+    channels: dict[str, list[str]] = {}
+    lost: dict[tuple[str, str], list[str]] = {}
+    for entry in gauges:
+        gauge, _, channel = entry["channel"].partition(".")
+        channels.setdefault(gauge, []).append(channel)
+        if entry["quality"] != "ok":
+            lost.setdefault((gauge, entry["quality"]), []).append(channel)
+    texts = []
+    for (gauge, quality), names in lost.items():
+        if len(names) > 1 and names == channels[gauge]:
+            texts.append(f"{gauge}: {quality} (all {len(names)})")
+        else:
+            texts.append(f"{', '.join(f'{gauge}.{name}' for name in names)}: {quality}")
+    return texts
+
+
 def _loop(status: dict[str, Any]) -> Text:
     loop = status["loop"]
     parts: Sequence[str] = [
         f"loop {loop['rate_hz']:g} Hz",
         f"{loop['missed_cycles']} missed",
-        f"period {loop['period_mean_ms']:.4f} ± {loop['period_deviation_ms']:.4f} ms"
+        f"period {loop['period_mean_ms']:.3f} ± {loop['period_deviation_ms']:.3f} ms"
         if "period_mean_ms" in loop
         else "",
+    ]
+    times: Sequence[str] = [
         f"late {loop['lateness_median_us']:g} us (p99 {loop['lateness_p99_us']:g})"
         if "lateness_median_us" in loop
         else "",
         f"cycle {loop['cycle_median_us']:g} us" if "cycle_median_us" in loop else "",
     ]
-    return Text(", ".join(filter(None, parts)), style="dim")
+    lines = [", ".join(filter(None, texts)) for texts in (parts, times)]
+    return Text("\n".join(filter(None, lines)), style="dim")
 
 
 def _ended_processes(status: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, unix_address
+from compd.cli.options import DEFAULT_SOCKET
 from compd.units import UM_PER_MM
 
 # The daemon looks at the gauges for a second; a slow disk may take as long again.
@@ -24,11 +24,16 @@ def zero(
         bool, typer.Option("--yes", help="Do not ask where a gauge is far from the zero before, or not believed.")
     ] = False,
 ) -> None:
-    """Take machine zero: bring the machine to its zero position, let it stand still, then run this."""
+    """Take machine zero: bring the machine to its zero position, let it stand still, then run this.
+
+    A daemon that is about to start, and gauges that have no value yet, are waited for, for half a minute.
+    """
+    from compd.cli.waiting import connect_patiently, wait_for_gauges
     from compd.client import connect
     from compd.errors import DaemonError
 
-    with connect(unix_address(address), _TIMEOUT_S) as client:
+    with connect_patiently(address, lambda path: connect(path, _TIMEOUT_S)) as client:
+        wait_for_gauges(client)
         try:
             answer = client.zero(replace=yes)
         except DaemonError as error:

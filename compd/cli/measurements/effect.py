@@ -156,6 +156,7 @@ def _finish(
 
     from compd.api.diagnosis import compare
     from compd.comparison.display_unit import format_error
+    from compd.report.terminal_table import keep_words_whole
 
     if dry_run:
         done = f"not written: would have {done}"
@@ -179,7 +180,7 @@ def _finish(
             number.unit,
             "" if number.searched else plausible + ("" if number.plausible else ": [red]outside[/]"),
         )
-    console.print(table)
+    console.print(keep_words_whole(table, console.width))
     typer.echo(after.verdict)
 
 

@@ -9,6 +9,10 @@ import typer
 
 from compd.cli.options import OverwriteOption
 
+_BAR_WIDTH = 16
+# Two spaces and a line.
+_CELL_FRAME = 3
+
 
 def ledger(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="The model file.")],
@@ -22,6 +26,7 @@ def ledger(
     from compd.model_document import read_stored
     from compd.report.ledger_page import LEDGER_HEAD, ledger_rows, write_ledger_page
     from compd.report.page import check_page_path
+    from compd.report.terminal_table import keep_words_whole
 
     stored = read_stored(model)
     steps = stored.steps
@@ -29,15 +34,21 @@ def ledger(
     if not steps:
         console.print(f"{model}: no step yet; `compd effect add` makes the first")
         return
+    units = {step.unit for step in steps}
+    shown = [k for k, name in enumerate(LEDGER_HEAD) if name != "unit" or len(units) > 1]
+    title = f"{model}: {stored.machine}" + (f"; residuals in {steps[0].unit}" if len(units) == 1 else "")
+    columns = [[row[k] for row in ledger_rows(stored)] for k in shown]
+    heads = [LEDGER_HEAD[k] for k in shown]
     largest = max(max(step.rms_before_um, step.rms_after_um) for step in steps)
-    table = Table(*LEDGER_HEAD, "", title=f"{model}: {stored.machine}", title_justify="left")
-    for column in table.columns[1:3]:
-        column.overflow = "fold"  # names are to be copied whole
-    for column in table.columns[3:-1]:
-        column.no_wrap = True  # no number, unit or date is cut
-    for row, step in zip(ledger_rows(stored), steps, strict=True):
-        table.add_row(*row, "#" * max(1, round(16 * step.rms_after_um / largest)))
-    console.print(table)
+    bars = ["#" * max(1, round(_BAR_WIDTH * step.rms_after_um / largest)) for step in steps]
+    widths = [max(map(len, [head, *texts])) for head, texts in zip(heads, columns, strict=True)]
+    if sum(widths) + _CELL_FRAME * len(widths) + _BAR_WIDTH + _CELL_FRAME < console.width:
+        heads.append("")
+        columns.append(bars)
+    table = Table(*heads, title=title, title_justify="left")
+    for cells in zip(*columns, strict=True):
+        table.add_row(*cells)
+    console.print(keep_words_whole(table, console.width))
     if html is not None:
         check_page_path(html, overwrite)
         write_ledger_page(html, stored)

@@ -13,7 +13,7 @@ from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 def plan(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv.")],
-    rivals: Annotated[str, typer.Option(help="Two effects, by id: A,B.")],
+    rivals: Annotated[str, typer.Option(help="Two effects or more, by id: A,B,C.")],
     rows: Annotated[int, typer.Option(min=2, help="How many rows may be measured.")] = 40,
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
     machine: MachineOption = None,
@@ -46,20 +46,22 @@ def plan(
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Plan the rows (poses, loads, temperatures, speeds, other settings) on which two rival effects differ most."""
+    """Plan the rows (poses, loads, temperatures, speeds, other settings) on which rival effects differ most.
+
+    Of three rivals or more, those that no rows within the limits tell apart are named.
+    """
     from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
     from compd.output_file import check_replaceable
     from compd.recording.plan_file import PURPOSE_COLUMN
 
-    first, second = _pair(rivals)
     if out is not None:
         check_replaceable(out, (f"{PURPOSE_COLUMN},".encode(),), "a plan", overwrite)
     box = None if workspace is None else _numbers("--workspace", workspace, 6)
     heat = None if temperature is None else _numbers("--temperature", temperature, 2)
     planned = plan_measurement(
         open_recording(recording, machine),
-        (first, second),
+        [name.strip() for name in rivals.split(",")],
         rows=rows,
         model=model,
         effects=effects or (),
@@ -75,24 +77,6 @@ def plan(
     else:
         planned.write(out)
     typer.echo(f"{planned.summary}\n{planned.instructions}", err=out is None)
-
-
-def _pair(text: str) -> tuple[str, str]:
-    """The two names in A,B. Raises CompdError where there are not two."""
-    from compd.errors import CompdError, Problem
-
-    names = [name.strip() for name in text.split(",")]
-    if len(names) != 2:
-        raise CompdError(
-            Problem(
-                where="--rivals",
-                what="needs two effects",
-                value=text,
-                allowed="A,B",
-                next_step="`compd diagnose` names rivals",
-            )
-        )
-    return names[0], names[1]
 
 
 def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:

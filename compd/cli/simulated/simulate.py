@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from compd.simulation.wires.server import Simulation
 
 LOOK_EVERY_S = 0.25
-SEALED = "hidden.answer.json"
 
 
 def simulate(
@@ -50,6 +49,9 @@ def simulate(
     Without a plan it visits points for ever. With one it visits them once, so that `compd join` finds the clocks,
     then goes through the plan's rows: sets the load, holds parts and room as planned, comes from the planned side,
     waits (--speedup takes that much of it away), dwells; then it stands still.
+
+    `compd fault` breaks a line of it. At the end the daemon's configuration, ports, sockets and machine zero are
+    removed; only the sealed answer of --hidden stays, until the next machine is simulated there.
     """
     import contextlib
     import math
@@ -68,6 +70,7 @@ def simulate(
     from compd.simulation.truth.strengths import FULLY_MEASURED
     from compd.simulation.truth.world import World
     from compd.simulation.wires.server import Simulation
+    from compd.simulation.wires.simulation_directory import SEALED_ANSWER
 
     configuration = load(config)
     measured = [quantity.name for quantity in configuration.wiring.quantities]
@@ -84,7 +87,7 @@ def simulate(
         rows=rows,
     )
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: stop.set())
     clock = MonotonicClock()
     console = Console()
@@ -94,9 +97,9 @@ def simulate(
         directory.mkdir(parents=True, exist_ok=True)
         simulation = Simulation(configuration, world, directory.resolve(), clock)
         stack.callback(simulation.stop)
-        if sized:
-            write_answer(directory / SEALED, sized, [], seed)
         daemon = simulation.start()
+        if sized:
+            write_answer(directory / SEALED_ANSWER, sized, [], seed)
         console.print(_lines(simulation))
         console.print(_next_commands(simulation, daemon), highlight=False, soft_wrap=True)
         done = not rows
@@ -148,7 +151,9 @@ def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
         f"    compd run {daemon.path}\n"
         f"    compd zero {daemon.sockets.unix.path}    (it stands at machine zero for the next {hold_s:.0f} s)\n"
         f"    compd watch {daemon.sockets.unix.path}\n"
-        f"Truth, a laser tracker, commands and faults: {simulation.directory / 'control.sock'}. Ctrl-C ends."
+        f"    compd tracker {simulation.directory} --out track.csv    (a laser tracker looks at the tip)\n"
+        f"    compd fault {simulation.directory} LINE FAULT    (breaks a line; without LINE: which, and how)\n"
+        f"Truth and commands: {simulation.directory / 'control.sock'}. Ctrl-C ends, and removes what is there."
     )
 
 

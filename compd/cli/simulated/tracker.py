@@ -29,7 +29,10 @@ def tracker(
     """
     import numpy as np
 
+    from compd.cli.progress import ElapsedShown
+    from compd.cli.waiting import connect_patiently
     from compd.client import connect
+    from compd.clock import MonotonicClock
     from compd.errors import CompdError, Problem
     from compd.output_file import check_replaceable
     from compd.simulation.wires.control_client import ControlClient
@@ -40,14 +43,16 @@ def tracker(
         )
     check_replaceable(out, (), "an export", overwrite)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    looks, apart_mm, at_rest = [], [], 0
+    looks: list[list[float]] = []
+    apart_mm, at_rest = [], 0
     with (
         ControlClient(simulation / "control.sock") as machine,
-        connect(simulation / "compd.sock", _ANSWER_TIMEOUT_S) as daemon,
+        connect_patiently(str(simulation / "compd.sock"), lambda path: connect(path, _ANSWER_TIMEOUT_S)) as daemon,
+        ElapsedShown(seconds, MonotonicClock()) as shown,
     ):
         typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")
         try:
-            for setpoint in daemon.watch(rate_hz):
+            for setpoint in shown.show(daemon.watch(rate_hz), lambda: f"{len(looks)} looks"):
                 seen = machine.ask("MEASURE")
                 looks.append([seen["monotonic_s"], *seen["reference_mm"]])
                 at_rest = 0 if seen["moving"] else at_rest + 1

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
+from compd.number_text import join_words
 from compd.recording.plan_file import NOT_SET, plan_text, write_plan_file
 from compd.tables import Columns, data_frame, html_table
 
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 LEAST_SEPARATION = 3.0
 # Standard deviations that the rows have to add to what was measured: the noise itself moves the difference by one.
 LEAST_GAIN = 1.0
+# The way on where nothing tells rivals apart.
+_EITHER = (
+    "Within the limits they correct alike: either may be added to the model and used there. Which of the two it is "
+    "stays open."
+)
 # A smaller one is rounding.
 LEAST_SHOWN = 0.01
 # A column with more values is told by its range.
@@ -45,6 +51,8 @@ class MeasurementPlan:
         The same on the recording alone.
     separated_by : str
         What tells the rivals apart, in words, should these rows not.
+    alike : tuple of pairs of str
+        Of three rivals or more, the pairs that no rows within the limits tell apart; the rows are for the others.
     """
 
     rivals: tuple[str, ...]
@@ -52,6 +60,7 @@ class MeasurementPlan:
     separation: float
     before: float
     separated_by: str = ""
+    alike: tuple[tuple[str, str], ...] = ()
 
     @property
     def tells_apart(self) -> bool:
@@ -63,10 +72,15 @@ class MeasurementPlan:
         """What the rows are good for, in a sentence or two."""
         *others, last = self.rivals
         subject, by = (f"{', '.join(others)} and {last} differ", "by") if others else (f"{last} is seen", "at")
+        least = f"{by} at least" if len(others) > 1 else by
+        except_alike = ", but for those named below," if self.alike and self.rows else ""
         text = (
-            f"{subject} {by} {as_factor(self.before)} times the noise on what was measured, {by} "
+            f"{subject}{except_alike} {least} {as_factor(self.before)} times the noise on what was measured, {least} "
             f"{as_factor(self.separation)} times with these {len(self.rows)} rows."
         )
+        if self.alike:
+            pairs = join_words([f"{first} from {second}" for first, second in self.alike], "or")
+            text += f" No rows within the limits tell {pairs}. {_EITHER}"
         if self.tells_apart:
             return text
         if self.separation < LEAST_SHOWN:
@@ -75,7 +89,8 @@ class MeasurementPlan:
             text += f" That does not tell them apart, which takes {LEAST_SEPARATION:.2g} times."
         else:
             text += " These rows add little."
-        return f"{text} Widen the limits, or measure otherwise: {self.separated_by}."
+        text += f" Widen the limits, or measure otherwise: {self.separated_by}."
+        return text if self.separation >= LEAST_SEPARATION or self.alike else f"{text} {_EITHER}"
 
     @property
     def instructions(self) -> str:

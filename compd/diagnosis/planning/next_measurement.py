@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import permutations
+from dataclasses import replace
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -28,18 +29,19 @@ EXPECTED_SIZE = 0.5
 def plan_measurement(
     aligned: AlignedRecording,
     model: Sequence[FittedEffect],
-    pair: tuple[FittedEffect, FittedEffect],
+    rivals: Sequence[FittedEffect],
     sigma_um: FloatArray,
     limits: ProgrammeLimits | SettingLimits,
     rows: int,
 ) -> MeasurementPlan:
-    """The rows on which two fitted rivals differ most, however the other one is refitted.
+    """The rows on which fitted rivals differ most, however the other ones are refitted.
 
-    The criterion is T-optimality (`compd.diagnosis.planning.t_optimal`), with either rival as the truth; the smaller of
-    the two sums of squares counts. Effects of the model, constants and the instrument's frame are refitted along, and
-    the recording's rows count.
+    The criterion is T-optimality (`compd.diagnosis.planning.t_optimal`), with each rival as the truth; the smallest of
+    the sums of squares counts. Effects of the model, constants and the instrument's frame are refitted along, and the
+    recording's rows count. Of three rivals or more, pairs that no rows within the limits tell apart are named, and the
+    rows are for the others.
 
-    model : effects that are fitted along.  pair : the rivals, fitted on the recording.  sigma_um : (m,) noise.
+    model : effects that are fitted along.  rivals : two or more, fitted on the recording.  sigma_um : (m,) noise.
     limits : of a machine whose kinematics is known ProgrammeLimits; of an external one the columns' limits, where they
         are not those of the recording.
     rows : how many may be measured at most.
@@ -51,10 +53,23 @@ def plan_measurement(
         plan = plan_measurement(aligned, (), (spring, contact), sigma_um, recorded_limits(aligned), rows=30)
         plan.before, plan.separation  # by how many standard deviations the two differ, before and after
     """
-    possible = _programmes(aligned, [fitted.effect for fitted in pair], model, limits)
+    effects = [fitted.effect for fitted in rivals]
+    possible = _programmes(aligned, effects, model, limits)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible)
-    first, second = (planner.contender(fitted) for fitted in pair)
-    return planner.plan([(first, second), (second, first)], rows, _words([fitted.effect for fitted in pair]))
+    contenders = [planner.contender(fitted) for fitted in rivals]
+    plan = planner.plan(list(permutations(contenders, 2)), rows, _words(effects))
+    if len(rivals) == 2 or plan.separation >= LEAST_SEPARATION:
+        return plan
+    pairs = list(combinations(contenders, 2))
+    apart = [
+        (first, second)
+        for first, second in pairs
+        if planner.plan([(first, second), (second, first)], rows).separation >= LEAST_SEPARATION
+    ]
+    alike = tuple((first.name, second.name) for first, second in pairs if (first, second) not in apart)
+    if apart:
+        plan = planner.plan([pair for first, second in apart for pair in ((first, second), (second, first))], rows)
+    return replace(plan, rivals=_ids(effects), separated_by=_words(effects), alike=alike)
 
 
 def next_measurement(

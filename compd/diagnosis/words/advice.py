@@ -80,8 +80,8 @@ def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
     if words != NO_WORDS:
         return [f"to tell {first.effect.id}: {words}"]
     recording = diagnosis.before.aligned.recording.path.name
-    pair = f"{first.effect.id},{first.rivals[0].name}"
-    return [f"compd plan {recording} --rivals {pair} says what tells them apart"]
+    names = ",".join([first.effect.id, *(rival.name for rival in first.rivals)])
+    return [f"compd plan {recording} --rivals {names} says what tells them apart"]
 
 
 def _what_to_measure(diagnosis: Diagnosis) -> list[str]:

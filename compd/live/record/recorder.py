@@ -11,8 +11,9 @@ A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itse
     NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`
     NAME-0001.model-*.yaml  copies of the model files that were applied or ran as the shadow
 
-A new part begins when machine zero is taken anew, since the columns of a part have one zero. Whole lines are written
-and synchronised twice a second, so a power cut or SIGKILL costs less than a second.
+A new part begins when machine zero is taken anew, since the columns of a part have one zero, and when the daemon has
+started anew (`ReadingsFeed`). Whole lines are written and synchronised twice a second, so a power cut or SIGKILL costs
+less than a second. Every row of the CSV has its cycle, also where the disk was full.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from pathlib import Path
 
 from compd.clock import Clock
 from compd.errors import CompdError, Problem, RecordingError, StateError
+from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import Message, RecordingPart
 
 _WRITE_EVERY_S = 0.5
@@ -66,9 +68,9 @@ class Recorder:
 
     Attributes
     ----------
-    rows : READINGS messages written.
     missing : cycles whose message never came, where every cycle was asked for.
     dropped : messages that were not written because the disk stalled.
+    without_zero : messages of a daemon that has started anew and has no machine zero: from nothing a column can count.
     """
 
     def __init__(
@@ -89,16 +91,18 @@ class Recorder:
                     where=str(existing[0]), what="is there already", next_step="choose another name, or move it away"
                 )
             )
-        self.rows = 0
         self.dropped = 0
         self.missing = 0
+        self.without_zero = 0
         self._name = name
         self._first_messages = (version, watch)
         self._every_cycle = "rate_hz" not in watch
         self._limits = limits
         self._report = report
         self._clock = clock
-        self._waiting: deque[tuple[bytes, Message]] = deque()
+        self._waiting: deque[FeedItem] = deque()
+        self._received = 0
+        self._rows_deleted = 0
         self._parts: list[RecordingPart] = []
         self._part_count = 0
         self._origin_s = math.nan
@@ -110,18 +114,21 @@ class Recorder:
         """Start the writing thread."""
         self._thread.start()
 
-    def follow(self, lines: Iterable[tuple[bytes, Message]], for_s: float | None) -> None:
-        """Record READINGS as they come, for `for_s` seconds of the daemon's time; None is for ever.
+    @property
+    def rows(self) -> int:
+        """READINGS messages written, in parts that are there or were deleted at the limit."""
+        return self._rows_deleted + sum(part.rows for part in self._parts)
 
-        Raises what `put` raises, and DaemonError when the daemon goes away.
+    def follow(self, items: Iterable[FeedItem]) -> None:
+        """Record READINGS as they come, of one daemon after the other.
+
+        Raises what `put` raises.
         """
-        start_s, last_seq = math.nan, None
-        for line, message in lines:
-            if last_seq is None:
-                start_s = message["time_s"]
-            elif for_s is not None and message["time_s"] - start_s >= for_s:
-                return
-            elif self._every_cycle:
+        last_seq = None
+        for first_messages, line, message in items:
+            if first_messages is not self._first_messages:
+                self._first_messages, last_seq = first_messages, None
+            if last_seq is not None and self._every_cycle:
                 self.missing += message["seq"] - last_seq - 1
             last_seq = message["seq"]
             self.put(line, message)
@@ -136,7 +143,8 @@ class Recorder:
         if len(self._waiting) >= _MAX_WAITING:
             self.dropped += 1
             return
-        self._waiting.append((line, message))
+        self._received += 1
+        self._waiting.append(FeedItem(self._first_messages, line, message))
 
     def close(self) -> None:
         """Write the queued lines and close the files. Raises what ended the writing."""
@@ -147,12 +155,15 @@ class Recorder:
 
     def summary(self) -> str:
         """Rows and parts written, and what is missing, as a sentence."""
-        parts = f"{self.rows} rows in {self._part_count} part{'s' * (self._part_count != 1)}"
-        losses = [
-            f"{count} {what}"
-            for count, what in ((self.missing, "cycles did not come"), (self.dropped, "rows dropped: the disk stalled"))
-            if count
-        ]
+        rows = self.rows
+        parts = f"{rows} rows in {self._part_count} part{'s' * (self._part_count != 1)}"
+        counts = (
+            (self.missing, "cycles did not come"),
+            (self.dropped, "rows dropped: the disk stalled"),
+            (self.without_zero, "rows not written: the daemon had no machine zero"),
+            (self._received - rows - self.without_zero, "rows came and are not on the disk"),
+        )
+        losses = [f"{count} {what}" for count, what in counts if count]
         return ", ".join([parts, *losses])
 
     def _run(self) -> None:
@@ -165,7 +176,8 @@ class Recorder:
                 Problem(
                     where=str(self._name.parent),
                     what=f"cannot be written to: {error.strerror}",
-                    next_step="what was written before is whole; make room, and record under another name",
+                    next_step="what was written before is whole, every row with its cycle; make room, and record "
+                    "under another name",
                 )
             )
 
@@ -181,20 +193,32 @@ class Recorder:
     def write(self) -> None:
         """Write every queued line to the disk; called by the writing thread."""
         while self._waiting:
-            line, message = self._waiting.popleft()
-            part = self._part_for(message)
-            part.add(line, message)
+            item = self._waiting.popleft()
+            message = item.message
+            if "zero" not in message and self._parts:
+                self._leave_out()
+                continue
+            part = self._part_for(item)
+            part.add(item.line, message)
             for hash_, file in message.get("model_files", {}).items():
                 if problem := part.copy_model(hash_, Path(file)):
                     self._report(f"the model file {file} {problem}: it is not kept, and replay will ask for it")
-            self.rows += 1
             if self._total_bytes() > self._limits.limit_bytes:
                 self._at_limit()
         if self._parts:
             self._parts[-1].sync()
 
-    def _part_for(self, message: Message) -> RecordingPart:
-        """The part that the message belongs to: a new one where the last is full, or has another machine zero."""
+    def _leave_out(self) -> None:
+        """Count a message without machine zero, of a daemon that started anew."""
+        if not self.without_zero:
+            self._report("the daemon has no machine zero now: nothing is recorded until `compd zero`")
+        self.without_zero += 1
+
+    def _part_for(self, item: FeedItem) -> RecordingPart:
+        """The part that the message belongs to: a new one where the last is full, has another machine zero, or is of
+        a daemon that has ended.
+        """
+        message = item.message
         if "zero" not in message:
             raise StateError(
                 Problem(
@@ -205,22 +229,25 @@ class Recorder:
             )
         if not self._parts:
             self._origin_s = message["time_s"]
-            return self._new_part(message)
+            return self._new_part(item)
         last, limits = self._parts[-1], self._limits
         if message["zero"] != last.zero:
             self._report("machine zero was taken anew")
+        elif item.first_messages is not last.first_messages:
+            pass  # whoever connected anew has said so
         elif last.size < limits.part_bytes and message["time_s"] - last.start_s < limits.part_s:
             return last
         last.close()
-        return self._new_part(message)
+        return self._new_part(item)
 
-    def _new_part(self, message: Message) -> RecordingPart:
-        self._part_count += 1
-        stem = self._name.with_name(f"{self._name.name}-{self._part_count:04d}")
+    def _new_part(self, item: FeedItem) -> RecordingPart:
+        message = item.message
+        stem = self._name.with_name(f"{self._name.name}-{self._part_count + 1:04d}")
         age = timedelta(seconds=self._clock.monotonic() - message["time_s"])
         started_at = (datetime.now(UTC) - age).isoformat(timespec="milliseconds")
-        part = RecordingPart(stem, self._first_messages, message, self._origin_s, started_at)
+        part = RecordingPart(stem, item.first_messages, message, self._origin_s, started_at)
         self._parts.append(part)
+        self._part_count += 1
         self._report(f"{part.csv_path} begins")
         return part
 
@@ -242,4 +269,5 @@ class Recorder:
         while self._total_bytes() > self._limits.limit_bytes and len(self._parts) > 1:
             oldest = self._parts.pop(0)
             oldest.delete()
+            self._rows_deleted += oldest.rows
             self._report(f"limit of {limit}: {oldest.csv_path} deleted, with {oldest.rows} rows")

@@ -22,15 +22,25 @@ MODEL_MARK = ".model-"
 
 
 class RecordingPart:
-    """NAME.csv, NAME.yaml and NAME.cycles.jsonl, for readings with one machine zero.
+    """NAME.csv, NAME.yaml and NAME.cycles.jsonl, for readings of one daemon with one machine zero.
 
-    The files consist of whole lines at any time.
+    The files consist of whole lines at any time, and every row has its cycle.
+
+    Attributes
+    ----------
+    first_messages : the daemon's VERSION and its answer to WATCH.
+    rows : rows on the disk.
     """
 
     def __init__(
-        self, stem: Path, first_messages: Sequence[Message], first_readings: Message, origin_s: float, started_at: str
+        self,
+        stem: Path,
+        first_messages: tuple[Message, Message],
+        first_readings: Message,
+        origin_s: float,
+        started_at: str,
     ) -> None:
-        """Write the sidecar and begin the other files. Raises OSError.
+        """Write the sidecar and begin the other files. Raises OSError, and leaves none of them then.
 
         Parameters
         ----------
@@ -40,13 +50,14 @@ class RecordingPart:
         origin_s : monotonic time that is 0 in the column time_s.
         started_at : UTC of the first row, ISO 8601.
         """
-        version, watch = first_messages
+        version, watch = self.first_messages = first_messages
         self.csv_path = stem.with_name(f"{stem.name}.csv")
         self._sidecar_path = stem.with_name(f"{stem.name}.yaml")
         self._cycles_path = stem.with_name(f"{stem.name}{CYCLES_SUFFIX}")
         self.zero: Message = first_readings["zero"]
         self.start_s: float = first_readings["time_s"]
         self.rows = 0
+        self._rows_added = 0
         self._columns: Sequence[Message] = watch["columns"]
         names = ["time_s", *(column["column"] for column in self._columns)]
         self._decimals = {name: decimals(name) for name in names}
@@ -58,13 +69,19 @@ class RecordingPart:
         self._stem = stem
         self._models: dict[str, Path] = {}
         self._complete_size = 0
-        self._write_complete(self._sidecar_path, sidecar)
-        self._cycles = LinesFile(self._cycles_path)
-        self._csv = LinesFile(self.csv_path)
-        self._cycles.add(first_lines)
-        self._csv.add(header)
-        self.sync()
-        sync_directory(stem.parent)
+        try:
+            self._write_complete(self._sidecar_path, sidecar)
+            self._cycles = LinesFile(self._cycles_path)
+            self._csv = LinesFile(self.csv_path)
+            self._cycles.add(first_lines)
+            self._csv.add(header)
+            self.sync()
+            sync_directory(stem.parent)
+        except FileExistsError:
+            raise  # somebody else's
+        except OSError:
+            self.delete()
+            raise
 
     @property
     def size(self) -> int:
@@ -75,7 +92,7 @@ class RecordingPart:
         """Append a READINGS message and the line in which it came; `sync` writes both."""
         self._cycles.add(line)
         self._csv.add(self._row(message).encode() + b"\n")
-        self.rows += 1
+        self._rows_added += 1
 
     def copy_model(self, hash_: str, file: Path) -> str:
         """Copy a model file beside the part, once. Returns what is wrong with the file, "" where nothing is.
@@ -95,9 +112,21 @@ class RecordingPart:
         return ""
 
     def sync(self) -> None:
-        """Write what was added to the disk. Raises OSError; the files then end with their last whole line."""
-        self._cycles.sync()
-        self._csv.sync()
+        """Write what was added to the disk. Raises OSError; then all that was added since the last time is lost, in
+        every file.
+        """
+        files = (self._cycles, self._csv)
+        try:
+            for file in files:
+                file.write()
+        except OSError:
+            self._rows_added = self.rows
+            for file in files:
+                file.cut()
+            raise
+        for file in files:
+            file.keep()
+        self.rows = self._rows_added
 
     def close(self) -> None:
         """Write what was added, and close the files."""
@@ -171,26 +200,32 @@ class LinesFile:
         self.size = 0
         self._file: FileIO = FileIO(path, "xb")
         self._queue: list[bytes] = []
-        self._written = 0
+        self._kept = 0
 
     def add(self, lines: bytes) -> None:
         self._queue.append(lines)
         self.size += len(lines)
 
-    def sync(self) -> None:
-        """Write the queued lines. Raises OSError; the part of a line that a full disk leaves is cut off."""
+    def write(self) -> None:
+        """Write the queued lines. Raises OSError: a part of them may be in the file."""
         if not self._queue:
             return
         block = memoryview(b"".join(self._queue))
         self._queue.clear()
-        try:
-            while block:
-                block = block[self._file.write(block) :]
-            os.fsync(self._file.fileno())
-        except OSError:
-            self._file.truncate(self._written)
-            raise
-        self._written = self.size
+        while block:
+            block = block[self._file.write(block) :]
+        os.fsync(self._file.fileno())
+
+    def keep(self) -> None:
+        """What is in the file stays there."""
+        self._kept = self.size
+
+    def cut(self) -> None:
+        """Take away all that came after the last `keep`."""
+        self._queue.clear()
+        self._file.truncate(self._kept)
+        self._file.seek(self._kept)
+        self.size = self._kept
 
     def close(self) -> None:
         self._file.close()

@@ -15,6 +15,9 @@ from compd.live.pipeline import build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 
+# Of a part's messages the first two say who spoke, and what the columns are.
+_FIRST_CLASSES = ("VERSION", "WATCH")
+
 
 class ReplayedCycle(NamedTuple):
     """One cycle of a recording, computed again.
@@ -75,6 +78,18 @@ class RecordedCycles:
             for where, message in self._messages(path):
                 if message.get("class") == "READINGS":
                     yield where, message
+
+    def rows_without_cycle(self) -> dict[Path, int]:
+        """How many rows of each part's CSV have no cycle from which they could be computed; only parts with such."""
+        lacking = {}
+        for path in self.paths:
+            table = path.with_name(path.name.removesuffix(CYCLES_SUFFIX) + ".csv")
+            if table.is_file():
+                rows = _whole_lines(table) - 1
+                cycles = _whole_lines(path) - len(_FIRST_CLASSES)
+                if rows > cycles:
+                    lacking[table] = rows - cycles
+        return lacking
 
     def _messages(self, path: Path) -> Iterator[tuple[str, Message]]:
         with path.open("rb") as file:
@@ -155,6 +170,11 @@ def _model(where: str, hash_: str, models: Mapping[str, LiveModel]) -> LiveModel
             )
         )
     return models[hash_]
+
+
+def _whole_lines(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(line.endswith(b"\n") for line in file)
 
 
 def _damaged(where: str, what: str) -> RecordingError:

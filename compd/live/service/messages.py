@@ -102,7 +102,7 @@ def parse(data: bytes) -> ParsedLine:
     Raises ProtocolError for anything that is not one JSON object with a text under "class".
     """
     try:
-        message = json.loads(data.decode("utf-8"), parse_constant=_refuse_constant)
+        message = json.loads(data.decode("utf-8"), parse_constant=_refuse_constant, object_pairs_hook=_keys_once)
     except (ValueError, RecursionError) as error:
         raise ProtocolError(ErrorCode.BAD_JSON, f"not a JSON object: {error}") from error
     if not isinstance(message, dict):
@@ -111,6 +111,16 @@ def parse(data: bytes) -> ParsedLine:
     if not isinstance(name, str):
         raise ProtocolError(ErrorCode.BAD_MESSAGE, 'needs "class", a text')
     return ParsedLine(name, message)
+
+
+def _keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; of a key that stands in it twice nobody knows which value is meant."""
+    message = dict(pairs)
+    if len(message) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {twice!r} stands in it twice")
+    return message
 
 
 def _refuse_constant(name: str) -> NoReturn:

@@ -78,12 +78,14 @@ class Formula:
         """What each linear parameter is multiplied by: (N, m) or what broadcasts to it; and the lags' states after.
 
         columns : (N, m) or (N, 1) by name, all of one m or 1.  constants : values of the other parameters.
-        states : one per lag, None at the start.  Where the arithmetic fails (log of a negative) the value is nan.
+        states : one per lag, None at the start.  Where the arithmetic fails (log of a negative, exp of a large one) the
+        value is nan.
         """
         evaluation = _Evaluation(self, columns, constants, time_s, session_start, list(states))
         with np.errstate(all="ignore"):
             terms = evaluation.terms(self.tree)
-        return {name: terms[name] for name in self.linear}, tuple(evaluation.after)
+        known = {name: np.where(np.isfinite(terms[name]), terms[name], np.nan) for name in self.linear}
+        return known, tuple(evaluation.after)
 
 
 def to_float(value: object) -> float:

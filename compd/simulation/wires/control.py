@@ -9,8 +9,9 @@
     {"class": "LOAD", "force_M_N": [x, y, z]}         load on the tool's tip
     {"class": "HEAT", "drives_W": [..], "ring_W": ..} heat sources from now on: all of `Heat`
     {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null repairs it
+    {"class": "LINES"}                                the lines, the fault of each, and those it can have
 
-Every request gets one answer: TRUTH, MEASURED, TIP, or ERROR with code and text.
+Every request gets one answer: TRUTH, MEASURED, TIP, LINES, or ERROR with code and text.
 """
 
 from __future__ import annotations

@@ -14,8 +14,20 @@ class ControlClient:
     """A connection to the control socket at `path`; a context manager that closes it."""
 
     def __init__(self, path: Path) -> None:
+        """Raises DaemonError where no simulated machine answers."""
+        self._path = path
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.connect(str(path))
+        try:
+            self._socket.connect(str(path))
+        except OSError as error:
+            self._socket.close()
+            raise DaemonError(
+                Problem(
+                    where=str(path),
+                    what=f"no simulated machine answers: {error.strerror}",
+                    next_step="start it with `compd simulate CONFIG --directory`, and give that directory",
+                )
+            ) from error
         self._lines = self._socket.makefile("rb")
 
     def __enter__(self) -> Self:
@@ -26,9 +38,15 @@ class ControlClient:
         self._socket.close()
 
     def ask(self, message_class: str, **values: Any) -> dict[str, Any]:
-        """Send one request, return its answer. Raises DaemonError for the answer ERROR."""
-        self._socket.sendall(json.dumps({"class": message_class, **values}).encode() + b"\n")
-        answer: dict[str, Any] = json.loads(self._lines.readline())
+        """Send one request, return its answer. Raises DaemonError for the answer ERROR, or none."""
+        try:
+            self._socket.sendall(json.dumps({"class": message_class, **values}).encode() + b"\n")
+            line = self._lines.readline()
+        except OSError:
+            line = b""
+        if not line.endswith(b"\n"):
+            raise DaemonError(Problem(where=str(self._path), what="the simulated machine is gone"))
+        answer: dict[str, Any] = json.loads(line)
         if answer.get("class") == "ERROR":
             raise DaemonError(Problem(where="simulated machine", what=str(answer.get("text")), value=message_class))
         return answer

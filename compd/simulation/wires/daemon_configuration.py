@@ -12,7 +12,9 @@ import yaml
 from compd.configuration import Configuration, load
 from compd.configuration.document import read_document
 from compd.errors import ConfigurationError, Problem
+from compd.files import write_files
 from compd.output_file import check_replaceable
+from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 
 Port = str | tuple[str, int]
 LOOPBACK = "127.0.0.1"
@@ -48,13 +50,13 @@ def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port]
         else:
             line["host"], line["port"] = port
     sockets = data["sockets"]
-    sockets["unix"] = {"path": str(directory / "compd.sock")}
+    sockets["unix"] = {"path": str(directory / DAEMON_SOCKET)}
     if configuration.sockets.tcp is not None:
         sockets["tcp"] = {"host": LOOPBACK, "port": _free_port(configuration.sockets.tcp.port)}
     if configuration.sockets.udp is not None:
         sockets["udp"] = {"host": LOOPBACK, "port": configuration.sockets.udp.port}
-    data["state"] = {"directory": str(directory / "state")}
-    (directory / "state").mkdir(exist_ok=True)
+    data["state"] = {"directory": str(directory / STATE)}
+    (directory / STATE).mkdir(exist_ok=True)
     _write(path, configuration.path, data)
     return load(path)
 
@@ -71,6 +73,7 @@ def _free_port(wanted: int) -> int:
 
 
 def _write(path: Path, original: Path, data: dict[str, Any]) -> None:
-    head = f"# {original.name} with the ports of a simulated machine; written by `compd simulate`, gone with it.\n"
-    check_replaceable(path, (b"written by `compd simulate`",), "a configuration of a simulated machine")
-    path.write_text(head + yaml.safe_dump(data, sort_keys=False, width=110), encoding="utf-8")
+    head = f"# {original.name} with the ports of a simulated machine; {WRITTEN_BY}\n"
+    check_replaceable(path, (WRITTEN_BY.encode(),), "a configuration of a simulated machine")
+    # whole at once: a daemon may be waiting for it
+    write_files({path: head + yaml.safe_dump(data, sort_keys=False, width=110)})

@@ -21,10 +21,10 @@ from compd.simulation.wires.daemon_configuration import Port, daemon_configurati
 from compd.simulation.wires.live_world import LiveWorld
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
+from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02
-CONTROL_SOCKET = "control.sock"
 # The tracker's noise does not depend on the machine's seed.
 TRACKER_SEED = 17
 
@@ -49,7 +49,8 @@ class Simulation:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="world", daemon=True)
         sensing = Sensing(configuration, self._live)
-        self._ports_directory = directory / "ports"
+        self._ports_directory = directory / PORTS
+        self._own = SimulationDirectory(directory, configuration.path.name)
         self.lines: Mapping[str, SimulatedLine] = {
             name: SimulatedLine(
                 name,
@@ -73,11 +74,17 @@ class Simulation:
             "LOAD": self._load,
             "HEAT": self._heat,
             "FAULT": self._fault,
+            "LINES": lambda _: self._fault_states(),
         }
         self._running = ExitStack()
 
     def start(self) -> Configuration:
-        """Open every port; returns the daemon's configuration, which is also written to `directory`."""
+        """Open every port; returns the daemon's configuration, which is also written to `directory`.
+
+        Raises CompdError where another simulator or a daemon runs in the directory.
+        """
+        self._own.begin()
+        self._running.callback(self._own.end)
         self._ports_directory.mkdir(exist_ok=True)
         ports = {}
         for name, line in self.lines.items():
@@ -94,7 +101,7 @@ class Simulation:
         return daemon
 
     def stop(self) -> None:
-        """Close every port and socket."""
+        """Close every port and socket, and remove the daemon's configuration and state."""
         self._running.close()
 
     def _run(self) -> None:
@@ -193,6 +200,10 @@ class Simulation:
             raise ValueError(f"no line {name!r}; there are " + ", ".join(self.lines))
         self.lines[name].fault = message["fault"]
         return self.truth()
+
+    def _fault_states(self) -> Answer:
+        lines = {name: {"fault": line.fault, "faults": list(line.faults)} for name, line in self.lines.items()}
+        return {"class": "LINES", "lines": lines}
 
 
 def _watts(value: Any) -> float:

@@ -13,6 +13,7 @@ from compd.errors import CompdError
 from compd.model.library import BUNDLED
 from compd.report.effect_signature import compute_signature
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD
+from tests.support.hidden_effects import record_with_effects
 from tests.support.paths import CONFIG
 
 
@@ -108,3 +109,37 @@ def test_the_hysteresis_curve_is_a_loop() -> None:
     there, back, again = tip_um[middle]
     assert abs(there - back) > 1.0
     assert there == pytest.approx(again, abs=1e-6)
+
+
+def add_formula(directory: Path, formula: str) -> str:
+    """What `compd effect add` of a formula says, of 30 rows with a temperature that changes."""
+    (directory / "mine.yaml").write_text(
+        f"{{id: mine, port: link, formula: {formula}, physics: Grows., "
+        "parameters: {k: {unit: um/K, plausible: [-10, 10], source: mine}}}"
+    )
+    recording = directory / "run.csv"
+    record_with_effects(recording, 1, {})
+    arguments = [
+        "add",
+        str(directory / "mine.yaml"),
+        "--recording",
+        str(recording),
+        "--model",
+        str(directory / "m.yaml"),
+    ]
+    result = CliRunner().invoke(command, arguments)
+    assert isinstance(result.exception, CompdError)
+    return str(result.exception)
+
+
+def test_a_quantity_without_its_unit_or_misspelt_is_asked_back(tmp_path: Path) -> None:
+    assert "did you mean temperature_room_degC?" in add_formula(tmp_path, "k * temperature_room")
+    assert "did you mean temperature_room_degC?" in add_formula(tmp_path, "k * temprature_room_degC")
+    assert "did you mean" not in add_formula(tmp_path, "k * voltage_V")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_formula_that_has_no_value_is_named_and_numpy_says_nothing(tmp_path: Path) -> None:
+    text = add_formula(tmp_path, "k * exp(1000 * temperature_room_degC)")
+    assert "mine has no finite value in " in text
+    assert "exp of a large number" in text

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 
 import pytest
@@ -145,14 +145,35 @@ def test_it_ends_at_a_signal_with_everything_written(tmp_path, end):
 
 
 @pytest.mark.usefixtures("drifting")
-def test_a_daemon_that_goes_leaves_a_whole_recording_and_an_error(tmp_path):
-    with daemon_at(tmp_path) as (_, _, client):
-        with record_command(tmp_path) as process:
+def test_it_goes_on_in_a_new_part_when_the_daemon_has_started_anew(tmp_path):
+    with ExitStack() as stack:
+        with daemon_at(tmp_path) as (configuration, _, client):
+            process = stack.enter_context(record_command(tmp_path))
             until_rows(client, tmp_path / "run-0001.csv", 3)
-            os.kill(client.status()["processes"]["supervisor"]["pid"], signal.SIGTERM)
+        assert "the daemon is gone" in process.stderr.readline()
+        with supervised(configuration), connect(tmp_path / "s", TIMEOUT_S) as again:
+            assert "the daemon is back: nothing was recorded for " in process.stderr.readline()
+            assert "run-0002.csv begins" in process.stderr.readline()
+            until_rows(again, tmp_path / "run-0002.csv", 3)
+            process.send_signal(signal.SIGINT)
             _, said = process.communicate(timeout=TIMEOUT_S)
-        assert process.returncode == 2
-    assert "the daemon is gone" in said
+        assert process.returncode == 0
+    rows = sum(rows_in(tmp_path / f"run-000{part}.csv") for part in (1, 2))
+    assert f"{rows} rows in 2 parts" in said
+    replayed = list(replay_cycles(configuration, RecordedCycles(tmp_path / "run")))
+    assert len(replayed) == rows
+    assert not [cycle for cycle in replayed if cycle.differs]
+
+
+@pytest.mark.usefixtures("drifting")
+def test_while_the_daemon_is_away_ctrl_c_ends_it_with_everything_written(tmp_path):
+    with daemon_at(tmp_path) as (_, _, client), record_command(tmp_path) as process:
+        until_rows(client, tmp_path / "run-0001.csv", 3)
+        os.kill(client.status()["processes"]["supervisor"]["pid"], signal.SIGTERM)
+        assert "the daemon is gone" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=TIMEOUT_S)
+        assert process.returncode == 0
     assert f"{rows_in(tmp_path / 'run-0001.csv')} rows in 1 part" in said
 
 

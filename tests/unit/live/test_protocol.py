@@ -58,6 +58,8 @@ BAD = [
     (b'"WATCH"\n', "bad_json"),
     (DEEP + b"\n", "bad_json"),
     (b'{"class":"WATCH","rate_hz":NaN}\n', "bad_json"),
+    (b'{"class":"WATCH","rate_hz":1,"rate_hz":200}\n', "bad_json"),
+    (b'{"class":"STATUS","class":"VERSION"}\n', "bad_json"),
     (b'{"class":"WATCH","rate_hz":' + b"9" * 4000 + b"}\n", "bad_message"),
     (b'{"class":"WATCH","rate_hz":1e999}\n', "bad_message"),
     (b'{"class":"WATCH","rate_hz":-1}\n', "bad_message"),
@@ -96,6 +98,12 @@ def test_a_bad_message_gets_an_error_and_harms_nobody(service, message, code):
     service.deliver(setpoint(1, MonotonicClock().monotonic()))
     assert other.read()["seq"] == 1
     assert service.commands.target is None
+
+
+def test_an_empty_line_is_ignored(service):
+    peer = service.tcp()
+    peer.send(b"\n  \n")
+    assert peer.ask({"class": "VERSION"}) == VERSION
 
 
 @pytest.mark.parametrize(

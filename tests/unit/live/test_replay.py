@@ -266,10 +266,37 @@ def test_another_configuration_is_told_and_may_give_other_setpoints(tmp_path, ca
     assert "30 of 30 setpoints differ" in err
 
 
+def test_another_configuration_that_makes_no_difference_is_no_warning(tmp_path, capsys):
+    shipped_run(tmp_path)
+    other = tmp_path / "other.yaml"
+    text = (CONFIG / "tripod-cmm.yaml").read_text()
+    other.write_text(text.replace("port: 7750", "port: 7751"))
+    replay_command(tmp_path / "run", other, setpoints=False)
+    err = capsys.readouterr().err
+    assert "warning" not in err
+    assert "every setpoint is the one that was sent, though recorded with another configuration" in err
+
+
+def test_rows_without_a_cycle_are_told_and_not_everything_is_said_to_be_there(tmp_path, capsys):
+    import typer
+
+    shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-10]))
+    with pytest.raises(typer.Exit) as ended:
+        replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=False)
+    assert ended.value.exit_code == 1
+    err = capsys.readouterr().err
+    assert f"{tmp_path / 'run-0001.csv'}: 10 rows have no cycle beside them, and cannot be replayed" in err
+    assert "20 cycles replayed" in err
+
+
 def test_a_line_torn_by_a_kill_is_left_out_and_counted(tmp_path, capsys):
     shipped_run(tmp_path)
     path = tmp_path / "run-0001.cycles.jsonl"
     path.write_bytes(path.read_bytes()[:-100])
+    table = tmp_path / "run-0001.csv"  # written after the cycles
+    table.write_bytes(b"".join(table.read_bytes().splitlines(keepends=True)[:-1]))
     replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=False)
     err = capsys.readouterr().err
     assert "1 torn line" in err

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from plotly.graph_objects import Figure
 
+from compd.release import __version__
 from compd.report.page import SHARED_SCRIPT, Panel, write_page
 from compd.report.page_table import PageTable
 
@@ -72,6 +74,17 @@ def test_pages_of_a_directory_can_share_the_script(tmp_path: Path) -> None:
     assert outline.loaded == [SHARED_SCRIPT]
     assert "Plotly.newPlot" in text
     assert len(text) < 50_000 < (tmp_path / SHARED_SCRIPT).stat().st_size
+
+
+def test_the_footer_ends_with_date_and_release(outline: Outline) -> None:
+    (footer,) = outline.texts["footer"]
+    assert re.search(rf"Written on \d{{4}}-\d\d-\d\d by compd {re.escape(__version__)}\.$", footer)
+
+
+def test_a_page_without_figures_does_not_carry_the_script_that_draws_them(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    write_page(path, "Title", "Verdict", [Panel("In numbers", "", PageTable(("a",), [("1",)]))], "")
+    assert path.stat().st_size < 50_000
 
 
 def test_no_figure_offers_to_upload_itself(outline: Outline) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ from compd.diagnosis.planning.next_measurement import (
     plan_measurement,
 )
 from compd.errors import CompdError, RecordingError
-from compd.model.effect import FittedEffect
+from compd.model.effect import Effect, FittedEffect
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 SIGMA_UM = np.full(3, NOISE_UM)
@@ -204,10 +206,44 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
     assert shown.stdout.startswith("row,purpose,time_s")
 
 
+class NamedLike:
+    """An effect under another name: nothing parts the two."""
+
+    def __init__(self, effect: Any, name: str) -> None:
+        self._effect = effect
+        self.id = name
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._effect, name)
+
+
+def test_of_three_rivals_the_rows_part_those_that_can_be_and_the_others_are_named(tmp_path: Path) -> None:
+    aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)}, visits=60)
+    spring, contact = fit_rivals(aligned, "link_elasticity", "joint_contact")
+    twin = replace(spring, effect=cast("Effect", NamedLike(spring.effect, "twin")))
+    limits = recorded_limits(aligned)._replace(force_N=100.0)
+    plan = plan_measurement(aligned, (), (spring, contact, twin), SIGMA_UM, limits, 20)
+    assert plan.rivals == ("link_elasticity", "joint_contact", "twin")
+    assert plan.alike == (("link_elasticity", "twin"),)
+    assert plan.separation >= LEAST_SEPARATION
+    words = "No rows within the limits tell link_elasticity from twin. Within the limits they correct alike"
+    assert words in plan.summary
+
+
+def test_three_rivals_that_rows_tell_apart_are_planned_for_together(tmp_path: Path) -> None:
+    record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)}, visits=60)
+    names = ["link_elasticity", "joint_contact", "link_zero"]
+    plan = compd.plan_measurement(tmp_path / "run.csv", names, rows=20, force_N=100.0)
+    assert plan.alike == ()
+    assert plan.separation >= LEAST_SEPARATION
+    assert plan.summary.startswith("link_elasticity, joint_contact and link_zero differ by at least ")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--rivals", "link_zero"], "needs two effects"),
+        (["--rivals", "link_zero"], "needs two effects or more"),
+        (["--rivals", "link_zero,link_zero"], "needs two effects or more"),
         (["--rivals", "link_zero,no_such"], "no such effect"),
         (["--rivals", "link_zero,tool_offset", "--temperature", "25,20"], "is not understood"),
         (["--rivals", "link_zero,tool_offset", "--workspace", "1,2,3"], "is not understood"),
