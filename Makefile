@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample scoreboard sensitivity nightly clean
+.PHONY: help docs demo test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -17,10 +17,11 @@ help:
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (3 min)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
+	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make scoreboard  the diagnosis on 1300 simulated machines (hours; continues where it stopped)"
 	@echo "make sensitivity  the scoreboard with each threshold of the diagnosis halved and doubled (hours; continues, too)"
-	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench and the scoreboard"
+	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, three hours of soak, the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"
 
 $(STAMP): pyproject.toml
@@ -100,6 +101,10 @@ bench: $(STAMP)
 bench-sample: $(STAMP)
 	@for name in $(SAMPLE); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done
 
+# Faults, their order and places follow from the seed.
+soak: $(STAMP)
+	$(BIN)/python -m tests.soak $(OPTIONS)
+
 # One thread each, because cases run side by side.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -135,7 +140,12 @@ docs: $(STAMP) $(GALLERY) $(EXAMPLE)
 	  --doctree-dir docs/_build/doctrees docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
-nightly: lint wheel demo test pages walks long service hidden bench scoreboard
+# Hours of faults, and other examples of every fuzzer than yesterday's.
+nightly: lint wheel demo test pages walks long service hidden bench
+	$(BIN)/python -m tests.soak --minutes 180 --seed $$(date +%j)
+	$(BIN)/python -m tests.soak --without-faults --hours 24
+	COMPD_FUZZ=20 $(BIN)/pytest --timeout 1800 tests/fuzz
+	$(MAKE) scoreboard
 
 clean:
 	find . -name __pycache__ -not -path "./$(VENV)/*" -prune -exec rm -rf {} +

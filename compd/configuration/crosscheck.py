@@ -31,6 +31,7 @@ class Sections:
     drivers: Mapping[str, type[Gauge[Any]]]
     wiring: Any
     acquisition: Any = None
+    votes: Any = None
 
 
 def problems(sections: Sections) -> list[Problem]:
@@ -41,6 +42,7 @@ def problems(sections: Sections) -> list[Problem]:
         *_process_problems(sections),
         *_channel_problems(sections),
         *_completeness_problems(sections),
+        *_vote_problems(sections),
     ]
 
 
@@ -70,7 +72,7 @@ def warnings(sections: Sections) -> list[Problem]:
         for name in sections.gauges
         if whole and name not in wired_gauges
     ]
-    return [*unused, *_shared_process_warnings(sections)]
+    return [*unused, *_vote_warnings(sections), *_shared_process_warnings(sections)]
 
 
 def resolve_channel(
@@ -162,6 +164,32 @@ def _process_problems(sections: Sections) -> Iterator[Problem]:
         elif name in named:
             yield Problem(where=where, what="named twice", value=name, allowed="each line once", next_step="remove it")
         named.add(name)
+
+
+def _vote_problems(sections: Sections) -> Iterator[Problem]:
+    """A vote that looks at what is not wired."""
+    temperature = getattr(getattr(sections.votes, "frame", None), "temperature", None)
+    names = [wire.name for _, wire in _entries(sections.wiring, "quantities")]
+    if temperature is not None and temperature not in names and None not in names:
+        yield Problem(
+            where=sections.document.where(("votes", "frame", "temperature")),
+            what="no such quantity",
+            value=temperature,
+            allowed=", ".join(names),
+            next_step="write a name under `wiring: quantities:`",
+        )
+
+
+def _vote_warnings(sections: Sections) -> Iterator[Problem]:
+    """A vote that nobody can give."""
+    roles = {(wire.link, wire.role) for _, wire in _entries(sections.wiring, "joint")}
+    pairs = [link for link, role in roles if role == "Ra" and (link, "Rb") in roles]
+    if getattr(sections.votes, "joint_pair_um", None) is not None and not pairs:
+        yield Problem(
+            where=sections.document.where(("votes", "joint_pair_um")),
+            what="no joint has two comparators, Ra and Rb: this vote sees nothing",
+            next_step="remove it",
+        )
 
 
 def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""Places of a configuration outside of its file: directories that it names, and who reaches its sockets."""
+"""Places of a configuration outside of its file: directories that it names, and files."""
 
 from __future__ import annotations
 

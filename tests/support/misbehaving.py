@@ -18,6 +18,10 @@ import structlog
 
 from compd.gauge import ByteLine, Channel, Gauge, Reading, good
 
+# The gauge in the configuration: the only one on its line.
+DIAL = "dial"
+DIAL_PROCESS = f"line {DIAL}"
+DIAL_CHANNEL = f"{DIAL}.value"
 ORDER = Path(__file__).with_name("misdeed")
 SHOWN_DEGC = 20.0
 HELD_S = 0.5

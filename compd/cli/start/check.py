@@ -81,7 +81,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of
+    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
 
     console = Console()
     figures = figures_of(configuration)
@@ -95,7 +95,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     for spot in BLIND_SPOTS:
         console.print(Text(spot.fault[0].upper() + spot.fault[1:], style="bold"))
         for name, text in (
-            ("shown by", spot.shown_by or "nothing"),
+            ("shown by", shown_by(spot, configuration)),
             ("unseen", spot.unseen),
             ("cost", spot.cost(figures)),
         ):

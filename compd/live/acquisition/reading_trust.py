@@ -110,7 +110,8 @@ class ReadingTrust:
         sample = Sample(reading.value, reading.time_s, window_s)
         self._count(sample.value)
         memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
-        if memory.accepted[i] != memory.obeyed[i]:
+        # one that was accepted while it was asked is asked twice at the next poll
+        if memory.accepted[i] != memory.obeyed[i] and first is not None:
             memory.obeyed[i] = memory.accepted[i]
             memory.heard[i] = memory.voted[i]
             return self._begin(reading, sample, first)

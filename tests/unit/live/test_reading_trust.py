@@ -228,6 +228,20 @@ def test_silence_until_the_last_reading_is_stale_is_a_loss(shop):
     assert "came back 0.020 mm away" in shop.reading("scale_1").detail
 
 
+def test_a_gauge_that_is_accepted_between_a_poll_and_its_judgement_is_believed_at_the_next(shop):
+    """Readings may wait until their line is known to be in step."""
+    shop.poll(20)
+    shop.shows["scale_1"] = lambda _: 5.0
+    shop.poll(2)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+    gauge = shop.gauges["scale_1"]
+    readings = gauge.read(None)
+    shop.memory.accept("scale_1")
+    gauge.put(readings, shop.now_s)
+    shop.poll()
+    assert shop.reading("scale_1").ok
+
+
 def test_an_absolute_gauge_needs_no_acceptance():
     shop = Shop(returns_by_itself=True)
     shop.poll(20)

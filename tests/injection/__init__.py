@@ -1,0 +1,1 @@
+"""An injector between a simulated machine and the daemon, and the fault matrix that it is used for."""

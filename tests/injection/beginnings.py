@@ -1,0 +1,120 @@
+"""How the faults of the matrix begin: each function returns what does it to a running machine."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+from tests.injection import faults
+from tests.injection.case import Begin
+from tests.injection.rig import InjectedMachine
+
+# Where the scales stand when a fault begins: different for each, so that exchanged ones differ.
+REST_MM = (2.0, 4.0, 7.0)
+# Where a case drives them.
+AWAY_MM = (9.0, 11.0, 14.0)
+
+
+def on(line: str, make: Callable[[], faults.Fault]) -> Begin:
+    """A fault of one line; made anew for every trial, since it keeps a state."""
+    return lambda machine: machine.injector.fault(line, make())
+
+
+def once(line: str, channel: str, mm: float) -> Begin:
+    return on(line, lambda: faults.Off((channel,), mm, count=1))
+
+
+def always(line: str, channel: str, mm: float) -> Begin:
+    return on(line, lambda: faults.Off((channel,), mm))
+
+
+def drifting(line: str, channel: str, mm_per_s: float) -> Begin:
+    return on(line, lambda: faults.Off((channel,), drift_per_s=mm_per_s))
+
+
+def shows(line: str, channel: str, number: float) -> Begin:
+    return on(line, lambda: faults.Shows((channel,), number))
+
+
+def away(*lines: str, s: float = 1.0) -> Begin:
+    """Unplugged for so long, and plugged in again as they were."""
+
+    def begin(machine: InjectedMachine) -> None:
+        machine.injector.unplug(*lines)
+        machine.truth.rest_for(s)
+        machine.injector.plug(*lines)
+
+    return begin
+
+
+def back_with(line: str, channel: str, mm: float, s: float = 2.0) -> Begin:
+    """Without power for so long; then the gauge shows another number than before."""
+
+    def begin(machine: InjectedMachine) -> None:
+        machine.injector.unplug(line)
+        machine.truth.rest_for(s)
+        machine.injector.fault(line, faults.Off((channel,), mm))
+        machine.injector.plug(line)
+
+    return begin
+
+
+def while_driving(begin: Begin) -> Begin:
+    def both(machine: InjectedMachine) -> None:
+        begin(machine)
+        machine.truth.drive(AWAY_MM)
+
+    return both
+
+
+def mute(*lines: str) -> Begin:
+    """No reply at all."""
+
+    def begin(machine: InjectedMachine) -> None:
+        for line in lines:
+            machine.injector.fault(line, faults.Lost(probability=1.0))
+
+    return begin
+
+
+def unplugged_driving(line: str) -> Begin:
+    """Unplugged, and plugged in again after the machine has driven."""
+
+    def begin(machine: InjectedMachine) -> None:
+        machine.injector.unplug(line)
+        machine.truth.drive(AWAY_MM)
+        machine.injector.plug(line)
+
+    return begin
+
+
+def exchanged(one: str, other: str) -> Begin:
+    return lambda machine: machine.injector.exchange(one, other)
+
+
+def replugged_exchanged(one: str, other: str) -> Begin:
+    def begin(machine: InjectedMachine) -> None:
+        machine.injector.unplug(one, other)
+        machine.injector.exchange(one, other)
+        machine.truth.rest_for(0.5)
+        machine.injector.plug(one, other)
+
+    return begin
+
+
+def flaps(*lines: str) -> Begin:
+    def begin(machine: InjectedMachine) -> None:
+        for _ in range(6):
+            machine.injector.replug(*lines)
+            machine.truth.rest_for(0.1)
+
+    return begin
+
+
+def sent(process: str, number: signal.Signals) -> Begin:
+    return lambda machine: machine.signal(process, number)
+
+
+def stopped(machine: InjectedMachine) -> None:
+    """The whole daemon is stopped for a second."""
+    machine.stop_for(1.0)

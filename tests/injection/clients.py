@@ -1,0 +1,154 @@
+"""Hostile clients: each runs in a process of its own against the daemon's sockets until it is ended."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import random
+import socket
+import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tests.injection.rig import InjectedMachine
+
+CONNECTED_WITHIN_S = 10.0
+PAUSE_S = 0.01
+RESET = struct.pack("ii", 1, 0)
+Address = tuple[str, int]
+
+
+def _connected(tcp: Address) -> socket.socket:
+    connection = socket.create_connection(tcp, CONNECTED_WITHIN_S)
+    connection.settimeout(CONNECTED_WITHIN_S)
+    return connection
+
+
+def _flood(tcp: Address, line: bytes) -> None:
+    """Ask as fast as it is taken, and read every answer."""
+    with _connected(tcp) as connection:
+        connection.setblocking(False)
+        while True:
+            with contextlib.suppress(BlockingIOError):
+                connection.send(line * 100)
+            with contextlib.suppress(BlockingIOError):
+                while connection.recv(1 << 16):
+                    pass
+
+
+def status(unix: str, tcp: Address) -> None:
+    _flood(tcp, b'{"class":"STATUS"}\n')
+
+
+def version(unix: str, tcp: Address) -> None:
+    _flood(tcp, b'{"class":"VERSION"}\n')
+
+
+def deaf(unix: str, tcp: Address) -> None:
+    """Twenty watchers that never read."""
+    connections = [_connected(tcp) for _ in range(20)]
+    for connection in connections:
+        connection.sendall(b'{"class":"WATCH"}\n')
+    time.sleep(3600)
+
+
+def idle(unix: str, tcp: Address) -> None:
+    """More connections than there is room for, which ask nothing."""
+    kept = []
+    for _ in range(60):
+        with contextlib.suppress(OSError):
+            kept.append(_connected(tcp))
+    time.sleep(3600)
+
+
+def endless(unix: str, tcp: Address) -> None:
+    """A line that never ends."""
+    while True:
+        with contextlib.suppress(OSError), _connected(tcp) as connection:
+            while True:
+                connection.sendall(b"x" * 65536)
+
+
+def noise(unix: str, tcp: Address) -> None:
+    """Random bytes."""
+    generator = random.Random(1)
+    while True:
+        with contextlib.suppress(OSError), _connected(tcp) as connection:
+            while True:
+                connection.sendall(generator.randbytes(4096))
+
+
+def churn(unix: str, tcp: Address) -> None:
+    """Connections that send half a message and are reset."""
+    while True:
+        with contextlib.suppress(OSError), _connected(tcp) as connection:
+            connection.sendall(b'{"class":"WATCH","rate_hz":')
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+        time.sleep(PAUSE_S)
+
+
+def models(unix: str, tcp: Address) -> None:
+    """Models that are no files: a FIFO, a device without end, deep nesting."""
+    folder = Path(unix).parent
+    fifo, nested = folder / "fifo.yaml", folder / "nested.yaml"
+    with contextlib.suppress(FileExistsError):
+        os.mkfifo(fifo)
+    nested.write_text("[" * 4000)
+    while True:
+        for path in (fifo, Path("/dev/zero"), nested, folder):
+            with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as connection:
+                connection.settimeout(CONNECTED_WITHIN_S)
+                connection.connect(unix)
+                connection.sendall(b'{"class":"MODEL","file":"%s"}\n' % os.fsencode(path))
+                lines = connection.makefile("rb")
+                lines.readline()  # VERSION
+                lines.readline()
+        time.sleep(PAUSE_S)
+
+
+# What is done, in a user's words and exactly, by the name of the function.
+ATTACKS: dict[str, tuple[str, str]] = {
+    "status": ("a client asks STATUS without end", "as fast as it is taken, over TCP"),
+    "version": ("a client asks VERSION without end", "as fast as it is taken, over TCP"),
+    "deaf": ("clients that watch and never read", "20 over TCP"),
+    "idle": ("clients that take all places", "60 over TCP"),
+    "endless": ("a client whose line never ends", "x without newline, over TCP"),
+    "noise": ("a client that sends noise", "random bytes over TCP"),
+    "churn": ("clients that come and are cut off", "half a message and a reset, over TCP"),
+    "models": ("models that are no model files", "a FIFO, /dev/zero, 4000 brackets, a directory"),
+}
+_ATTACKS: dict[str, Callable[[str, Address], None]] = {
+    function.__name__: function for function in (status, version, deaf, idle, endless, noise, churn, models)
+}
+
+
+def run(name: str, unix: str, tcp: Address) -> None:
+    """Until it is killed; the daemon's end is its end too.
+
+    It takes no processor time from the simulated machine: the daemon is attacked, not the computer.
+    """
+    os.nice(19)
+    with contextlib.suppress(OSError):
+        _ATTACKS[name](unix, tcp)
+
+
+def attack(name: str) -> Callable[[InjectedMachine], None]:
+    """For the matrix."""
+    return lambda machine: machine.attack(name)
+
+
+@contextmanager
+def attacking(name: str, unix: Path, tcp: Address) -> Iterator[None]:
+    """The client runs during the block."""
+    process = multiprocessing.get_context("spawn").Process(target=run, args=(name, str(unix), tcp), daemon=True)
+    process.start()
+    try:
+        yield
+    finally:
+        process.kill()
+        process.join()

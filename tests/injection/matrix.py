@@ -1,0 +1,16 @@
+"""The fault matrix: what fails, what is injected for it, what must happen, and how the daemon comes out of it.
+
+One table for the test (tests/system/test_fault_matrix.py), the run that measures (`python -m tests.injection`), the
+soak (`python -m tests.soak`) and the page of the documentation (docs/generate/faults.py). The machine is the shipped
+tripod, at rest with its scales at `REST_MM`, unless a case says that it drives.
+"""
+
+from __future__ import annotations
+
+from tests.injection.case import Case
+from tests.injection.cases_of_lines import LINES
+from tests.injection.cases_of_numbers import NUMBERS
+from tests.injection.cases_of_processes import PROCESSES_AND_CLIENTS
+from tests.injection.cases_of_readings import READINGS
+
+MATRIX: tuple[Case, ...] = (*READINGS, *LINES, *NUMBERS, *PROCESSES_AND_CLIENTS)

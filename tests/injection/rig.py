@@ -1,0 +1,307 @@
+"""A simulated machine, the injector, a daemon, and the truth against which every valid setpoint is held."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import signal
+import socket
+import threading
+import time
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import yaml
+
+from compd.demo.processes import Command, run_commands
+from compd.demo.session import wait_for_gauges
+from compd.errors import DaemonError
+from compd.live.loop.states import State
+from compd.simulation.wires.control_client import ControlClient
+from tests.injection.clients import attacking
+from tests.injection.ends import LOOPBACK
+from tests.injection.injector import Injector
+from tests.support.daemon_process import Daemon
+from tests.support.paths import CONFIG
+from tests.support.watching import PATIENCE_S, Rules, Seen, Watcher, until
+
+TRIPOD = "tripod-cmm.yaml"
+RATE_HZ = 100.0
+# For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.
+SETTLED_S = 0.3
+TRUTH_EVERY_S = 0.05
+# What an owner adds to the shipped configuration, so that the gauges are compared with each other. Of the frame's
+# comparators the noise is larger than the last digit.
+NOISE_UM = {"frame_u": 0.02, "cabinet": 0.02}
+VOTES = {
+    "joint_pair_um": 30.0,
+    "tip_mm_per_s": 200.0,
+    "frame": {"temperature": "temperature_frame_degC", "expansion_ppm_per_K": 10.5, "tolerance_um": 15.0},
+}
+MACHINE_ZERO = "machine-zero.json"
+
+
+@dataclass
+class Verdict:
+    """What became of the setpoints of a time.
+
+    worst_um : largest distance of a valid tip from the true one, the machine at rest; nan where none was valid, inf
+    for a tip that is no number.
+    worst : that setpoint. states : how often each state was there. reasons : likewise.
+    """
+
+    worst_um: float = math.nan
+    worst: dict[str, Any] = field(default_factory=dict)
+    states: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    judged: int = 0
+    valid: int = 0
+    longest_reason: int = 0
+
+    @property
+    def valid_share(self) -> float:
+        total = sum(self.states.values())
+        return self.valid / total if total else math.nan
+
+    def add(self, seen: Seen, tip_mm: np.ndarray | None) -> None:
+        """A setpoint, with the true tip of its time; None where the machine moved."""
+        self.states[seen["state"]] += 1
+        if reason := seen.setpoint.get("reason"):
+            self.reasons[reason] += 1
+            self.longest_reason = max(self.longest_reason, len(reason.encode()))
+        if not seen["valid"]:
+            return
+        self.valid += 1
+        if tip_mm is None:
+            return
+        self.judged += 1
+        error_um = float(np.linalg.norm(np.subtract(seen["tip_M_mm"], tip_mm))) * 1e3
+        if not math.isfinite(error_um):
+            error_um = math.inf
+        if math.isnan(self.worst_um) or error_um > self.worst_um:
+            self.worst_um, self.worst = error_um, seen.setpoint
+
+
+class Asked(NamedTuple):
+    """The truth as of a time between asking and the answer."""
+
+    from_s: float
+    to_s: float
+    tip_mm: np.ndarray
+    moving: bool
+
+
+class Truth:
+    """Asks the simulated machine for its true tip, twenty times a second, and remembers the times of rest."""
+
+    def __init__(self, control: Path) -> None:
+        self._client = ControlClient(control)
+        self._lock = threading.Lock()
+        self._end = threading.Event()
+        self._seen: list[Asked] = []
+        self._ask()
+        self._thread = threading.Thread(target=self._run, name="truth", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._end.set()
+        self._thread.join(PATIENCE_S)
+        self._client.__exit__()
+
+    def forget(self) -> None:
+        """All but the last second."""
+        del self._seen[: -round(1 / TRUTH_EVERY_S)]
+
+    def drive(self, scale_mm: Sequence[float], patience_s: float = PATIENCE_S) -> None:
+        """Drive there, and return when the machine has come to rest and every gauge has been read again."""
+        with self._lock:
+            self._client.ask("DRIVE", scale_mm=list(scale_mm))
+        until("the machine rests", lambda: not self._ask()["moving"], patience_s)
+        self.rest_for(SETTLED_S)
+
+    def rest_for(self, duration_s: float) -> None:
+        """Let the machine stand for so long."""
+        end_s = time.monotonic() + duration_s
+        until("a rest", lambda: self._seen[-1].from_s > end_s)
+
+    def at(self, from_s: float, to_s: float) -> np.ndarray | None:
+        """(3,) the true tip, if the machine stood still from `from_s` to `to_s` and it is known; else None.
+
+        The answers before and after count as well, so that no motion between two answers is missed.
+        """
+        seen = self._seen[:]
+        first = bisect_right(seen, from_s, key=lambda asked: asked.to_s) - 1
+        last = bisect_left(seen, to_s, key=lambda asked: asked.from_s)
+        if first < 0 or last == len(seen) or any(asked.moving for asked in seen[first : last + 1]):
+            return None
+        return seen[last].tip_mm
+
+    def _ask(self) -> dict[str, Any]:
+        with self._lock:
+            from_s = time.monotonic()
+            truth = self._client.ask("TRUTH")
+            self._seen.append(Asked(from_s, time.monotonic(), np.array(truth["tip_mm"]), truth["moving"]))
+        return truth
+
+    def _run(self) -> None:
+        with contextlib.suppress(OSError, ValueError, DaemonError):  # the machine has been stopped
+            while not self._end.wait(TRUTH_EVERY_S):
+                self._ask()
+
+
+class InjectedMachine:
+    """The shipped tripod, simulated, with the injector on every line and a daemon beyond it. A context manager.
+
+    changes : of the daemon's configuration, by section: {"loop": {"on_stale": "fade"}}.
+    """
+
+    def __init__(self, directory: Path, seed: int = 3, changes: dict[str, dict[str, Any]] | None = None) -> None:
+        self.directory = directory
+        self._seed = seed
+        self._changes = changes or {}
+        self._running = ExitStack()
+
+    def __enter__(self) -> Self:
+        with ExitStack() as starting:
+            self._start(starting)
+            self._running = starting.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running.close()
+
+    def _start(self, running: ExitStack) -> None:
+        wires, ports = self.directory / "wires", self.directory / "ports"
+        options = ["--directory", str(wires), "--seed", str(self._seed), "--zero-hold", "1e9"]
+        commands = [Command(["simulate", str(CONFIG / TRIPOD), *options], ready=wires / "control.sock")]
+        running.enter_context(run_commands(commands, log=self.directory / "simulate.log"))
+        ports.mkdir()
+        configuration = yaml.safe_load((wires / TRIPOD).read_text())
+        self.injector = running.enter_context(Injector(configuration, ports))
+        self.truth = Truth(wires / "control.sock")
+        running.callback(self.truth.close)
+        self._attacks = running.enter_context(ExitStack())
+        self._tcp = (LOOPBACK, _free_port())
+        self.daemon = Daemon(self._write_configuration())
+        running.callback(self.daemon.stop)
+        self.daemon.__enter__()
+        with self.daemon.connected() as client, self.daemon.connected() as observer:
+            wait_for_gauges(observer, client.watch(10))
+            until("machine zero is taken", lambda: _takes_zero(observer))
+
+    def _write_configuration(self) -> Path:
+        data = self.injector.daemon_configuration()
+        data["loop"]["rate_hz"] = RATE_HZ
+        host, port = self._tcp
+        data["sockets"] = {
+            "tcp": {"host": host, "port": port},
+            "unix": {"path": str(self.directory / "s")},
+            "valid_for_s": 0.1,
+        }
+        data["state"] = {"directory": str(self.directory / "state")}
+        add_votes(data)
+        for section, values in self._changes.items():
+            data.setdefault(section, {}).update(values)
+        path = self.directory / "machine.yaml"
+        path.write_text(yaml.safe_dump(data, sort_keys=False))
+        return path
+
+    @contextmanager
+    def watched(self) -> Iterator[Watcher]:
+        """A client that takes every setpoint; the rules that are broken are in its `broken`."""
+        watcher = Watcher(self.daemon.socket, self.rules)
+        try:
+            yield watcher
+        finally:
+            watcher.close()
+
+    @property
+    def rules(self) -> Rules:
+        return self.daemon.rules
+
+    def judge(self, setpoints: Sequence[Seen], verdict: Verdict | None = None) -> Verdict:
+        """Hold setpoints against the truth. Ask for the truth once more first: the last ones are judged by it."""
+        self.truth.rest_for(0.0)
+        verdict = verdict or Verdict()
+        for seen in setpoints:
+            time_s = seen["time_s"]
+            age_s = seen.setpoint.get("age_s") or 0.0
+            verdict.add(seen, self.truth.at(time_s - max(age_s, SETTLED_S), time_s) if seen["valid"] else None)
+        return verdict
+
+    def accept(self, names: Sequence[str] = ("all",)) -> None:
+        """A person has looked at these gauges."""
+        with self.daemon.connected() as client:
+            for name in names:
+                client.accept(name)
+
+    def attack(self, name: str) -> None:
+        """A hostile client from now on."""
+        self._attacks.enter_context(attacking(name, self.daemon.socket, self._tcp))
+
+    def signal(self, process: str, number: signal.Signals) -> None:
+        """Send a signal to one of the daemon's processes."""
+        os.kill(self.daemon.pids()[process], number)
+
+    def stop_for(self, duration_s: float) -> None:
+        """Stop all of the daemon for so long."""
+        os.killpg(self.daemon.process.pid, signal.SIGSTOP)
+        try:
+            self.truth.rest_for(duration_s)
+        finally:
+            os.killpg(self.daemon.process.pid, signal.SIGCONT)
+
+    def repair(self) -> None:
+        """No fault on any line, no hostile client, and a daemon that runs."""
+        self._attacks.close()
+        self.injector.repair()
+        if not self.daemon.alive:
+            self.restart()
+
+    def restart(self, forget: bool = False) -> None:
+        """End the daemon, in whatever state it is, and start it anew.
+
+        forget : what it knows of its gauges but for machine zero, so that they are believed as they are.
+        """
+        self.daemon.stop()
+        if forget:
+            for path in (self.directory / "state").iterdir():
+                if path.name != MACHINE_ZERO:
+                    path.unlink()
+        self.daemon.__enter__()
+
+    def until_ok(self, watcher: Watcher, patience_s: float = PATIENCE_S) -> bool:
+        """Whether the state becomes ok within this time."""
+        since, end_s = watcher.now, time.monotonic() + patience_s
+        while time.monotonic() < end_s:
+            if any(seen["state"] == State.OK for seen in watcher.seen[since:]):
+                return True
+            watcher._end.wait(0.02)
+        return False
+
+
+def add_votes(configuration: dict[str, Any]) -> None:
+    """Let the gauges of a configuration document be compared with each other, as far as they can."""
+    for gauge, noise_um in NOISE_UM.items():
+        configuration["gauges"][gauge]["noise_um"] = noise_um
+    configuration["votes"] = VOTES
+
+
+def _takes_zero(client: Any) -> bool:
+    try:
+        client.zero()
+    except DaemonError:
+        return False
+    return True
+
+
+def _free_port() -> int:
+    with socket.create_server((LOOPBACK, 0)) as probe:
+        return int(probe.getsockname()[1])

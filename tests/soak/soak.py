@@ -1,0 +1,110 @@
+"""Simulated shop time with faults from the whole matrix: at random places, and now and then two at once."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from compd.errors import DaemonError
+from tests.injection.case import Case
+from tests.injection.matrix import MATRIX
+from tests.injection.rig import InjectedMachine
+from tests.injection.trial import accept
+from tests.soak.resources import resources_by_process
+from tests.soak.summary import Summary
+from tests.support.watching import Watcher
+
+# How often two faults come together, and how often none does.
+TOGETHER_SHARE = 0.2
+QUIET_SHARE = 0.1
+# Stroke in which the machine visits places, mm.
+STROKE_MM = 12.0
+# A fault lasts between these times, s.
+LASTS_S = (0.5, 4.0)
+# How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
+BY_ITSELF_S = 4.0
+AFTER_ACCEPTANCE_S = 10.0
+# Memory is compared with what it is after so many episodes: by then everything has been used once.
+WARM_EPISODES = 5
+
+Say = Callable[[str], None]
+
+
+def soak(machine: InjectedMachine, minutes: float, seed: int, say: Say) -> Summary:
+    """Run it. The faults, their order and places follow from the seed; their times are those of the computer."""
+    chance = random.Random(seed)
+    summary = Summary(seed)
+    start_s = told_s = time.monotonic()
+    episode = 0
+    while time.monotonic() < start_s + 60 * minutes:
+        if episode == WARM_EPISODES:
+            summary.before = resources_by_process(machine.daemon.pids())
+        _episode(machine, _drawn(chance), chance, summary)
+        episode += 1
+        if time.monotonic() > told_s + 60:
+            told_s = time.monotonic()
+            say(f"{(told_s - start_s) / 60:.0f} min: {episode} episodes, {sum(summary.states.values())} setpoints")
+    machine.repair()
+    machine.truth.rest_for(1.0)
+    summary.after = resources_by_process(machine.daemon.pids())
+    summary.seconds = time.monotonic() - start_s
+    return summary
+
+
+def _drawn(chance: random.Random) -> list[Case]:
+    """No fault, one, or two that leave the daemon alive."""
+    if chance.random() < QUIET_SHARE:
+        return []
+    one = chance.choice(MATRIX)
+    if one.lost or chance.random() > TOGETHER_SHARE:
+        return [one]
+    return [one, chance.choice([case for case in MATRIX if not case.lost and case.id != one.id])]
+
+
+def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Random, summary: Summary) -> None:
+    """To a place, the faults, and out of them again."""
+    place_mm = [chance.uniform(-STROKE_MM, STROKE_MM) for _ in range(3)]
+    lasts_s = chance.uniform(*LASTS_S)
+    machine.truth.forget()
+    before = _counts(machine)
+    with machine.watched() as watcher:
+        machine.truth.drive(place_mm)
+        for case in cases:
+            case.begin(machine)
+        machine.truth.rest_for(lasts_s)
+        machine.repair()
+        accepted = restarted = False
+        if not watcher.ended and not _settles(machine, watcher, BY_ITSELF_S):
+            accepted = accept(machine)
+            restarted = not _settles(machine, watcher, AFTER_ACCEPTANCE_S)
+        verdict = machine.judge(watcher.seen)
+        ended = bool(watcher.ended)
+        summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
+    fault = summary.add(cases, verdict)
+    fault.accepted += accepted
+    fault.restarted += restarted
+    if ended and not any(case.lost for case in cases):
+        summary.broken.append(f"{[case.id for case in cases]}: the connection ended")
+    if restarted:
+        machine.restart(forget=True)
+    elif not ended:
+        after = _counts(machine)
+        summary.cycles += max(0, after["cycles"] - before["cycles"])
+        summary.missed += max(0, after["missed_cycles"] - before["missed_cycles"])
+    if restarted or ended:
+        with machine.watched() as again:
+            assert machine.until_ok(again), again.seen[-1].setpoint
+
+
+def _settles(machine: InjectedMachine, watcher: Watcher, patience_s: float) -> bool:
+    try:
+        return machine.until_ok(watcher, patience_s)
+    except DaemonError:
+        return False
+
+
+def _counts(machine: InjectedMachine) -> dict[str, Any]:
+    counts: dict[str, Any] = machine.daemon.status()["loop"]
+    return counts

@@ -1,0 +1,110 @@
+"""The end, and a new configuration."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from compd.client import Client, connect
+from compd.errors import DaemonError
+from compd.live.loop.states import State
+from tests.support.daemon_process import Daemon, Pidfds
+from tests.support.process_checks import check_undisturbed, cycles_kept, is_ok, is_valid
+from tests.support.processes import RATE_HZ
+from tests.support.watching import PATIENCE_S, Seen, until
+
+# Promised are 2 s from SIGTERM to the end.
+END_S = 3.0
+
+
+def check_goodbye(seen: list[Seen], reason: str) -> None:
+    """The last setpoints of a stream: held for this reason, and a stop in the end.
+
+    A computer that pauses in between makes the loop miss its time, which is a stop of its own.
+    """
+    announced = next((i for i, s in enumerate(seen) if reason in s["reason"]), None)
+    assert announced is not None, f"no reason contains {reason!r}: {seen[-1].setpoint}"
+    assert seen[announced]["state"] == State.HOLD
+    assert is_valid(seen[announced])
+    states = [s["state"] for s in seen[announced:]]
+    assert set(states) == {State.HOLD, State.STOP}
+    assert states[-1] == State.STOP, "the last setpoint is invalid"
+
+
+def test_sigterm_is_told_to_clients_and_leaves_nothing(fresh: Daemon) -> None:
+    pids = fresh.pids()
+    with fresh.watched() as watcher, Pidfds(pids.values()) as processes:
+        watcher.for_s(0.2)
+        since = watcher.now
+        start_s = time.monotonic()
+        fresh.process.terminate()
+        assert fresh.process.wait(PATIENCE_S) == 0, fresh.log.read_text()[-4000:]
+        took_s = time.monotonic() - start_s
+        print(f"ended {took_s:.2f} s after SIGTERM")
+        assert took_s < END_S
+        processes.wait_for_ends()
+        watcher.until_end()
+        check_goodbye(watcher.seen[since:], "stopping")
+    assert not fresh.socket.exists()
+    assert not fresh.left()
+
+
+def changed(config: Path, **loop: Any) -> None:
+    """Write these keys of `loop:` into a configuration."""
+    data = yaml.safe_load(config.read_text())
+    data["loop"] |= loop
+    new = config.with_suffix(".new")
+    new.write_text(yaml.safe_dump(data, sort_keys=False))
+    new.rename(config)
+
+
+def test_sighup_with_an_invalid_configuration_changes_nothing(changing: Daemon) -> None:
+    pids = changing.pids()
+    with changing.connected() as client:
+        config_hash = client.version["config_hash"]
+    with changing.watched() as watcher, cycles_kept(changing):
+        changed(changing.config, rate_hz=-1)
+        os.kill(changing.process.pid, signal.SIGHUP)
+        until("the log says why", lambda: "loop.rate_hz" in changing.log.read_text(errors="replace"))
+        watcher.for_s(1.0)
+        assert not watcher.ended
+        check_undisturbed(changing, watcher.seen)
+    assert changing.pids() == pids
+    with changing.connected() as client:
+        assert client.version["config_hash"] == config_hash
+
+
+def test_sighup_brings_a_changed_configuration_under_the_same_main_process(changing: Daemon) -> None:
+    with changing.connected() as client:
+        config_hash = client.version["config_hash"]
+    with changing.watched() as watcher:
+        watcher.for_s(0.2)
+        since = watcher.now
+        changed(changing.config, rate_hz=RATE_HZ / 2)
+        start_s = time.monotonic()
+        os.kill(changing.process.pid, signal.SIGHUP)
+        watcher.until_end()
+        check_goodbye(watcher.seen[since:], "configuration")
+
+    def comes_back() -> Client | None:
+        assert changing.alive
+        try:
+            return connect(changing.socket, PATIENCE_S)
+        except DaemonError:
+            return None
+
+    with until("it listens again", comes_back) as client:
+        assert client.version["config_hash"] != config_hash
+        status = client.status()
+        assert status["config_hash"] == client.version["config_hash"]
+        assert status["loop"]["rate_hz"] == RATE_HZ / 2
+        assert status["processes"]["supervisor"]["pid"] == changing.process.pid
+        assert status["zero"]["taken"], "a rate changes no machine zero"
+    with changing.watched() as watcher:
+        watcher.until("ok", is_ok)
+        print(f"ok {time.monotonic() - start_s:.2f} s after SIGHUP")

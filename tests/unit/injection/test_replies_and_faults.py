@@ -1,0 +1,99 @@
+"""What the injector changes is the number alone: frames stay whole, and their checksums fit."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from tests.injection.faults import Exchange, Fault, Lost, Off, OneDigit, OneReplyLate, Shows, Stuck, Together
+from tests.injection.replies import Display, HeadsUnit, Protocol, Registers, crc16
+from tests.injection.rig import Verdict
+from tests.support.watching import Seen
+
+FLOATS = [
+    {"name": "u1", "address": 0, "type": "float32"},
+    {"name": "room", "address": 2, "type": "int16", "scale": 0.01},
+]
+DISPLAY = (Display(), b"\x02", b"-    1.2345    \r\n")
+HEADS = (HeadsUnit(2), b"M0\r\n", b"M0,+000.0120,-001.5000\r\n")
+RTU_BODY = b"\x01\x04\x06" + struct.pack(">fh", 0.25, 2015)
+RTU = (Registers(FLOATS, over_tcp=False), b"\x01\x04\x00\x00\x00\x03\xb0\x0b", RTU_BODY + crc16(RTU_BODY))
+TCP = (
+    Registers(FLOATS, over_tcp=True),
+    b"\x00\x07\x00\x00\x00\x06\x01\x04\x00\x00\x00\x03",
+    b"\x00\x07\x00\x00\x00\x09\x01\x04\x06" + struct.pack(">fh", 0.25, 2015),
+)
+LINES = pytest.mark.parametrize(("protocol", "request_", "reply"), [DISPLAY, HEADS, RTU, TCP])
+
+
+def sent(fault: Fault, line: tuple[Protocol, bytes, bytes], number: int = 0, elapsed_s: float = 0.0) -> list[bytes]:
+    protocol, request, reply = line
+    return [s.data for s in fault.send(Exchange(protocol, request, reply, number, elapsed_s))]
+
+
+def test_the_crc_is_that_of_the_specification() -> None:
+    assert crc16(bytes.fromhex("01030000000a")) == bytes.fromhex("c5cd")
+
+
+@LINES
+def test_a_reply_is_whole_once_and_keeps_its_bytes_where_no_number_changes(
+    protocol: Protocol, request_: bytes, reply: bytes
+) -> None:
+    assert protocol.request_length(request_ + b"\x02") == len(request_)
+    assert [n for n in range(len(reply) + 1) if protocol.reply_length(reply[:n])] == [len(reply)]
+    values = protocol.values(request_, reply)
+    assert set(values) == set(protocol.channels)
+    assert protocol.with_values(request_, reply, values) == reply
+
+
+@LINES
+def test_a_number_that_is_off_comes_in_a_frame_that_fits(protocol: Protocol, request_: bytes, reply: bytes) -> None:
+    first = protocol.channels[0]
+    (changed,) = sent(Off((first,), by=0.5), (protocol, request_, reply))
+    before, after = protocol.values(request_, reply), protocol.values(request_, changed)
+    assert after[first] - before.pop(first) == pytest.approx(0.5)
+    assert before.items() <= after.items()
+    assert len(changed) == len(reply)
+    if protocol is RTU[0]:
+        assert crc16(changed[:-2]) == changed[-2:]
+
+
+def test_a_drift_grows_and_one_reading_is_one() -> None:
+    drift = Off(("position",), drift_per_s=0.01)
+    assert sent(drift, DISPLAY, 5, elapsed_s=2.0) == [b"-    1.2145    \r\n"]
+    once = Off(("position",), by=1.0, count=1)
+    assert sent(once, DISPLAY, 0) != [DISPLAY[2]]
+    assert sent(once, DISPLAY, 1) == [DISPLAY[2]]
+
+
+def test_one_digit_is_another_one() -> None:
+    assert sent(OneDigit("position", -1), DISPLAY) == [b"-    1.7345    \r\n"]
+
+
+def test_what_is_stuck_shows_its_first_number_and_what_is_behind_the_one_before() -> None:
+    other = (DISPLAY[0], DISPLAY[1], b"+    9.0000    \r\n")
+    stuck, behind = Stuck(), OneReplyLate()
+    assert [sent(stuck, line) for line in (DISPLAY, other)] == [[DISPLAY[2]], [DISPLAY[2]]]
+    assert [sent(behind, line) for line in (DISPLAY, other)] == [[], [DISPLAY[2]]]
+
+
+def test_a_register_may_hold_nan_and_faults_come_together() -> None:
+    fault = Together((Shows(("u1",), math.nan), Off(("room",), by=1.0)))
+    (changed,) = sent(fault, TCP)
+    values = TCP[0].values(TCP[1], changed)
+    assert math.isnan(values["u1"])
+    assert values["room"] == pytest.approx(21.15)
+    assert sent(Lost(count=1), TCP) == []
+
+
+@pytest.mark.parametrize("wrong", [[1.0, 2.0, 3.5], [1.0, 2.0, math.nan]])
+def test_a_wrong_valid_setpoint_is_found_among_right_ones(wrong: list[float]) -> None:
+    verdict, truth = Verdict(), np.array([1.0, 2.0, 3.0])
+    for tip_mm in ([1.0, 2.0, 3.0002], wrong, [1.0, 2.0, 3.0]):
+        verdict.add(Seen(0.0, {"state": "ok", "valid": True, "reason": "", "tip_M_mm": tip_mm}), truth)
+    assert verdict.worst_um > 400.0
+    assert verdict.worst["tip_M_mm"] == wrong
+    assert verdict.judged == 3
