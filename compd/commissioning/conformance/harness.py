@@ -13,6 +13,7 @@ from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.live.acquisition.acquisition import NOTHING_UNDER_WAY
+from compd.live.acquisition.gauge_trust import GaugeTrust
 
 LOOKS = 24  # fault-free polls that the tolerance, a gauge's last digit, is taken from
 COARSEST = 0.01  # of the range: a difference beyond it is no last digit, but a wrong unit, scale or sign
@@ -69,6 +70,7 @@ class ConformanceSession:
     wire: ConformanceWire
     sensors: SensorValues
     tolerance: dict[str, float] = field(default_factory=dict)  # by channel, in its unit
+    trust: GaugeTrust | None = None  # judges the readings, as the daemon's does; None: the driver alone
     _line: Any = None
 
     def poll(self, faults: Iterable[Fault] = (), new_values: bool = True) -> Poll:
@@ -130,7 +132,10 @@ class ConformanceSession:
         try:
             if self._line is None:
                 self._line = self.wire.open()
-            return self.gauge.read(self._line)
+            if self.trust is None:
+                return self.gauge.read(self._line)
+            line = self._line
+            return self.trust.judge(self.trust.read(lambda: self.gauge.read(line)), self.wire.clock.monotonic())
         except LineFault as fault:
             now_s = self.wire.clock.monotonic()
             self._after(fault)

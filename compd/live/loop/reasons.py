@@ -50,7 +50,8 @@ def lost(faults: Iterable[GaugeFault]) -> Lost:
     """Faults grouped: "joint 1 to 9 (joints): line_lost (read: the port has hung up)"."""
     groups: dict[tuple[str, Quality, str], list[GaugeFault]] = {}
     for fault in faults:
-        detail = "" if fault.quality is Quality.STALE else fault.detail  # ages differ, the reason does not
+        # ages and distances differ, the reason does not
+        detail = "" if fault.quality in (Quality.STALE, Quality.DISTRUSTED) else fault.detail
         groups.setdefault((fault.channel.partition(".")[0], fault.quality, detail), []).append(fault)
     # a gauge that waits for a person comes first, that it is not cut off
     ordered = sorted(groups.values(), key=lambda group: group[0].quality is not Quality.DISTRUSTED)
@@ -70,7 +71,7 @@ def shortened(reason: str) -> str:
 def _group_text(group: list[GaugeFault]) -> str:
     first = group[0]
     gauge = first.channel.partition(".")[0] if len(group) > 1 else first.channel
-    detail = f" ({first.detail})" if first.detail else ""
+    detail = f" ({first.detail})".replace(f"accept {first.channel}", f"accept {gauge}") if first.detail else ""
     return f"{_meanings([fault.meaning for fault in group])} ({gauge}): {first.quality}{detail}"
 
 

@@ -16,8 +16,13 @@ from hypothesis import strategies as st
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.cases import CaseResult, Subject, run_case
 from compd.commissioning.conformance.faults import Fault
+from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.live.acquisition.gauge_trust import GaugeTrust
+from compd.live.acquisition.possible_motion import MotionLimits
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import GAUGES, names
 from compd.simulation.wires.device import SimulatedByteDevice
 
@@ -106,10 +111,20 @@ modbus_only = st.one_of(
 with_checksum = st.one_of(harmless_to_format, st.builds(faults.flipped, st.integers(0, 10_000)))
 
 
+def judged(session: ConformanceSession) -> GaugeTrust:
+    """As the acquisition judges an absolute gauge of whose motion nothing is known."""
+    lengths = [channel.name for channel in session.gauge.channels if channel.unit == "mm"]
+    memory = TrustMemory(lengths, [tolerance_mm(None)] * len(lengths))
+    unlimited = TrustSettings(MotionLimits(), returns_by_itself=True, stale_after_s=math.inf)
+    judges = {name: ReadingTrust(memory, name, unlimited) for name in lengths}
+    return GaugeTrust([judges.get(channel.name) for channel in session.gauge.channels], session.wire.clock)
+
+
 def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> None:
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
+    session.trust = judged(session)
     for faults_by_reply in polls:
         poll = session.poll(faults_by_reply)
         assert not poll.wrong, (faults_by_reply, poll)
