@@ -32,8 +32,6 @@ from compd.files import write_files
 from compd.release import __version__
 
 FORMAT = 2
-# A model of a hundred effects has 100 KB.
-LARGEST_FILE_BYTES = 1_000_000
 Kind = Literal["add", "remove", "fit", "undo"]
 # An effect's id, /absolute/file.py:NAME, or a formula written out.
 Declaration: TypeAlias = str | dict[str, Any]

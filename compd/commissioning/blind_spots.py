@@ -74,7 +74,7 @@ class BlindSpot:
     name : stable, for programs.
     fault : what happens.
     shown_by : what shows it, and under which condition; "" where nothing does.
-    vote : the key under `votes:` that switches this on; "" where it needs none, or there is none.
+    vote : the key under `votes:` (`VoteSettings`) for this; "" where it needs none, or there is none.
     unseen : what remains that nothing shows.
     cost : its number for a machine; "" where it has none there.
     """
@@ -222,6 +222,17 @@ def _is_absolute(configuration: Configuration, gauge: str) -> bool:
     return configuration.drivers[gauge].absolute if said is None else said
 
 
+def shown_by(spot: BlindSpot, configuration: Configuration | None = None) -> str:
+    """What shows a fault, in words: with the vote for it, and whether that is on in this configuration."""
+    if not spot.vote:
+        return spot.shown_by or "nothing"
+    state = ""
+    if configuration is not None:
+        setting = getattr(configuration.votes, spot.vote)
+        state = " is on" if setting is not None and setting is not False else " is off"
+    return f"{spot.shown_by} (`votes.{spot.vote}`{state})"
+
+
 def _nothing(_figures: Figures) -> str:
     return ""
 
@@ -231,7 +242,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "drift_of_a_scale",
         "a scale drifts: its head comes loose, its mount grows warm",
         "in machine-tool mode, once it exceeds the following error",
-        "scale_against_command",
+        "following_mm",
         "in CMM mode, and where the drive itself follows this scale",
         lambda figures: _drift(figures, "scale"),
     ),
@@ -239,7 +250,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "drift_of_a_joint_comparator",
         "a joint comparator drifts, or its probe comes loose",
         "of a revolute joint with two: the two no longer go together",
-        "ra_against_rb",
+        "joint_pair_um",
         "of a joint with one comparator, or where both drift alike",
         lambda figures: _drift(figures, "joint"),
     ),
@@ -247,7 +258,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "drift_of_a_frame_comparator",
         "a frame comparator drifts, or its rod grows warm",
         "where frame temperatures are wired: the frame moves more than they explain",
-        "frame_against_temperature",
+        "frame",
         "slow drifts that a temperature could explain",
         lambda figures: _drift(figures, "frame"),
     ),
@@ -255,7 +266,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "stuck_comparator",
         "a comparator shows one value for ever: its probe hangs, its unit repeats itself",
         "where its noise exceeds its last digit: bit-identical readings while its neighbours scatter",
-        "frozen_comparator",
+        "repeated_digits",
         "where noise or digits are coarse, and until enough readings have come",
         _stuck_comparator,
     ),
@@ -263,7 +274,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "stuck_scale",
         "a scale shows one value for ever",
         "while the machine moves: the other links, or its own joints, say so",
-        "standing_scale",
+        "standing_scale_mm",
         "with the machine at rest; and what moved before the vote was sure",
         _stuck_scale,
     ),
@@ -292,11 +303,19 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         _small_jump,
     ),
     BlindSpot(
+        "gauge_that_runs_away",
+        "a reading runs away as smoothly as the machine could move",
+        "in CMM mode: the tip would be faster than the machine ever is",
+        "tip_mm_per_s",
+        "in machine-tool mode, and whatever is slower",
+        lambda figures: f"1 mm of a scale is {figures.leverage('scale'):.2f} mm at the tip",
+    ),
+    BlindSpot(
         "power_cut",
         "displays and computer lose their power together; the displays count anew from where they stand",
+        "at the start, a gauge that counts must show what it showed last, which is on the disk",
         "",
-        "",
-        "the daemon has no last value to compare with: take machine zero after every power cut",
+        "displays that come back with the same number although the machine was moved; a state directory that was lost",
         _power_cut,
     ),
     BlindSpot(

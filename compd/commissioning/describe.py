@@ -9,21 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
-from compd.errors import CompdError, Problem
+from compd.commissioning.ambiguities import DescriptionError, ReplyPart, ambiguities
+from compd.errors import Problem
 from compd.gauge import Gauge, LineFault, Quality
 from compd.plugins import GAUGES, load
 
 FEWEST_REPLIES = 3
-_NUMBER = re.compile(rb" *[+-]? *\d*\.\d+| *[+-] *\d+|\d+")
-
-
-class DescriptionError(CompdError):
-    """Replies from which no description follows."""
+_NUMBER = re.compile(rb" *[+-]? *\d+\.\d+[eE][+-]?\d+| *[+-]? *\d*\.\d+| *[+-] *\d+|\d+")
 
 
 @dataclass(frozen=True)
@@ -38,34 +35,41 @@ class GaugeDescription:
         return yaml.safe_dump({"learned_gauge": {**self.options, "line": "name_of_its_line"}}, sort_keys=False)
 
 
-class _ReplyPart(NamedTuple):
-    """A piece of a reply: a number or the text between two numbers, and its first byte's place in the reply."""
-
-    is_number: bool
-    text: bytes
-    start: int
-
-
 def learn_gauge(
-    request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
+    request: bytes,
+    replies: Sequence[bytes],
+    unit: str,
+    names: Sequence[str] = (),
+    errors: Mapping[bytes, str] = {},
+    ignored: str = "",
+    decimals: int | None = None,
 ) -> tuple[GaugeDescription, list[str]]:
     """The description of a gauge, and the values that it gives of every reply. Parameters as for `describe_replies`.
 
     Raises DescriptionError where no description follows, or where a reply does not fit the one that does.
     """
-    description = describe_replies(request, replies, unit, names, errors)
+    description = describe_replies(request, replies, unit, names, errors, ignored, decimals)
     return description, read_replies(description, load(GAUGES, "serial_ascii", "driver serial_ascii"), replies)
 
 
 def describe_replies(
-    request: bytes, replies: Sequence[bytes], unit: str, names: Sequence[str] = (), errors: Mapping[bytes, str] = {}
+    request: bytes,
+    replies: Sequence[bytes],
+    unit: str,
+    names: Sequence[str] = (),
+    errors: Mapping[bytes, str] = {},
+    ignored: str = "",
+    decimals: int | None = None,
 ) -> GaugeDescription:
     """The description of a gauge that answered `request` (b"": it speaks unasked) by `replies`.
 
     unit : of every number on the wire.
     names : of the channels; "value", or 1, 2 ... if empty.
     errors : whole error replies without their terminator, and their quality.
-    Raises DescriptionError for too few replies that differ, and for the first reply of another form, with its place.
+    ignored : letters and signs that may vary beside a number and do not touch its value.
+    decimals : how many the device shows; digits behind them are skipped. As many as came if None.
+    Raises DescriptionError for too few replies that differ, for the first reply of another form, with its place, and
+    for whatever beside a number may be its sign, its unit, an address or a checksum.
     """
     terminator = _terminator(replies)
     bodies = [reply[: len(reply) - len(terminator)] for reply in replies]
@@ -84,6 +88,8 @@ def describe_replies(
     numbers = [k for k, column in enumerate(columns) if _is_channel(column)]
     if not numbers:
         raise DescriptionError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
+    if questions := ambiguities(columns, unit, ignored, decimals):
+        raise DescriptionError(questions)
     chosen = list(names) or (["value"] if len(numbers) == 1 else [str(k + 1) for k in range(len(numbers))])
     if len(chosen) != len(numbers):
         raise DescriptionError(
@@ -98,7 +104,7 @@ def describe_replies(
     for k, column in enumerate(columns):
         if k in numbers:
             name = chosen[numbers.index(k)]
-            text, note = _converter([part.text for part in column], name if len(numbers) > 1 else "")
+            text, note = _converter([part.text for part in column], name if len(numbers) > 1 else "", decimals)
         else:
             text, note = _constant(column)
         form += text
@@ -176,16 +182,16 @@ def _terminator(replies: Sequence[bytes]) -> bytes:
     return terminator
 
 
-def _parts(body: bytes) -> list[_ReplyPart]:
+def _parts(body: bytes) -> list[ReplyPart]:
     """Text and numbers in turn; the first and the last part are text, perhaps empty."""
     parts, start = [], 0
     for match in _NUMBER.finditer(body):
-        parts += [_ReplyPart(False, body[start : match.start()], start), _ReplyPart(True, match[0], match.start())]
+        parts += [ReplyPart(False, body[start : match.start()], start), ReplyPart(True, match[0], match.start())]
         start = match.end()
-    return [*parts, _ReplyPart(False, body[start:], start)]
+    return [*parts, ReplyPart(False, body[start:], start)]
 
 
-def _columns(bodies: Sequence[bytes]) -> list[list[_ReplyPart]]:
+def _columns(bodies: Sequence[bytes]) -> list[list[ReplyPart]]:
     """Column by column the parts of all replies. DescriptionError where one reply is built differently."""
     split = [_parts(body) for body in bodies]
     for k, parts in enumerate(split):
@@ -212,7 +218,7 @@ def _difference(k: int, place: int, body: bytes, first: bytes) -> DescriptionErr
     )
 
 
-def _is_channel(column: Sequence[_ReplyPart]) -> bool:
+def _is_channel(column: Sequence[ReplyPart]) -> bool:
     """A number with a point or a sign always counts; a bare whole number (an address, a name) if it changed."""
     if not column[0].is_number:
         return False
@@ -220,7 +226,7 @@ def _is_channel(column: Sequence[_ReplyPart]) -> bool:
     return not bare or len({part.text for part in column}) > 1
 
 
-def _constant(column: Sequence[_ReplyPart]) -> tuple[str, str]:
+def _constant(column: Sequence[ReplyPart]) -> tuple[str, str]:
     """Text that never changed, literally; a character that did, as the set of all that came; and a note as above."""
     form, note = "", ""
     for place in range(len(column[0].text)):
@@ -235,23 +241,32 @@ def _constant(column: Sequence[_ReplyPart]) -> tuple[str, str]:
     return form, note
 
 
-def _converter(texts: Sequence[bytes], name: str) -> tuple[str, str]:
-    """A number's converter, as narrow as the replies, and a note on what to look up in the manual ("" if nothing)."""
-    decimals = {len(text.partition(b".")[2]) if b"." in text else None for text in texts}
-    signed = all(re.search(rb"[+-]", text) for text in texts)
+def _converter(texts: Sequence[bytes], name: str, shown_decimals: int | None) -> tuple[str, str]:
+    """A number's converter, as narrow as the replies, and a note on what to look up in the manual ("" if nothing).
+
+    shown_decimals : how many decimals belong to the number; the digits behind them are skipped.
+    """
+    exponent = any(b"e" in text.lower() for text in texts)
+    decimals = {len(re.split(rb"[eE]", text)[0].partition(b".")[2]) if b"." in text else None for text in texts}
+    signed = all(re.match(rb" *[+-]", text) for text in texts)
     blank = all(text[:1] in b"+- " for text in texts) and not signed
     fixed = len({len(text) for text in texts}) == 1
-    zeros = fixed and all(re.search(rb"[+-]?0\d", text) for text in texts)
+    zeros = fixed and all(re.match(rb"[+-]?0\d", text) for text in texts)
     note = ""
-    head = ""
+    head = tail = ""
     if not fixed:
         blanks = min(len(text) - len(text.lstrip(b" ")) for text in texts)
         head, blank = " " * blanks, False
         note = f"{name or 'the number'} has no fixed width: a digit lost on the wire cannot be found"
     (places,) = decimals if len(decimals) == 1 else (None,)
+    width = len(texts[0]) if fixed else None
     point = any(b"." in text for text in texts)
     if point and places is None:
         note = f"{name or 'the number'} has no fixed count of decimals: a digit lost on the wire cannot be found"
+    elif width and places and shown_decimals is not None and 0 < shown_decimals < places:
+        skipped = places - shown_decimals
+        width, places, tail = width - skipped, shown_decimals, f"%*{skipped}[0-9]"
+        note = f"the {skipped} digits behind {name or 'the number'} are skipped: a checksum in them is not checked"
     if not point:
         note = f"{name or 'the number'} is a whole number: give its channel `decimals` or `scale`"
     return (
@@ -260,9 +275,10 @@ def _converter(texts: Sequence[bytes], name: str) -> tuple[str, str]:
         + (f"({name})" if name else "")
         + ("+" if signed else " " if blank else "")
         + ("0" if zeros else "")
-        + (str(len(texts[0])) if fixed else "")
+        + (str(width) if width else "")
         + (f".{places}" if point and places else "")
-        + ("f" if point else "d"),
+        + ("e" if exponent else "f" if point else "d")
+        + tail,
         note,
     )
 
@@ -295,5 +311,5 @@ class _RepeatedReply:
             raise LineFault(Quality.MISMATCH, repr(self._waiting))
         return self.receive(end + len(terminator))
 
-    def drain(self) -> bytes:
+    def drain(self, quiet_s: float | None = None) -> bytes:
         return self.receive(len(self._waiting))

@@ -1,8 +1,8 @@
 """Which jump a length gauge can feign without being distrusted, and lines on which nobody can tell whose a reply is.
 
-A reading is believed while it lies where something that accelerates by at most a could have brought it since the last
-poll, a time T ago: from rest to speed and back within two polls is a T^2. To that come six standard deviations of the
-noise, three for each of two readings. Without a limit, any jump is believed that the next answer confirms.
+The limits of a gauge, `acceleration_mm_per_s2` and `fastest_mm_per_s`, say where something can have moved since the
+last poll; its noise comes to that (`compd.live.acquisition.possible_motion`). Without limits, any jump is believed that
+the next answer confirms.
 """
 
 from __future__ import annotations
@@ -17,12 +17,9 @@ from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
-from compd.units import UM_PER_MM
-
-# The acquisition polls no line more often.
-_FASTEST_ROUND_S = 2e-3
-# Standard deviations of the noise between two readings: of 1e9 pairs one differs by more from noise alone.
-_NOISE_DEVIATIONS = 6.0
+from compd.live.acquisition.acquisition import FASTEST_ROUND_S
+from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
+from compd.live.acquisition.reading_trust import tolerance_mm
 
 
 class FeignedJump(NamedTuple):
@@ -30,14 +27,13 @@ class FeignedJump(NamedTuple):
 
     gauge : its name. measures : what its channels measure, as "scale 1". poll_s : from one reading to the next, nan
     where the driver does not say what it moves. jump_mm : the largest that is believed; inf without a limit, nan where
-    it is not known. noise_um : nan where the configuration does not say, and the jump is then without it.
+    it is not known.
     """
 
     gauge: str
     measures: tuple[str, ...]
     poll_s: float
     jump_mm: float
-    noise_um: float
 
 
 def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[FeignedJump]:
@@ -83,12 +79,11 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
         elif jump.jump_mm > largest_mm:
             warnings.append(
                 Problem(
-                    where=configuration.where("gauges", jump.gauge, "acceleration_mm_per_s2"),
+                    where=configuration.where("gauges", jump.gauge),
                     what=f"a jump of {named_together(jump.measures)} of {jump.jump_mm:.3g} mm is believed",
-                    value=f"{configuration.gauges[jump.gauge].acceleration_mm_per_s2:g} mm/s2, "
-                    f"a reading every {jump.poll_s * 1e3:.3g} ms",
+                    value=f"{_limits_text(configuration.gauges[jump.gauge])}, read every {jump.poll_s * 1e3:.3g} ms",
                     allowed=f"what is believed should be below limits.correction_mm, {largest_mm:g} mm",
-                    next_step="write the acceleration that it really has, or poll it more often",
+                    next_step="write `acceleration_mm_per_s2:` as small as it really is, or poll it more often",
                 )
             )
     return warnings
@@ -139,6 +134,11 @@ def _follows(before: str, name: str) -> bool:
     return digits.isdigit() and name == f"{kind} {letter}{int(digits) + 1}"
 
 
+def _limits_text(options: GaugeOptions) -> str:
+    limits = {"mm/s2": options.acceleration_mm_per_s2, "mm/s": options.fastest_mm_per_s}
+    return ", ".join(f"{limit:g} {unit}" for unit, limit in limits.items() if limit is not None)
+
+
 def _without_identity(identities: Mapping[str, str | None]) -> list[str]:
     """Gauges whose replies could be another one's, of the gauges of one line."""
     counts = Counter(identities.values())
@@ -147,12 +147,12 @@ def _without_identity(identities: Mapping[str, str | None]) -> list[str]:
 
 
 def _poll_s(budget: LineBudget) -> float:
-    return max(budget.usual_s, budget.line.poll_every_s, _FASTEST_ROUND_S) if budget.known else math.nan
+    return max(budget.usual_s, budget.line.poll_every_s, FASTEST_ROUND_S) if budget.known else math.nan
 
 
 def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions) -> FeignedJump:
-    noise_um = math.nan if options.noise_um is None else options.noise_um
-    noise_mm = 0.0 if options.noise_um is None else _NOISE_DEVIATIONS * options.noise_um / UM_PER_MM
-    limit = options.acceleration_mm_per_s2
-    jump_mm = math.inf if limit is None else limit * poll_s**2 + noise_mm
-    return FeignedJump(gauge, measures, poll_s, jump_mm, noise_um)
+    speed, acceleration = options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf
+    limits = MotionLimits(speed, acceleration)
+    unlimited = math.isinf(speed) and math.isinf(acceleration)
+    jump_mm = math.inf if unlimited else unseen_jump_mm(limits, poll_s, tolerance_mm(options.noise_um))
+    return FeignedJump(gauge, measures, poll_s, jump_mm)

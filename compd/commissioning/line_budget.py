@@ -5,6 +5,8 @@ takes to answer. What the computer adds is not in it.
 
     exchange = quiet + (sent + received) x character + turnaround,    round = sum of all exchanges,    rate = 1 / round
 
+Where replies do not say whose they are, a round ends with a silence that is longer than the longest exchange.
+
 Example: nine values as int16 in one block (8 bytes there, 23 back) at 19200 baud, 8N1: a character takes 0.52 ms, the
 silence 1.8 ms; with a turnaround of 1.8 ms a round takes 19.8 ms: 51 rounds a second.
 """
@@ -18,7 +20,9 @@ from dataclasses import dataclass, field
 from compd.configuration import Configuration
 from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
 from compd.errors import Problem
+from compd.gauge import replies_tell_whose
 from compd.lines.open import QUIET_CHARACTERS
+from compd.live.acquisition.reply_order import LATER_S, SLOWER
 
 SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
 SHORTEST_QUIET_ASCII_S = 1e-3
@@ -76,7 +80,7 @@ class LineBudget:
     """A round on one line, which polls every gauge on it once.
 
     bytes : there and back. ideal_s, usual_s : duration of a round with the shortest and the usual turnaround.
-    absent_s : what a round costs more while one device does not answer, before its gauge is put to rest.
+    absent_s : what a round costs more when a device that is absent is asked again.
     unknown : gauges whose drivers do not say what they move; they are not in the figures.
     """
 
@@ -109,14 +113,19 @@ class LineBudget:
         return 1 / max(round_s, self.line.poll_every_s) if self.known else math.nan
 
 
-def budget_of_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic | None]) -> LineBudget:
-    """The budget of one line; `gauges`: name -> traffic per poll as (bytes sent, bytes received), None = unknown."""
+def budget_of_line(
+    name: str, line: LineSettings, gauges: Mapping[str, Traffic | None], tells_whose: bool = True
+) -> LineBudget:
+    """The budget of one line; `gauges`: name -> traffic per poll as (bytes sent, bytes received), None = unknown.
+
+    tells_whose : whether replies on this line say whose they are.
+    """
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
     slowest = pace(line, USUAL_TURNAROUND_S)
-    # The request goes out, nothing comes for the timeout, and the line is drained for another one.
+    # The request goes out, and nothing comes for the timeout.
     absent_s = max(
-        (2 * line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
-        default=2 * line.timeout_s,
+        (line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
+        default=line.timeout_s,
     )
     return LineBudget(
         name=name,
@@ -124,21 +133,28 @@ def budget_of_line(name: str, line: LineSettings, gauges: Mapping[str, Traffic |
         gauges=len(gauges),
         exchanges=len(known),
         bytes=sum(sent + received for sent, received in known),
-        ideal_s=pace(line).round_s(known),
-        usual_s=slowest.round_s(known),
+        ideal_s=pace(line).round_s(known) + (0.0 if tells_whose else _silence_s(pace(line), known)),
+        usual_s=slowest.round_s(known) + (0.0 if tells_whose else _silence_s(slowest, known)),
         absent_s=absent_s,
         unknown=tuple(gauge for gauge, traffic in gauges.items() if traffic is None),
     )
 
 
+def _silence_s(line_pace: Pace, traffic: Traffic) -> float:
+    """How long the line is listened to at the end of a round, s (`compd.live.acquisition.reply_order`)."""
+    longest_s = max((line_pace.exchange_s(sent, received) for sent, received in traffic), default=0.0)
+    return SLOWER * longest_s + LATER_S
+
+
 def line_budgets(configuration: Configuration) -> list[LineBudget]:
     """The budget of every line that a gauge hangs on."""
     gauges = configuration.gauge_objects()
-    return [
-        budget_of_line(name, line, {gauge: gauges[gauge].traffic() for gauge in _gauges_on(configuration, name)})
-        for name, line in configuration.lines.items()
-        if _gauges_on(configuration, name)
-    ]
+    budgets = []
+    for name, line in configuration.lines.items():
+        if on_line := {gauge: gauges[gauge] for gauge in _gauges_on(configuration, name)}:
+            traffic = {gauge: driver.traffic() for gauge, driver in on_line.items()}
+            budgets.append(budget_of_line(name, line, traffic, replies_tell_whose(list(on_line.values()))))
+    return budgets
 
 
 def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:

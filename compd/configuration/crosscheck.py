@@ -31,7 +31,7 @@ class Sections:
     drivers: Mapping[str, type[Gauge[Any]]]
     wiring: Any
     acquisition: Any = None
-    sockets: Any = None
+    votes: Any = None
 
 
 def problems(sections: Sections) -> list[Problem]:
@@ -42,6 +42,7 @@ def problems(sections: Sections) -> list[Problem]:
         *_process_problems(sections),
         *_channel_problems(sections),
         *_completeness_problems(sections),
+        *_vote_problems(sections),
     ]
 
 
@@ -71,7 +72,7 @@ def warnings(sections: Sections) -> list[Problem]:
         for name in sections.gauges
         if whole and name not in wired_gauges
     ]
-    return [*unused, *_shared_process_warnings(sections), *_open_port_warnings(sections)]
+    return [*unused, *_vote_warnings(sections), *_shared_process_warnings(sections)]
 
 
 def resolve_channel(
@@ -165,6 +166,32 @@ def _process_problems(sections: Sections) -> Iterator[Problem]:
         named.add(name)
 
 
+def _vote_problems(sections: Sections) -> Iterator[Problem]:
+    """A vote that looks at what is not wired."""
+    temperature = getattr(getattr(sections.votes, "frame", None), "temperature", None)
+    names = [wire.name for _, wire in _entries(sections.wiring, "quantities")]
+    if temperature is not None and temperature not in names and None not in names:
+        yield Problem(
+            where=sections.document.where(("votes", "frame", "temperature")),
+            what="no such quantity",
+            value=temperature,
+            allowed=", ".join(names),
+            next_step="write a name under `wiring: quantities:`",
+        )
+
+
+def _vote_warnings(sections: Sections) -> Iterator[Problem]:
+    """A vote that nobody can give."""
+    roles = {(wire.link, wire.role) for _, wire in _entries(sections.wiring, "joint")}
+    pairs = [link for link, role in roles if role == "Ra" and (link, "Rb") in roles]
+    if getattr(sections.votes, "joint_pair_um", None) is not None and not pairs:
+        yield Problem(
+            where=sections.document.where(("votes", "joint_pair_um")),
+            what="no joint has two comparators, Ra and Rb: this vote sees nothing",
+            next_step="remove it",
+        )
+
+
 def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
     """A driver that is not part of compd, on a line that shares its process with others."""
     own_process = getattr(sections.acquisition, "own_process", None) or ()
@@ -178,20 +205,6 @@ def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
                 value=options.driver,
                 next_step=f"write `{options.line}` under `acquisition: own_process:`",
             )
-
-
-def _open_port_warnings(sections: Sections) -> Iterator[Problem]:
-    """A TCP port that other computers can reach."""
-    tcp = None if sections.sockets is None else sections.sockets.tcp
-    if tcp is not None and tcp.is_open:
-        yield Problem(
-            where=sections.document.where(("sockets", "tcp", "host")),
-            what="OPEN TO THE NETWORK: other computers can watch and, with the token, move this machine; nothing "
-            "on the way is encrypted, the token neither",
-            value=f"{tcp.host}, allowed from {', '.join(tcp.allow)}",
-            next_step="let compd listen on 127.0.0.1 and a proxy with TLS on the network, or keep this network to the "
-            "machine; `target: {unix_only: true}` under `sockets:` lets other computers only watch",
-        )
 
 
 def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:

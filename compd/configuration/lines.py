@@ -22,7 +22,9 @@ class _LineSettings(Section):
 
 
 class _SerialSettings(_LineSettings):
-    port: Text = Field(description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port)")
+    port: Text = Field(
+        description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port, rfc2217://host:port)"
+    )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
     low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")

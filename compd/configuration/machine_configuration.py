@@ -302,7 +302,7 @@ def examine(path: Path) -> Examined:
         drivers,
         part["wiring"],
         part["acquisition"],
-        part["sockets"],
+        part["votes"],
     )
     problems += crosscheck.problems(checked)
     warnings = in_order([*crosscheck.warnings(checked), *implausible(document, part, gauges)])

@@ -167,9 +167,8 @@ class TcpSocket(Section):
         description="addresses and networks (10.1.2.0/24) from which clients may connect; left out: every address that "
         "reaches the port",
     )
-    token_file: str | None = Field(
+    token_file: AbsolutePath | None = Field(
         default=None,
-        pattern=r"^/",
         description="absolute path of a file, of mode 600, with a secret of 16 characters or more that every TCP "
         "client sends in its first line, `AUTH`; left out: none",
     )

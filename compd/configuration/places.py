@@ -1,4 +1,4 @@
-"""Places of a configuration outside of its file: directories that it names, and who reaches its sockets."""
+"""Places of a configuration outside of its file: directories that it names, and files."""
 
 from __future__ import annotations
 
@@ -68,7 +68,21 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
                     next_step=f"as root: install -d -o USER {path}; USER is who runs the daemon",
                 )
             )
-    return warnings
+    return [*warnings, *_open_socket_warnings(document, sockets)]
+
+
+def _open_socket_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:
+    if sockets is None or sockets.tcp is None or not sockets.tcp.is_open:
+        return
+    yield Problem(
+        where=document.where(("sockets", "tcp", "host")),
+        what="OPEN TO THE NETWORK: other computers can watch and, with the token, set targets; nothing on the way is "
+        "encrypted, the token neither",
+        value=f"{sockets.tcp.host}, allowed from {', '.join(sockets.tcp.allow)}",
+        allowed="127.0.0.1, or ::1, for this computer alone",
+        next_step="put a proxy with TLS in front of 127.0.0.1, or see that the network has nobody else in it; `target: "
+        "{unix_only: true}` lets other computers only watch",
+    )
 
 
 def _directories(
@@ -97,6 +111,6 @@ def _nearest(path: Path) -> Path:
 
 def _is_something_else(path: Path) -> bool:
     try:
-        return not stat.S_ISSOCK(path.stat().st_mode)
+        return not stat.S_ISSOCK(path.lstat().st_mode)
     except OSError:
         return False

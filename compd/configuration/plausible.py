@@ -62,6 +62,11 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "a controller may go on so long with the last setpoint of a daemon that has died",
     ),
     PlausibleRange(
+        "sockets.target.valid_for_s", 0.05, 60, "s",
+        "a controller would have to send its target many times a second",
+        "a controller that hangs keeps the machine at its last target so long",
+    ),
+    PlausibleRange(
         "lines.*.timeout_s", 0.005, 5, "s",
         "devices take 1 to 100 ms to answer: good replies would come too late",
         "one lost reply keeps all gauges of the line waiting so long",
@@ -91,6 +96,31 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "gauges.*.acceleration_mm_per_s2", 0.01, 50_000, "mm/s2",
         "not even noise would be believed",
         "five times gravity: this limit would find no jump",
+    ),
+    PlausibleRange(
+        "votes.standing_scale_mm", 0.01, 100, "mm",
+        "scales scatter, and a machine at rest would be taken for one that moves",
+        "a scale that is stuck would be found only after such a way",
+    ),
+    PlausibleRange(
+        "votes.following_mm", 0.002, 5, "mm",
+        "drives follow to micrometres: good scales would be named",
+        "a scale that is wrong by as much would pass",
+    ),
+    PlausibleRange(
+        "votes.joint_pair_um", 0.5, 200, "um",
+        "the play of an axis is larger: good comparators would be named",
+        "ball shanks err by micrometres: a comparator that drifts would pass",
+    ),
+    PlausibleRange(
+        "votes.tip_mm_per_s", 1, 5000, "mm/s",
+        "no machine is that slow: good gauges would be named",
+        "no tip moves that fast: nothing would be found",
+    ),
+    PlausibleRange(
+        "votes.frame.tolerance_um", 0.5, 500, "um",
+        "thermometers and rods are not that good: good comparators would be named",
+        "a comparator that drifts by as much would pass",
     ),
     PlausibleRange(
         "geometry.link_length_mm.*", 20, 20_000, "mm", "shorter than its own joints", "longer than any machine's"

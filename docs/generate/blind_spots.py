@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Figures, figures_of
+from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Figures, figures_of, shown_by
 from compd.configuration.shipped import load_machine
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target
 
@@ -17,7 +17,8 @@ The numbers are those of the tripod that comes with compd. For your own machine:
 
     compd check --what-cannot-be-seen my-machine.yaml
 
-Where a vote is named, it is a key under `votes:` in the configuration.
+`votes.KEY` is a key of the section [`votes`](#configuration-votes) of the configuration. That command also says whether
+it is on.
 """
 DRIFT = f"""\
 The error at the tip, at machine zero, of a length that is wrong by {DRIFT_UM:g} um: in CMM mode of the tip that is
@@ -46,9 +47,8 @@ def page() -> str:
 
 def _part(spot: BlindSpot) -> str:
     """One blind spot: a heading and a list."""
-    vote = f" (vote {code(spot.vote)})" if spot.vote else ""
     points = [
-        ("Shown by", (escape(sentence(spot.shown_by)) if spot.shown_by else "Nothing.") + vote),
+        ("Shown by", escape(sentence(shown_by(spot)))),
         ("Unseen", escape(sentence(spot.unseen))),
         ("On this tripod", escape(sentence(spot.cost(figures())) if spot.cost(figures()) else "")),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import TypeAdapter
 
 from compd.configuration.machine_configuration import SECTIONS
+from compd.configuration.plausible import PLAUSIBLE, PlausibleRange
 from compd.gauge import GaugeOptions
 from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term
 from docs.generate.schema import Key, ModelSchema, default_text, key_unit
@@ -26,6 +27,12 @@ GAUGES = """\
 The gauges, by name. Every other key belongs to the gauge's driver: see [gauges and drivers](gauges.md).
 """
 
+PLAUSIBLE_VALUES = """\
+A value outside of these ranges can be used, and `compd check` and `compd run` warn of it: there are machines of all
+sizes, but most often it is a slip of the unit or of the decimal point, or a limit that would let a fault pass. `*`
+stands for any name or entry.
+"""
+
 
 def page() -> str:
     """Markdown, from `SECTIONS`."""
@@ -41,10 +48,18 @@ def page() -> str:
         heading(2, "`gauges`", target("configuration", "gauges")),
         GAUGES,
         keys_table(ModelSchema(GaugeOptions).keys()),
+        heading(2, "Plausible values", target("configuration", "plausible")),
+        PLAUSIBLE_VALUES,
+        table(["key", "plausible", "below", "above"], [_plausible(entry) for entry in PLAUSIBLE]),
         "## Example",
         "The tripod that compd ships with, `config/tripod-cmm.yaml`:",
         "```{literalinclude} ../../config/tripod-cmm.yaml\n:language: yaml\n```\n",
     )
+
+
+def _plausible(entry: PlausibleRange) -> list[str]:
+    reasons = [escape(sentence(reason)) if reason else "-" for reason in (entry.too_low, entry.too_high)]
+    return [code(entry.key), f"{entry.lowest:g} to {entry.highest:g} {entry.unit}", *reasons]
 
 
 def keys_table(keys: list[Key]) -> str:

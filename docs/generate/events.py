@@ -25,7 +25,10 @@ from one process, they are counted in `log_dropped`.
 
 def page() -> str:
     """Markdown, from the list of events and that of their keys."""
-    rows = [[code(e.id), e.level, codes(e.keys), f"*{escape(e.text)}*: {escape(sentence(e.meaning))}"] for e in EVENTS]
+    rows = [
+        [code(e.id), e.level, codes(e.keys) or "-", f"*{escape(e.text)}*: {escape(sentence(e.meaning))}"]
+        for e in EVENTS
+    ]
     keys = [[code(key), escape(sentence(meaning))] for key, meaning in KEYS.items()]
     return join(
         "# Events",

@@ -105,6 +105,7 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
     watch = client.ask({"class": "WATCH", "rate_hz": 10}, "WATCH")
     driven = client.next_setpoint("ok", "slewing")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
+    authorized = client.ask({"class": "AUTH", "token": "hvNhV6l3Zk3lY0cJ4lV5Wg"}, "VERSION")
     talk = {
         "greeting": Exchange(None, (greeting,)),
         "WATCH": watch,
@@ -114,7 +115,8 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
         "RELEASE": client.ask({"class": "RELEASE"}, "RELEASE"),
         "ZERO": zero,
         "ACCEPT": client.ask({"class": "ACCEPT", "gauge": "all"}, "ACCEPT"),
-        "AUTH": client.ask({"class": "AUTH", "token": "hvNhV6l3Zk3lY0cJ4lV5Wg"}, "VERSION"),
+        # this daemon wants no token; one that does greets with AUTH
+        "AUTH": Exchange(authorized.sent, ({"class": "AUTH"}, *authorized.received)),
         "STATUS": client.ask({"class": "STATUS"}, "STATUS"),
         "VERSION": client.ask({"class": "VERSION"}, "VERSION"),
         "MODEL": client.ask({"class": "MODEL"}, "MODEL"),

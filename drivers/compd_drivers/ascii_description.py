@@ -11,6 +11,10 @@ from compd_drivers.exchange import ExchangeOptions
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.reply_format import ReplyFormat, unescape
 
+# An error form that fits more than this share of so many values of all kinds leaves no value.
+NEARLY_EVERY = 0.9
+SAMPLED_VALUES = 200
+
 
 class AsciiChannel(MeasuredChannel):
     """One number in the reply."""
@@ -50,7 +54,9 @@ class SerialAsciiOptions(ExchangeOptions):
     in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
     in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
     channels: tuple[AsciiChannel, ...] = Field(min_length=1, description="the numbers in the reply, in their order")
-    errors: tuple[ErrorReply, ...] = Field(default=(), description="the first that fits counts")
+    errors: tuple[ErrorReply, ...] = Field(
+        default=(), description="looked at before the value; the first that fits counts"
+    )
     init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
     echo: Echo | None = Field(default=None, description="finds a reply that is one behind")
     silent_in_menu: bool = Field(default=False, description="the device does not answer while in its menu")
@@ -67,6 +73,8 @@ class SerialAsciiOptions(ExchangeOptions):
                 raise ValueError(f"`in` has no %({missing[0]})f")
             if unknown := [number for number in numbers if number not in names]:
                 raise ValueError(f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}")
+        if shadowed := description.error_like_a_value():
+            raise ValueError(f"error {shadowed!r} fits nearly every value of the form {self.in_!r}")
         if not self.in_terminator and None in description.lengths:
             raise ValueError("without `in_terminator` every reply must have a fixed length: give every width")
         if not self.in_terminator and len(set(description.lengths)) > 1:
@@ -101,6 +109,14 @@ class Description(NamedTuple):
             unescape(options.out) + unescape(options.out_terminator),
             unescape(options.in_terminator),
         )
+
+    def error_like_a_value(self) -> str:
+        """The first error form that fits nearly every value; "" if there is none."""
+        values = list(self.reply.samples(SAMPLED_VALUES)) if self.errors else []
+        for form, error in self.errors:
+            if sum(form.match(value) is not None for value in values) > NEARLY_EVERY * len(values):
+                return error.in_
+        return ""
 
     @property
     def lengths(self) -> tuple[int | None, ...]:

@@ -19,7 +19,8 @@ class ExchangeOptions(GaugeOptions):
         default=None, description="between two bytes of a reply; the line's own, for the whole reply, if left out"
     )
     extra_input: Literal["error", "ignore"] = Field(
-        default="error", description="bytes behind a reply: a fault, or nothing to do with it"
+        default="error",
+        description="bytes behind a reply: a fault, or nothing to do with it (a gauge alone on its line)",
     )
 
 
@@ -78,8 +79,8 @@ def nothing_behind(line: ByteLine, options: ExchangeOptions, reply: bytes) -> No
 class MenuSilence:
     """Tells a device that does not answer while in its menu from one that is lost.
 
-    It had answered on this connection and then twice not: silent. The first time is a timeout like any other, so
-    that the line is drained and rests before the next request. A cable that came off looks the same as the menu.
+    It had answered on this connection and then twice not: silent. The first time is a timeout like any other: the
+    reply may only be late. A cable that came off looks the same as the menu.
     """
 
     def __init__(self) -> None:

@@ -5,6 +5,7 @@ One key `unit` says what the device sends; the channel delivers mm, degC, N, hPa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -49,6 +50,15 @@ CONVERSIONS: Mapping[str, _Conversion] = {
     "1": _Conversion("1"),
 }
 SIGNALS = ("V", "mA")
+
+
+# No instrument shows a number that is smaller, but for 0, or larger; a float whose bytes are exchanged does.
+SMALLEST_FLOAT, LARGEST_FLOAT = 1e-20, 1e20
+
+
+def not_measured(number: float) -> bool:
+    """Whether a float on the wire can be no measurement, and is read in a wrong order of its bytes."""
+    return math.isfinite(number) and number != 0.0 and not SMALLEST_FLOAT <= abs(number) <= LARGEST_FLOAT
 
 
 class DescriptionSection(BaseModel):

@@ -23,7 +23,7 @@ from pydantic import Field, model_validator
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
 from compd_drivers.linearisation import Linearisation
-from compd_drivers.measured import DescriptionSection, repeated
+from compd_drivers.measured import DescriptionSection, not_measured, repeated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -201,6 +201,8 @@ def _reading(channel: ModbusChannel, registers: tuple[int, ...], status_value: i
         return bad(time_s, Quality.OVER_RANGE, f"raw value {raw:g}")
     if raw in channel.under_range:
         return bad(time_s, Quality.UNDER_RANGE, f"raw value {raw:g}")
+    if channel.type == "float32" and not_measured(raw):
+        return bad(time_s, Quality.MISMATCH, _other_orders(channel, registers, raw))
     value = raw * channel.scale + channel.offset
     reading = channel.linearisation.reading(value, time_s) if channel.linearisation else good(value, time_s)
     if channel.highest is not None and reading.value > channel.highest:
@@ -214,6 +216,21 @@ def _status_quality(status: Status, status_value: int) -> Quality:
     if status_value in status.over_range:
         return Quality.OVER_RANGE
     return Quality.UNDER_RANGE if status_value in status.under_range else Quality.SENSOR_FAULT
+
+
+def _other_orders(channel: ModbusChannel, registers: Sequence[int], raw: float) -> str:
+    """What the same registers are in the other orders of bytes and words, for a person who knows the value."""
+    orders = [
+        channel.model_copy(update={"word_order": words, "byte_order": inside})
+        for words in ("high_first", "low_first")
+        for inside in ("big", "little")
+    ]
+    others = ", ".join(
+        f"{decode(other, registers):.7g} ({other.word_order}, {other.byte_order})"
+        for other in orders
+        if other != channel
+    )
+    return f"byte order? {raw:.4g} ({channel.word_order}, {channel.byte_order}) is no measurement; others: {others}"
 
 
 def decode(channel: ModbusChannel, registers: Sequence[int]) -> float:

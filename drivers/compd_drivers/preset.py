@@ -99,6 +99,11 @@ class Preset(DescriptionSection):
     line: LineAsDelivered | None = Field(
         default=None, description="the port as delivered; without it `compd gauge scan --probe` leaves the preset out"
     )
+    absolute: bool = Field(
+        default=False,
+        description="whether the device shows the same value again after its power was off, whatever is set on it; "
+        "left out where that is not certain",
+    )
     options: dict[str, PresetOption] = Field(default={}, description="what the person has to choose, in this order")
     gauge: dict[str, Any] = Field(default={}, description="options of the base driver; {name} is the chosen option")
     simulated: dict[str, Any] = Field(default={}, description="where the simulated device has others")

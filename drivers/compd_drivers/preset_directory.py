@@ -98,6 +98,7 @@ def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gaug
             "__doc__": preset.delivers,
             "__module__": f"{__name__}.{name}",
             "Options": options_model,
+            "absolute": preset.absolute,
             "about": f"{preset.title}\n\nSource: {preset.source}".strip(),
             "sample_options": preset.sample,
             "sample_range": preset.sample_range,

@@ -9,6 +9,7 @@ Everything is literal but a backslash and a percent sign:
     %d   %+06d            whole number, without or with its exact width
     %e                    number with an exponent:  +1.2345E-03
     %x   %4x              hexadecimal number, without sign
+    %+4x                  hexadecimal number in two's complement of its width: FFFF is -1
     %(name)f              the number of channel `name`; the name may be left out where there is one channel
     %*5c   %*s            skip five characters; skip what is not blank
     %*[<>=]   %*2[0-9]    skip one or more (or exactly two) characters out of a set
@@ -19,15 +20,17 @@ Everything is literal but a backslash and a percent sign:
 Give width and decimals wherever the manual shows them: a digit lost on the wire is then found.
 A width counts characters, blanks and sign included; leading zeros may come as blanks. Flag + : the sign is always
 there; flag blank: a sign or a blank is always there. What is skipped never takes the sign or a digit of a
-number beside it.
+number beside it; where both have a width, skipped digits may follow a number: `%+08.3f%*2c`.
 Sources: StreamDevice (format converters, checksums), C printf.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+import struct
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from random import Random
 from typing import Literal, cast
 
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
@@ -41,6 +44,7 @@ _CONVERTER = re.compile(
     r"|(?P<star>\*)?(?P<optional>\?)?(?:\((?P<name>\w+)\))?(?P<flags>[+ 0]*)(?P<width>\d+)?(?:\.(?P<decimals>\d+))?"
     r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]))",
 )
+_BYTE = struct.Struct("B").pack
 _SIGNS = {"+": r" *[+-] *", " ": r"(?: *[+-]| ) *", "": r" *[+-]? *"}
 _CHARACTERS = {"f": r"[+\- 0-9.]", "d": r"[+\- 0-9]", "e": r"[+\- 0-9.Ee]", "x": r"[0-9A-Fa-f]"}
 
@@ -70,6 +74,7 @@ class _Number:
     channel: str
     kind: str
     text: re.Pattern[bytes]
+    signed_bits: int  # of a hexadecimal number in two's complement; 0 for every other
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,11 @@ class _ChecksumField:
     kind: ChecksumKind
     start: int
     hexadecimal: bool
+
+    def of(self, data: bytes) -> bytes:
+        """The checksum of `data` as it stands in the reply."""
+        checksum = CHECKSUMS[self.kind].of(data)
+        return checksum[::-1].hex().upper().encode() if self.hexadecimal else checksum
 
 
 class ReplyFormat:
@@ -96,7 +106,8 @@ class ReplyFormat:
         self._instead = instead or {}
         self._numbers: list[_Number] = []
         self._checks: list[_ChecksumField] = []
-        self._before: Literal["fixed", "number", "skipped"] = "fixed"  # what stands before
+        self._before: Literal["fixed", "number", "number of open width", "skipped"] = "fixed"  # what stands before
+        self._samples: list[Callable[[Random, bytes], bytes]] = []  # each part, behind what stands before it
         self.length: int | None = 0
         self.longest = 0
         self.literal = b""  # all that is literal, for counting terminators
@@ -138,10 +149,20 @@ class ReplyFormat:
             if text in self._instead.get(number.channel, ()):
                 values.append(text)
             elif number.text.fullmatch(text):
-                values.append(_value(number.kind, text))
+                values.append(_value(number, text))
             else:
                 return None
         return tuple(values)
+
+    def samples(self, count: int) -> Iterator[bytes]:
+        """`count` replies of this form with numbers, and skipped characters, of every kind; the same in every run."""
+        random = Random(0)
+        for _ in range(count):
+            reply = b""
+            for part in self._samples:
+                reply += part(random, reply)
+            if self.match(reply) is not None:
+                yield reply
 
     def checksum_fails(self, reply: bytes) -> bool:
         """Whether the reply has the right form and a wrong checksum."""
@@ -150,11 +171,9 @@ class ReplyFormat:
 
     def _fits(self, match: re.Match[bytes], reply: bytes) -> bool:
         for check in self._checks:
-            expected = CHECKSUMS[check.kind].of(reply[check.start : match.start(check.group)])
+            expected = check.of(reply[check.start : match.start(check.group)])
             received = match[check.group]
-            if check.hexadecimal:
-                expected, received = expected[::-1].hex().upper().encode(), received.upper()
-            if received != expected:
+            if (received.upper() if check.hexadecimal else received) != expected:
                 return False
         return True
 
@@ -167,7 +186,9 @@ class ReplyFormat:
         if text:
             self._before = "fixed"
         self._longer(len(text))
-        self.literal += text.encode("latin-1")
+        data = text.encode("latin-1")
+        self.literal += data
+        self._samples.append(lambda random, before: data)
         return re.escape(text)
 
     def _longer(self, by: int | None) -> None:
@@ -191,8 +212,13 @@ class ReplyFormat:
         if kind == "c":
             width = width or 1
         characters = "." if kind == "c" else _CHARACTERS.get(kind, r"[^ \t\r\n]") if kind else _set(match["set"])
-        # what is skipped must not take digits of the number before it
-        whole = r"(?![0-9.])" if self._before == "number" else ""
+        # what is skipped must not take digits of the number before it, which it cannot where both have a width
+        both_fixed = self._before == "number" and width is not None and not match["optional"]
+        whole = r"(?![0-9.])" if self._before.startswith("number") and not both_fixed else ""
+        of_the_set = re.compile(characters.encode("latin-1"), re.DOTALL)
+        allowed = [byte for byte in map(_BYTE, range(256)) if of_the_set.fullmatch(byte)]
+        length = 0 if match["optional"] else width or 1
+        self._samples.append(lambda random, before: b"".join(random.choices(allowed, k=length)))
         if match["optional"]:
             self._longer(None)
             self._before = "skipped"
@@ -220,8 +246,12 @@ class ReplyFormat:
         name = match["name"] or ""
         if name in self.channels:
             raise ValueError(f"{match[0]}: channel {name!r} stands twice in the reply")
+        signed = kind == "x" and "+" in flags
+        if signed and width is None:
+            raise ValueError(f"{match[0]}: two's complement needs the number's width: %+4x")
         group = f"n{len(self._numbers)}"
-        self._numbers.append(_Number(name, kind, re.compile(body.encode())))
+        self._numbers.append(_Number(name, kind, re.compile(body.encode()), 4 * width if signed and width else 0))
+        self._samples.append(lambda random, before: _sample(random, kind, flags, width, decimals))
         words = [re.escape(word.decode("latin-1")) for word in sorted(self._instead.get(name, ()), key=len)]
         lengths = {len(word) for word in self._instead.get(name, ())} | {width}
         self._longer(width if len(lengths) == 1 else None)
@@ -229,7 +259,7 @@ class ReplyFormat:
         # nor may it take the sign or a digit of this one; and a number of open width ends with its last digit
         begins = r"(?:(?<![0-9.+\-])|(?<![.+\-])(?=[+\- ]))" if self._before == "skipped" else ""
         ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if kind == "x" else r"(?![0-9.])"
-        self._before = "number"
+        self._before = "number" if len(lengths) == 1 and width else "number of open width"
         return f"{begins}(?P<{group}>{'|'.join([*words, exact])}){ends}"
 
     def _checksum(self, match: re.Match[str]) -> str:
@@ -242,6 +272,8 @@ class ReplyFormat:
             _ChecksumField(group, cast(ChecksumKind, match["checksum"]), int(match["skip"] or 0), bool(match["hex"]))
         )
         self._longer(2 * length if match["hex"] else length)
+        check = self._checks[-1]
+        self._samples.append(lambda random, before: check.of(before[check.start :]))
         return f"(?P<{group}>[0-9A-Fa-f]{{{2 * length}}})" if match["hex"] else f"(?P<{group}>.{{{length}}})"
 
 
@@ -254,6 +286,21 @@ def _set(text: str) -> str:
     return f"[{turned}{members}]"
 
 
-def _value(kind: str, text: bytes) -> float:
+def _value(number: _Number, text: bytes) -> float:
     digits = text.replace(b" ", b"")
-    return float(int(digits, 16)) if kind == "x" else float(digits)
+    if number.kind != "x":
+        return float(digits)
+    value = int(digits, 16)
+    return float(value - (1 << number.signed_bits) if number.signed_bits and value >> number.signed_bits - 1 else value)
+
+
+def _sample(random: Random, kind: str, flags: str, width: int | None, decimals: int | None) -> bytes:
+    """A number as printf prints it."""
+    if kind == "x":
+        length = width or 4
+        return f"{random.getrandbits(4 * length):0{length}X}".encode()
+    places = 3 if decimals is None and kind in "fe" else decimals or 0
+    whole = 2 if width is None else max(0, width - 1 - (places + 1 if kind == "f" else 0))
+    value = random.uniform(-1, 1) * 10.0**whole
+    text = f"%{flags}{width or ''}" + (f".{places}{kind}" if kind in "fe" else kind)
+    return (text % (int(value) if kind == "d" else value)).encode()

@@ -130,10 +130,12 @@ class SerialAscii(Gauge[ByteLine]):
         self._check_echo(line)
         reply, time_s = self._poll(line)
         self._ready_on = line
-        values = self._description.reply.match(reply)
-        if values is not None:
+        error = self._error(reply)  # before the value: an error may look like one
+        if error is None:
+            values = self._description.reply.match(reply)
+            if values is None:
+                raise self._misfit(reply, self._description.reply)
             return [self._reading(k, values[place], time_s) for k, place in enumerate(self._order)]
-        error = self._refused(reply, self._description.reply)
         if error.quality == "device_error":
             self._ready_on = None
         return [bad(time_s, Quality(error.quality), _shown(reply, error))] * len(self._channels)
@@ -152,9 +154,10 @@ class SerialAscii(Gauge[ByteLine]):
         """One exchange without a value; an error reply to it is a fault of the whole poll."""
         line.send(request)
         reply = self._whole(line, form)
-        if form.match(reply) is None:
-            error = self._refused(reply, form)
+        if error := self._error(reply):
             raise LineFault(Quality(error.quality), _shown(reply, error))
+        if form.match(reply) is None:
+            raise self._misfit(reply, form)
 
     def _check_echo(self, line: ByteLine) -> None:
         if self._protocol.echo is None:
@@ -191,13 +194,11 @@ class SerialAscii(Gauge[ByteLine]):
     def _error(self, reply: bytes) -> ErrorReply | None:
         return next((error for form, error in self._description.errors if form.match(reply) is not None), None)
 
-    def _refused(self, reply: bytes, form: ReplyFormat) -> ErrorReply:
-        """The described error that a reply of another form is; LineFault if it is none."""
-        if error := self._error(reply):
-            return error
+    def _misfit(self, reply: bytes, form: ReplyFormat) -> LineFault:
+        """The fault for a reply that is neither of this form nor a described error."""
         if form.checksum_fails(reply):
-            raise LineFault(Quality.CRC, repr(reply))
-        raise LineFault(Quality.MISMATCH, f"{reply!r} is not what was expected")
+            return LineFault(Quality.CRC, repr(reply))
+        return LineFault(Quality.MISMATCH, f"{reply!r} is not what was expected")
 
     def _reading(self, k: int, value: float | bytes, time_s: float) -> Reading:
         channel = self._measured[k]

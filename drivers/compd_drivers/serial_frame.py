@@ -30,7 +30,7 @@ from pydantic import Field, model_validator
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
 from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
-from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, not_measured, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -252,4 +252,6 @@ def _reading(channel: FrameChannel, data: bytes, time_s: float) -> Reading:
     number = channel.number(data)
     if number in channel.invalid:
         return bad(time_s, Quality(channel.invalid[number]), f"number {number:g}")
+    if channel.type in _FLOATS and not_measured(number):
+        return bad(time_s, Quality.MISMATCH, f"byte order? {number:.4g} is no measurement")
     return channel.reading(number, time_s)

@@ -39,7 +39,10 @@ while True:
     if readable and not flood.recv(1 << 20):
         break
     if writable:
-        flood.send(request * 100)
+        try:
+            flood.send(request * 100)
+        except OSError:  # dropped: it took no answers
+            break
 """
 FLOODS = {
     "no flood": (),

@@ -142,7 +142,7 @@ class ReplayedLine:
             return self._take(place + len(terminator))
         raise LineFault(Quality.MISMATCH if len(self._waiting) >= limit else Quality.INCOMPLETE, repr(self._waiting))
 
-    def drain(self) -> bytes:
+    def drain(self, quiet_s: float | None = None) -> bytes:
         return self._take(len(self._waiting))
 
     def close(self) -> None:

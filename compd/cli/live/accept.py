@@ -40,7 +40,7 @@ def not_believed(status: dict[str, Any], setpoint: dict[str, Any]) -> list[str]:
     """What STATUS and SETPOINT say of gauges that are not believed, for people, with what to type."""
     distrusted = [gauge for gauge in status["gauges"] if gauge["quality"] == "distrusted"]
     lines = [f"{gauge['channel']}: {gauge.get('detail', 'no reason given')}" for gauge in distrusted]
-    if setpoint["state"] == "fault":
+    if setpoint["state"] == "fault" and not distrusted:
         lines.append(f"fault: {setpoint['reason']}")
     if not lines:
         return ["every gauge is believed"]

@@ -173,6 +173,12 @@ def learn(
     error: Annotated[
         list[str] | None, typer.Option(help="An error reply and its quality: 'ERR0=sensor_fault'.")
     ] = None,
+    ignore: Annotated[
+        str, typer.Option(help="Letters and signs that vary beside a number and do not touch its value: 'UGLE'.")
+    ] = "",
+    decimals: Annotated[
+        int | None, typer.Option(min=1, help="Decimals that the display shows, where more digits follow.")
+    ] = None,
     to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
@@ -196,7 +202,7 @@ def learn(
         reply_text, _, quality = assignment.partition("=")
         errors[reply_text.encode("latin-1")] = quality
     channels = [name.strip() for name in names.split(",") if name.strip()]
-    description, values = learn_gauge(request, captured, unit, channels, errors)
+    description, values = learn_gauge(request, captured, unit, channels, errors, ignore, decimals)
     for reply, value in zip(captured, values, strict=True):
         typer.echo(f"# {reply!r} -> {value}")
     for note in description.notes:

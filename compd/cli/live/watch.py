@@ -32,6 +32,7 @@ _STATUS_EVERY_S = 1.0
 _LEAST_RATE_HZ = 40.0
 _PERIODS = 3.0
 _LOOK_EVERY_S = 0.1
+_END_WITHIN_S = 0.5
 
 
 def watch(
@@ -85,7 +86,9 @@ class NewestSetpoint:
         self._status: dict[str, Any] = {}
         self._expires_s = math.inf
         self._error: CompdError | None = None
-        threading.Thread(target=self._follow, name="watch", daemon=True).start()
+        self._ended = False
+        self._thread = threading.Thread(target=self._follow, name="watch", daemon=True)
+        self._thread.start()
 
     def picture(self) -> RenderableType | None:
         """What is true now; None before the first setpoint."""
@@ -112,6 +115,11 @@ class NewestSetpoint:
             if self._error is not None:
                 raise self._error
 
+    def end(self) -> None:
+        """Follow no longer; the client may be closed then."""
+        self._ended = True
+        self._thread.join(_END_WITHIN_S)
+
     def _follow(self) -> None:
         try:
             status = self._client.status()
@@ -127,6 +135,11 @@ class NewestSetpoint:
                     expires_s = min(expires_s, setpoint["valid_until"])
                 with self._change:
                     self._setpoint, self._status, self._expires_s = setpoint, status, expires_s
+                if self._ended:
+                    return
+        except ValueError:  # a daemon that stands still, and the client was closed meanwhile
+            if not self._ended:
+                raise
         except CompdError as error:
             with self._change:
                 self._error, self._expires_s = error, min(self._expires_s, self._clock.monotonic())
@@ -151,6 +164,8 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
             if (picture := newest.picture()) is not None:
                 live.update(picture, refresh=True)  # no number stays on the screen
             raise
+        finally:
+            newest.end()
     if not console.is_terminal:
         console.print()  # `Live` leaves the last line open
 

@@ -58,9 +58,9 @@ def check(
         return
     warnings = [
         *configuration.warnings,
+        *token_warnings(configuration),
         *print_lines(configuration),
         *_print_cycle(configuration),
-        *socket_warnings(configuration),
     ]
     print_problems(warnings, "warning: ", sys.stdout)
     wiring = configuration.wiring
@@ -81,7 +81,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of
+    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
 
     console = Console()
     figures = figures_of(configuration)
@@ -95,7 +95,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     for spot in BLIND_SPOTS:
         console.print(Text(spot.fault[0].upper() + spot.fault[1:], style="bold"))
         for name, text in (
-            ("shown by", spot.shown_by or "nothing"),
+            ("shown by", shown_by(spot, configuration)),
             ("unseen", spot.unseen),
             ("cost", spot.cost(figures)),
         ):
@@ -131,20 +131,16 @@ def _print_cycle(configuration: Configuration) -> list[Problem]:
     return cycle_warnings(configuration, cycle)
 
 
-def socket_warnings(configuration: Configuration) -> list[Problem]:
-    """What on this computer would keep the daemon from listening: the Unix socket's path, the token's file."""
+def token_warnings(configuration: Configuration) -> list[Problem]:
+    """What would keep the daemon from using the token's file; run by another user, check may not be able to read it."""
     from compd.errors import DaemonError
-    from compd.live.service.listeners import unix_path_problem
     from compd.live.service.tcp_access import TcpAccess
 
-    warnings = []
-    if (problem := unix_path_problem(Path(configuration.sockets.unix.path))) is not None:
-        warnings.append(problem)
     try:
         TcpAccess.of(configuration.sockets.tcp)
     except DaemonError as error:
-        warnings += error.problems
-    return warnings
+        return list(error.problems)
+    return []
 
 
 def _list_drivers() -> None:
@@ -202,6 +198,7 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     from rich.table import Table
 
     from compd.commissioning.feigned_jumps import named_together
+    from compd.report.terminal_table import keep_words_whole
 
     title = "Largest jump that is believed"
     table = Table("gauge", "measures", "ms to the next reading", "jump, um", title=title, title_justify="left")
@@ -210,9 +207,9 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     for jump in jumps:
         poll = "?" if math.isnan(jump.poll_s) else f"{jump.poll_s * 1e3:.1f}"
         size = "any" if math.isinf(jump.jump_mm) else "?" if math.isnan(jump.jump_mm) else f"{jump.jump_mm * 1e3:.3g}"
-        noise = " + 6 x noise" if math.isnan(jump.noise_um) and math.isfinite(jump.jump_mm) else ""
-        table.add_row(jump.gauge, named_together(jump.measures), poll, size + noise)
-    Console().print(table)
+        table.add_row(jump.gauge, named_together(jump.measures), poll, size)
+    console = Console()
+    console.print(keep_words_whole(table, console.width))
 
 
 def _rates(usual_hz: float, ideal_hz: float) -> str:

@@ -21,8 +21,8 @@ MARGIN = 2.0
 SMALLEST = 1e-9  # of the range: rounding in floating point
 MOST_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
-# The daemon lets a gauge that did not answer rest for `back_off_s`, 0.5 s or more: at least so many line timeouts.
-REST_TIMEOUTS = 2.0
+# A gauge that did not answer rests for one line timeout, in which the line is drained: no further rest follows.
+REST_TIMEOUTS = 0.0
 
 
 class ConformanceWire(Protocol):

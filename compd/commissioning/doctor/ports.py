@@ -12,6 +12,8 @@ from compd.commissioning.doctor.finding import Computer, Finding, advice, fault,
 from compd.configuration.lines import LineSettings, ModbusTcpLine, TcpLine
 
 _BY_ID, _BY_PATH = "/dev/serial/by-id", "/dev/serial/by-path"
+# Their other end is held by another program as a matter of course.
+_PSEUDO_TERMINALS = "/dev/pts"
 _CONNECT_TIMEOUT_S = 1.0
 # FTDI's default keeps bytes back for 16 ms.
 _SHORT_LATENCY_MS = 2
@@ -56,6 +58,8 @@ def _serial_findings(
     real = computer.path(device)
     if not os.access(real, os.R_OK | os.W_OK):
         yield fault(subject, f"{port} may not be opened by this user", f"{subject}: {_how_to_be_permitted(real)}")
+    elif device.is_relative_to(_PSEUDO_TERMINALS):
+        yield good(subject, f"{port} is a pseudo terminal: a simulated gauge, or a program in between")
     elif holders := [holder for holder in computer.holders(device) if f"({os.getpid()})" not in holder]:
         if all(holder.startswith("compd") for holder in holders):
             yield good(subject, f"{port} is held by the daemon, {holders[0]}")

@@ -267,14 +267,17 @@ class LineThread:
             gauge.fail(quality, detail, failed_s)
             return
         self._order.missed(failed_s)
-        # A unit that has been absent before costs the others on the line its timeout, and no silence after it.
-        absent = quality is Quality.TIMEOUT and gauge.failures > 0 and len(self.gauges) > 1
-        came = b"" if absent else line.drain()
-        if came or quality is not Quality.TIMEOUT:
-            self._discard_waiting(
-                f"does not count, since {gauge.name} in the same round had {quality} {detail}".rstrip()
-            )
+        # A silence as long as the timeout has been kept already. It is kept once more where nothing else would tell a
+        # late reply from the next, but not for a unit that has been absent before: the others would wait for it.
+        absent = gauge.failures > 0 and len(self.gauges) > 1
+        if quality is not Quality.TIMEOUT:
+            line.drain()
+            self._discard_waiting(f"does not count: {gauge.name}, in the same round, had {quality} {detail}".rstrip())
+        elif not self._order.guarded and not absent:
+            line.drain()
         gauge.fail(quality, detail, failed_s)
+        if len(self.gauges) == 1 and gauge.failures == 1:
+            gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed or has had its time
 
 
 class Acquisition:

@@ -43,6 +43,11 @@ class ReplyOrder:
         self._fewest_polls = max(FEWEST_POLLS, len(gauges))
         self._in_doubt_until_s = -math.inf
 
+    @property
+    def guarded(self) -> bool:
+        """Whether a late reply is found by one that is too many, and not by what stands in it."""
+        return self._several or self._one
+
     def in_doubt(self, now_s: float) -> bool:
         """Whether a reading must wait until the line has been silent for `listen_s`."""
         return self._several or (self._one and now_s < self._in_doubt_until_s)

@@ -15,6 +15,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.file_trust import own_users, trust_problem
 from compd.files import read_small_file
@@ -24,7 +25,6 @@ from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
-from compd.model_document import LARGEST_FILE_BYTES
 from compd.model_file import read_model_file
 
 _HASH_DIGITS = 16
@@ -43,7 +43,7 @@ class ModelText(NamedTuple):
     def read(cls, path: Path) -> Self:
         """Read a file. Raises StateError where it cannot be read, is no regular file, or has more than 1 MB."""
         try:
-            return cls(str(path), read_small_file(path, LARGEST_FILE_BYTES))
+            return cls(str(path), read_small_file(path, LARGEST_BYTES))
         except OSError as error:
             raise _unreadable(path, error) from error
 

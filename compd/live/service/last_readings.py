@@ -26,6 +26,7 @@ _FORMAT = 1
 _LOOK_EVERY_S = 1.0
 # A daemon that was away for longer, s, does not know what happened to its gauges.
 _LONGEST_ABSENCE_S = 10.0
+_END_WITHIN_S = 0.5
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 log = structlog.get_logger()
@@ -103,9 +104,9 @@ class LastReadings:
         self._thread.start()
 
     def stop(self) -> None:
-        """Write once more, and end the thread."""
+        """Write once more, and end the thread; a disk that hangs is not waited for."""
         self._stop.set()
-        self._thread.join()
+        self._thread.join(_END_WITHIN_S)
 
     def _run(self) -> None:
         while not self._clock.wait(self._stop, _LOOK_EVERY_S):

@@ -46,7 +46,7 @@ class AcceptRequest(Request):
             channels = list(requests.accept(self.gauge))
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
-        _log.warning("gauges accepted", asked=self.gauge, channels=channels, client=client.name)
+        _log.warning("gauges accepted", gauge=self.gauge, channels=channels, client=client.name)
         return line({"class": self.wire_name, "gauges": channels})
 
 

@@ -128,7 +128,7 @@ class Publisher:
             _log.warning("a client could not be accepted", error=error.strerror)
             return
         if not local and not self._requests.admits(address[0]):
-            _log.warning("a client is not allowed", client=address[0], allowed="sockets.tcp.allow")
+            _log.warning("a client is not allowed", client=address[0])
             connection.close()
             return
         if not local:
@@ -185,7 +185,7 @@ class Publisher:
             return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
             if not session.authorized and session.is_heard:
-                _log.warning("a client has not shown the token", client=session.name, what=error.text)
+                _log.warning("a client has not shown the token", client=session.name, reason=error.text)
                 session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
             return error.to_json() if session.is_heard else b""
 

@@ -315,7 +315,7 @@ class Requests:
             raise ProtocolError(ErrorCode.NOT_CONTROLLER, "no client is the controller")
         if controller is not client:
             controller.lost_role = True
-            _log.warning("the controller's role was taken from it", controller=controller.name, by=client.name)
+            _log.warning("the controller has lost its role", client=controller.name, by=client.name)
         self.release(controller)
 
     def release(self, client: ClientSession) -> None:
@@ -323,7 +323,7 @@ class Requests:
         if self.controller is client:
             self.controller = None
             self.commands.target = None
-            _log.info("no controller any more", before=client.name)
+            _log.info("no controller any more", client=client.name)
 
     def _read(self, data: bytes) -> Request:
         name, keys = parse(data)

@@ -90,8 +90,9 @@ class ZeroCapture:
             _log.warning("machine zero refused", reason=str(error))
             return ProtocolError(ErrorCode.ZERO_REFUSED, str(error)).to_json()
         except Exception as error:  # noqa: BLE001  the client gets an answer whatever happens
-            _log.exception("machine zero refused")
-            return ProtocolError(ErrorCode.ZERO_REFUSED, f"{type(error).__name__}: {error}").to_json()
+            reason = f"{type(error).__name__}: {error}"
+            _log.warning("machine zero refused", reason=reason, exc_info=True)
+            return ProtocolError(ErrorCode.ZERO_REFUSED, reason).to_json()
         self._commands.zero = zero
         self._accept("all")
         _log.info("machine zero taken", path=str(path), changed_mm=_named(changed_mm) if changed_mm else "")

@@ -14,6 +14,8 @@ DAEMON_SOCKET = "compd.sock"
 SEALED_ANSWER = "hidden.answer.json"
 PORTS = "ports"
 STATE = "state"
+# What a simulator makes, and what the daemon keeps, with the copies that a crash leaves.
+_MADE = ((PORTS, "*"), (STATE, "*machine-zero.json*"), (STATE, "*last-readings.json*"))
 # First line of the daemon's configuration: only a file that begins so is replaced and removed.
 WRITTEN_BY = "written by `compd simulate`, gone with it."
 
@@ -88,7 +90,7 @@ class SimulationDirectory:
         for name in (CONTROL_SOCKET, DAEMON_SOCKET):
             if not is_served(self.path / name):
                 (self.path / name).unlink(missing_ok=True)
-        for folder, pattern in ((PORTS, "*"), (STATE, "*machine-zero.json*")):
+        for folder, pattern in _MADE:
             directory = self.path / folder
             for path in directory.glob(pattern):
                 if path.is_symlink() or folder == STATE:

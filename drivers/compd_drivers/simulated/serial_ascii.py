@@ -107,8 +107,10 @@ class SimulatedAscii(SimulatedByteDevice):
     def _number(self, name: str, form: str) -> str:
         channel = next(channel for channel in self.options.channels if channel.name == name)
         value = number_for(channel, self.sense(name)) / channel.scale * 10**channel.decimals
-        text = str(form % (round(value) if form[-1] in "dx" else value))
         width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)
+        if form[-1] == "x" and "+" in form:  # two's complement
+            return f"{round(value) % 16**width:0{width}X}"
+        text = str(form % (round(value) if form[-1] in "dx" else value))
         # an exact width without room for the zero before the point: -.050000
         return text.replace("0.", ".", 1) if 0 < width < len(text) and abs(value) < 1 else text
 

@@ -21,6 +21,15 @@ class SimulatedFrame(SimulatedByteDevice):
         self._request = bytes.fromhex(options.out) if options.out_checksum is None else self._printed_request()
         self._heard = b""
 
+    @property
+    def error_replies(self) -> dict[bytes, str]:
+        """Each described error as it goes over the wire, and the quality that it means."""
+        tokens = {error: error.frame.split() for error in self.options.errors}
+        return {
+            bytes(0 if token in {"..", "CS"} else int(token, 16) for token in frame): error.quality
+            for error, frame in tokens.items()
+        }
+
     def _printed_request(self) -> bytes:
         tokens = self.options.out.split()
         return with_checksum(

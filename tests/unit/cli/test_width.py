@@ -46,7 +46,7 @@ def test_gauge_show_wraps_no_text_twice(printed):
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_check_names_every_line_and_cuts_no_head(printed, name):
     text = printed("check", CONFIG / name)
-    assert "turnaround" in text
+    assert "exchanges" in text
     assert all(f" {line} " in text for line in load(CONFIG / name).lines)
 
 

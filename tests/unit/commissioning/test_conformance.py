@@ -49,6 +49,28 @@ def test_every_driver_on_ptys_and_ports(name: str) -> None:
     assert failures(list(run_conformance(driver_under_test(name)))) == []
 
 
+@pytest.mark.parametrize(
+    ("form", "error"),
+    [
+        ("%+08.3f", {"in": "+999.999", "quality": "over_range"}),
+        ("%*1[0-9],%+08.3f", {"in": "3,%*8c", "quality": "sensor_fault"}),
+    ],
+)
+def test_described_errors_that_look_like_values_are_tried(form: str, error: dict[str, str]) -> None:
+    options = {
+        "out": "?",
+        "out_terminator": r"\r",
+        "in": form,
+        "in_terminator": r"\r",
+        "channels": [{"name": "a", "unit": "mm"}],
+        "errors": [error],
+    }
+    results = [result for _, result in run_conformance(driver_under_test("serial_ascii", options), False)]
+    assert [result.observed for result in results if result.verdict == "FAIL"] == []
+    (errors,) = [result for result in results if result.case == "error replies"]
+    assert errors.observed.startswith(error["quality"])
+
+
 @pytest.mark.parametrize(("failing", "exact", "verdict"), [(1, False, "pass"), (3, False, "FAIL"), (1, True, "FAIL")])
 def test_a_computer_may_be_late_by_chance_in_real_time_and_a_driver_wrong_never(
     failing: int, exact: bool, verdict: str

@@ -33,8 +33,59 @@ OBSERVED = {
 @pytest.mark.parametrize("case", OBSERVED)
 def test_learned_description_reads_what_was_observed(case: str) -> None:
     request, replies, values = OBSERVED[case]
-    learned = describe_replies(request, replies, "mm")
+    learned = describe_replies(request, replies, "mm", ignored="GSNT" if case == "unasked" else "")
     assert read_replies(learned, load(GAUGES, "serial_ascii", "x"), replies) == values
+
+
+@pytest.mark.parametrize(
+    ("replies", "unit", "question"),
+    [
+        ([b"+001.234mm\r", b"+123.400um\r", b"-000.500mm\r"], "mm", "is it a sign, a unit, a side or a status"),
+        ([b"0012.300-\r", b"0012.400+\r", b"0000.500-\r"], "mm", "is it a sign, a unit, a side or a status"),
+        ([b"0012.300-\r", b"0012.400 \r", b"0000.500-\r"], "mm", "is it a sign, a unit, a side or a status"),
+        ([b"0012.300-\r", b"0010.400-\r", b"0000.500-\r"], "mm", "behind a number: is it the sign"),
+        ([b"L0012.300\r", b"R0012.400\r", b"L0000.500\r"], "mm", "is it a sign, a unit, a side or a status"),
+        ([b"12012.300\r", b"12000.500\r", b"12003.100\r"], "mm", "begins with 120 .* an address or a status"),
+        ([b"01012.300\r", b"01100.500\r", b"01003.100\r"], "mm", "begins with 01 .* an address or a status"),
+        ([b"-012.30007\r", b"+001.23041\r", b"+000.50013\r"], "mm", "5 decimals of mm: .* a checksum"),
+        ([b"+001.230\r", b"+999.999\r", b"-000.500\r"], "mm", "all nines: does it stand for an error"),
+        ([b"+0001,230\r", b"-0012,300\r", b"+0000,500\r"], "mm", "a decimal comma"),
+    ],
+)
+def test_what_may_belong_to_a_number_is_asked_and_never_thrown_away(
+    replies: list[bytes], unit: str, question: str
+) -> None:
+    with pytest.raises(CompdError, match=question):
+        describe_replies(b"?\r", replies, unit)
+
+
+def test_every_question_is_asked_at_once() -> None:
+    with pytest.raises(CompdError) as caught:
+        describe_replies(b"?\r", [b"L0012.300-\r", b"R0012.40007\r"[:10] + b"-\r", b"L9999.999-\r"], "mm")
+    assert len(caught.value.problems) >= 3
+
+
+def test_the_answers_to_the_questions() -> None:
+    driver = load(GAUGES, "serial_ascii", "x")
+    judged = [b"U+0012.300\r", b"G+0012.400\r", b"L-0000.500\r"]
+    learned = describe_replies(b"?\r", judged, "mm", ignored="UGL")
+    assert read_replies(learned, driver, judged) == ["12.3", "12.4", "-0.5"]
+    glued = [b"-012.30007\r", b"+001.23041\r", b"+000.50013\r"]
+    learned = describe_replies(b"?\r", glued, "mm", decimals=3)
+    assert learned.options["in"] == "%+08.3f%*2[0-9]"
+    assert read_replies(learned, driver, glued) == ["-12.3", "1.23", "0.5"]
+    learned = describe_replies(b"?\r", glued, "mm", decimals=5)
+    assert read_replies(learned, driver, glued) == ["-12.3001", "1.23041", "0.50013"]
+    over = [b"+001.230\r", b"+999.999\r", b"-000.500\r", b"+000.700\r"]
+    learned = describe_replies(b"?\r", over, "mm", errors={b"+999.999": "over_range"})
+    assert read_replies(learned, driver, over) == ["1.23", "over_range", "-0.5", "0.7"]
+
+
+def test_an_exponent_belongs_to_its_number() -> None:
+    replies = [b"+1.234567E-03\r", b"-2.500000E-01\r", b"+9.990000E+00\r"]
+    learned = describe_replies(b"?\r", replies, "1")
+    assert learned.options["in"] == "%+13.6e"
+    assert read_replies(learned, load(GAUGES, "serial_ascii", "x"), replies) == ["0.00123457", "-0.25", "9.99"]
 
 
 def test_learned_description_is_narrow() -> None:

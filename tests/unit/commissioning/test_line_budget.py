@@ -80,6 +80,13 @@ def test_unknown_traffic_has_no_rate_and_says_so() -> None:
     assert "mystery" in str(warning)
 
 
+def test_a_line_whose_replies_do_not_say_whose_they_are_is_listened_to_after_each_round() -> None:
+    nine = {f"g{i}": [(3, 10)] for i in range(9)}
+    told, not_told = (budget_of_line("x", rtu(9600), nine, tells_whose=tells) for tells in (True, False))
+    exchange_s = told.usual_s / 9
+    assert not_told.usual_s == pytest.approx(told.usual_s + 1.25 * exchange_s + 2e-3)
+
+
 def warning_text(budget: LineBudget, stale_after_s: float) -> str:
     return "\n".join(str(problem) for problem in line_warnings(budget, stale_after_s, "lines.x"))
 
@@ -88,7 +95,9 @@ def test_warnings_where_they_belong() -> None:
     nine = {f"g{i}": [(8, 7)] for i in range(9)}
     slow = budget_of_line("x", rtu(19200), nine)
     assert "go stale between two polls" in warning_text(slow, 0.2)
-    assert "one absent device of 9" in warning_text(slow, 0.3)
+    mute = budget_of_line("x", rtu(19200, timeout_s=0.3), nine)
+    assert "between two polls" not in warning_text(mute, 0.4)
+    assert "one absent device of 9 delays the others by 28" in warning_text(mute, 0.4)
     assert warning_text(slow, 1.0) == ""
     alone = budget_of_line("x", rtu(19200, timeout_s=5.0), {"g": INT16})
     assert warning_text(alone, 1.0) == ""

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from compd.configuration.machine_configuration import Examined
-from compd.errors import ConfigurationError
+from compd.errors import ConfigurationError, Problem, StateError
 from compd.machine_check import examine_whole, load_whole
+from compd.model_document import read_stored
+from compd.recording.sidecar import read_sidecar
 from tests.support.paths import CONFIG
 
 TRIPOD = (CONFIG / "tripod-cmm.yaml").read_text()
@@ -205,6 +207,10 @@ PROBLEMS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         swap(("{link: 3, gauge: scale_3}", "{link: 3, gauge: scale_1}")),
         [("wiring.scale[3].gauge", "wired already")],
     ),
+    "an open port without a list of who may connect": (
+        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
+        [("sockets.tcp", "allow and token_file are missing")],
+    ),
     "a machine called external": (swap(("machine: tripod-cmm", "machine: external")), [("machine", "another one")]),
     "a machine without a name": (swap(("machine: tripod-cmm", 'machine: ""')), [("machine", "must not be empty")]),
     "a name with a colour": (swap(("machine: tripod-cmm", 'machine: "\\e[31m"')), [("machine", "printable")]),
@@ -270,8 +276,8 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         [("lines.joints.back_off_s", "first wait is the longest")],
     ),
     "an open port": (
-        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
-        [("sockets.tcp.host", "become the controller")],
+        swap(("host: 127.0.0.1, port", "host: 0.0.0.0, allow: [10.0.0.0/8], token_file: /etc/compd/token, port")),
+        [("sockets.tcp.host", "OPEN TO THE NETWORK")],
     ),
 }
 
@@ -353,3 +359,18 @@ def test_run_reads_the_configuration_by_the_same_code(tmp_path: Path) -> None:
         load_whole(tmp_path / "machine.yaml")
     assert list(caught.value.problems) == found.problems
     assert len(found.problems) == 2
+
+
+@pytest.mark.parametrize(("content", "line", "words"), UNREADABLE.values(), ids=UNREADABLE)
+def test_model_files_and_sidecars_are_read_by_the_same_code(
+    tmp_path: Path, content: bytes, line: int, words: str
+) -> None:
+    path = tmp_path / "run.yaml"
+    path.write_bytes(content)
+    with pytest.raises(StateError) as caught:
+        read_stored(path)
+    problems: list[Problem] = []
+    assert read_sidecar(path, problems) is None
+    for (problem,) in (caught.value.problems, problems):
+        assert problem.where.startswith(f"{path}:{line}")
+        assert words in str(problem)

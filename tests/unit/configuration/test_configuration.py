@@ -45,7 +45,7 @@ def test_shipped_machines_are_complete(name: str) -> None:
 CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("  rate_hz: 200", "  rat_hz: 200"), "loop.rat_hz: unknown key", "did you mean `rate_hz`?"),
     (lambda t: t.replace("  on_stale: hold", "  #"), "loop.on_stale: is missing", "add `on_stale:`"),
-    (lambda t: t.replace("on_stale: hold", "on_stale: ignore"), "loop.on_stale", "'hold', 'fade' or 'stop'"),
+    (lambda t: t.replace("on_stale: hold", "on_stale: ignore"), "loop.on_stale", "'hold', 'fade', 'degrade' or 'stop'"),
     (lambda t: t.replace("rate_hz: 200", "rate_hz: .inf"), "loop.rate_hz", "finite"),
     (lambda t: t.replace("rate_hz: 200", "rate_hz: -1"), "loop.rate_hz", "greater than 0"),
     (lambda t: t.replace("[0, 250, 0]", "[0, 251, 0]", 1), "geometry.base", "centroid"),

@@ -149,3 +149,31 @@ def test_a_block_that_fails_leaves_no_values() -> None:
 def test_maps_that_cannot_be_are_refused(channels: list[dict[str, Any]], problem: str) -> None:
     with pytest.raises(ValidationError, match=problem):
         options(*channels)
+
+
+def registers_of(value: float, order: str) -> list[int]:
+    """A float32 as libmodbus writes it: ABCD, CDAB, BADC or DCBA."""
+    data = struct.pack(">f", value)
+    shuffled = bytes(data["ABCD".index(letter)] for letter in order)
+    return [int.from_bytes(shuffled[:2], "big"), int.from_bytes(shuffled[2:], "big")]
+
+
+def test_a_float_in_a_wrong_order_of_bytes_is_no_quiet_zero() -> None:
+    (reading,) = read(registers_of(-0.125, "DCBA"), channel(type="float32", lowest=-1, highest=1))
+    assert reading.quality is Quality.MISMATCH
+    assert reading.detail.startswith("byte order? 2.662e-43 (high_first, big) is no measurement")
+    assert "-0.125 (low_first, little)" in reading.detail, "all orders stand side by side"
+    (right,) = read(registers_of(-0.125, "DCBA"), channel(type="float32", word_order="low_first", byte_order="little"))
+    assert right.value == -0.125
+
+
+@pytest.mark.parametrize("value", [0.0, -0.0, 1e-12, -3e7])
+def test_zero_and_small_numbers_are_measurements(value: float) -> None:
+    (reading,) = read(registers_of(value, "ABCD"), channel(type="float32"))
+    assert reading.value == pytest.approx(value, rel=1e-6)
+
+
+@pytest.mark.parametrize("value", [1e-21, -1e-40, 1e30])
+def test_no_instrument_shows_such_numbers(value: float) -> None:
+    (reading,) = read(registers_of(value, "ABCD"), channel(type="float32"))
+    assert reading.quality is Quality.MISMATCH

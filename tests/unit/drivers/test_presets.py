@@ -227,3 +227,8 @@ def test_what_is_wrong_in_a_file_is_named_with_its_place(
     with pytest.raises(PluginError, match=what) as caught:
         PresetDirectory(tmp_path).driver("dial")
     assert any(re.search(where, problem.where) for problem in caught.value.problems), caught.value
+
+
+def test_only_devices_that_measure_where_their_sensor_is_are_absolute() -> None:
+    absolute = {name for name in names(GAUGES) if load(GAUGES, name, name).absolute}
+    assert absolute == {"adam_4017p", "icpdas_m7017c", "microepsilon_msc7", "moxa_e1240"}

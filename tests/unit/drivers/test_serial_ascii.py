@@ -60,6 +60,12 @@ def fault(device: SerialAscii, reply: bytes) -> Quality:
         ("%d", b"0012", 12.0),
         ("%+06d", b"-00012", -12.0),
         ("%4x", b"00fF", 255.0),
+        ("%+4x", b"FFFF", -1.0),
+        ("%+4x", b"8000", -32768.0),
+        ("%+4x", b"7fff", 32767.0),
+        ("%+08.3f%*2c", b"+001.23041", 1.23),  # a glued checksum
+        ("%+08.3f%*2[0-9A-F]", b"-012.300A7", -12.3),
+        (":010402%+4x%*2c", b":010402FB2E2A", -1234.0),  # Modbus ASCII
         ("%e", b"+1.2345E-03", 0.0012345),
         (r"\x02%f\x03", b"\x021.5\x03", 1.5),
         ("100%%=%d", b"100%=7", 7.0),
@@ -95,6 +101,10 @@ def test_formats_read_what_a_printf_prints(form: str, reply: bytes, value: float
         ("%f%*s", b"1.234"),  # what is skipped must not be a digit of the number
         ("%f%*c", b"1.234"),
         ("%8f%*s", b"+112.3456"),
+        ("%+08.3f%*2c", b"+001.2304"),  # a digit lost
+        ("%+08.3f%*2c", b"+01.23041"),
+        ("%+f%*2c", b"+001.23041"),  # a number of open width would take what is to be skipped
+        ("%+4x", b"FFF"),
         ("%*5c%f", b"N0 :-1.5"),
         ("%*4c%f", b"N0 :1.5"[:3] + b"11.5"),
         ("%*s%f", b"x+-1.5"),
@@ -314,6 +324,54 @@ def test_a_device_that_stops_speaking() -> None:
     assert caught.value.quality is Quality.INCOMPLETE
 
 
+# --- errors before values ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("form", "error", "reply", "quality"),
+    [
+        ("%+08.3f", {"in": "+999.999", "quality": "over_range"}, b"+999.999", Quality.OVER_RANGE),
+        ("%*1[0-9],%+08.3f", {"in": "3,%*8c", "quality": "sensor_fault"}, b"3,+001.234", Quality.SENSOR_FAULT),
+        ("%+08.3f", {"in": "%*1[+-]999.999", "quality": "over_range"}, b"-999.999", Quality.OVER_RANGE),
+    ],
+)
+def test_an_error_that_looks_like_a_value_is_an_error(
+    form: str, error: dict[str, str], reply: bytes, quality: Quality
+) -> None:
+    device = gauge(**{"in": form, "errors": [error]})
+    (reading,) = poll(device, reply + b"\r\n")
+    assert reading.quality is quality
+    (reading,) = poll(device, (b"1," if form.startswith("%*") else b"") + b"+001.234\r\n")
+    assert reading.value == 1.234
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"in": "%+08.3f", "errors": [{"in": "999", "quality": "over_range"}, {"in": "%*8c", "quality": "over_range"}]},
+        {"in": "%f", "errors": [{"in": "%*s", "quality": "over_range"}]},
+        {"in": "%+07.3f %0<sum8>", "errors": [{"in": "%*7c %*2c", "quality": "over_range"}]},
+        {"in": "%4x", "errors": [{"in": "%*[0-9A-F]", "quality": "over_range"}]},
+    ],
+)
+def test_an_error_that_fits_every_value_is_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match="fits nearly every value"):
+        gauge(**options)
+
+
+def test_an_error_that_fits_half_of_the_values_is_a_matter_of_the_manual() -> None:
+    gauge(**{"in": "%*1[01],%+08.3f", "errors": [{"in": "1,%*8c", "quality": "sensor_fault"}]})
+
+
+@pytest.mark.parametrize(
+    "form", ["%f", "%+09.4f", "% .3f", "%d", "%+06d", "%e", "%4x", "%+4x", "A%*2[0-9]%+07.2f %1<xor8>"]
+)
+def test_samples_of_a_form_are_replies_of_that_form(form: str) -> None:
+    samples = list(ReplyFormat(form).samples(50))
+    assert len(set(samples)) > 20
+    assert all(ReplyFormat(form).match(sample) is not None for sample in samples)
+
+
 # --- descriptions that cannot be right -----------------------------------------------------------------------
 
 
@@ -332,6 +390,7 @@ def test_a_device_that_stops_speaking() -> None:
         ({"in": "%f", "channels": [{"name": "value", "unit": "mm", "range": [1, -1]}]}, "range"),
         ({"in": "%f", "channels": [{"name": "value"}]}, "unit"),
         ({"in": "%y"}, "converter"),
+        ({"in": "%+x"}, "two's complement needs the number's width"),
     ],
 )
 def test_a_description_that_cannot_be_right(options: dict[str, Any], why: str) -> None:

@@ -158,3 +158,20 @@ def test_the_example_in_the_drivers_text() -> None:
     device = SerialFrame(SerialFrame.Options.model_validate(yaml.safe_load(block)))
     reply = bytes.fromhex("68 0B 0B 68 01 7E 08 AE 47 61 3F 00 00 00 00 1C 16")
     assert poll(device, reply)[0].quality is Quality.DEVICE_ERROR
+
+
+def test_a_float_in_a_wrong_order_of_bytes_is_no_quiet_zero() -> None:
+    device = gauge(
+        frame="5A 01 .. .. .. .. CS",
+        channels=[{"name": "gap", "at": 2, "type": "float32", "byte_order": "little", "unit": "mm"}],
+    )
+    (reading,) = poll(device, framed("5A 01 BE 00 00 00"))  # -0.125, high byte first
+    assert reading.quality is Quality.MISMATCH
+    assert "byte order?" in reading.detail
+    (reading,) = poll(device, framed("5A 01 00 00 00 BE"))
+    assert reading.value == -0.125
+
+
+def test_the_fixed_bytes_before_all_others_say_whose_a_reply_is() -> None:
+    assert gauge().reply_identity == "\x5a\x01"
+    assert gauge(frame=".. 01 .. .. CS").reply_identity is None

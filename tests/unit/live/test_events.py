@@ -30,7 +30,7 @@ def logged() -> Iterator[tuple[str, str, str, set[str]]]:
             level = node.func.attr if isinstance(node.func, ast.Attribute) else ""
             for text in texts:
                 assert isinstance(text, ast.Constant), f"{path}:{node.lineno}: an event's words are written out"
-                keys = {keyword.arg for keyword in node.keywords if keyword.arg}
+                keys = {keyword.arg for keyword in node.keywords if keyword.arg} - {"exc_info"}
                 yield f"{path.relative_to(ROOT)}:{node.lineno}", str(text.value), level, keys
 
 

@@ -16,7 +16,7 @@ import pytest
 from compd.clock import Clock
 from compd.commissioning.conformance.faults import Piece
 from compd.commissioning.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
-from compd.gauge import Gauge, Quality, replies_tell_whose
+from compd.gauge import Gauge, Quality, Reading, replies_tell_whose
 from compd.live.acquisition.acquisition import LineThread
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
@@ -76,13 +76,29 @@ class EndingClock:
         return self._clock.wait(event, timeout_s)
 
 
+class TimedLatest(WatchedLatest):
+    """Also notes when each reading was published."""
+
+    def __init__(self, channels: Sequence[str], clock: VirtualClock) -> None:
+        super().__init__(channels)
+        self._clock = clock
+        self.published_s: list[float] = []
+
+    def put(self, index: int, reading: Reading) -> None:
+        self.published_s.append(self._clock.now_s)
+        super().put(index, reading)
+
+
 class Run:
     """One line's thread on a virtual wire, for so many seconds of its time."""
 
-    def __init__(self, device: Comparators, gauges: Sequence[Gauge[Any]], seconds: float) -> None:
-        self.wire = VirtualWire(device, registers=False, timeout_s=TIMEOUT_S)  # type: ignore[arg-type]
+    def __init__(
+        self, device: Comparators, gauges: Sequence[Gauge[Any]], seconds: float, timeout_s: float = TIMEOUT_S
+    ) -> None:
+        self.wire = VirtualWire(device, registers=False, timeout_s=timeout_s)  # type: ignore[arg-type]
         self.names = [f"c{k}" for k in range(1, len(gauges) + 1)]
-        self.latest = WatchedLatest([f"{name}.x" for name in self.names])
+        self.latest = TimedLatest([f"{name}.x" for name in self.names], self.wire.clock)
+        settings = SETTINGS_TCP.model_copy(update={"timeout_s": timeout_s})
         clock = EndingClock(self.wire.clock, self.wire.clock.now_s + seconds, self._end)
 
         def opener(settings: Any, clock: Clock) -> Any:
@@ -90,7 +106,7 @@ class Run:
 
         named = list(zip(self.names, gauges, strict=True))
         stale_after_s = dict.fromkeys(self.names, 2.0)
-        self.thread = LineThread("line", SETTINGS_TCP, named, stale_after_s, self.latest, clock, opener)
+        self.thread = LineThread("line", settings, named, stale_after_s, self.latest, clock, opener)
         self.thread.start()
         assert self.thread.join(PATIENCE_S)
 
@@ -192,6 +208,24 @@ def test_a_late_reply_does_not_leave_a_single_gauge_one_reply_behind(late_s: flo
     readings = [reading for _, reading in run.latest.history if reading.ok]
     assert len(readings) > 30
     assert [r.time_s for r in readings] == pytest.approx([heard[round(r.value)] for r in readings])
+
+
+@pytest.mark.parametrize("timeout_s", [0.15, 0.2])
+def test_a_display_that_loses_every_twentieth_reply_is_never_stale(timeout_s: float) -> None:
+    """At 0.5 s, as both example configurations have it; the display takes 30 ms to answer."""
+
+    class Display(Comparators):
+        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, heard_s, timeout_s)
+            return [] if self.requests % 20 == 0 else [piece._replace(delay_s=30e-3)]
+
+    run = Run(Display(), [comparator(1)], 60.0, timeout_s)
+    assert run.thread.gauges[0].faults[Quality.TIMEOUT] > 20
+    readings = [reading for _, reading in run.latest.history]
+    assert all(reading.ok for reading in readings)
+    next_published_s = run.latest.published_s[1:]
+    oldest_s = max(then_s - r.time_s for r, then_s in zip(readings, next_published_s, strict=False))
+    assert oldest_s < 0.5
 
 
 def test_identities_differ_only_where_none_begins_another() -> None:

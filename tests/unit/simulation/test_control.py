@@ -109,7 +109,10 @@ def test_a_taken_tcp_port_is_exchanged_for_any(directory: Path) -> None:
 
 def test_no_setpoint_leaves_this_computer(directory: Path) -> None:
     """The simulated machine's setpoints must never reach the real machine's controller."""
-    abroad = {"tcp": {"host": "0.0.0.0", "port": 0}, "udp": {"host": "192.168.10.30", "port": 9000}}
+    abroad = {
+        "tcp": {"host": "0.0.0.0", "port": 0, "allow": ["10.0.0.0/8"], "token_file": "/etc/compd/token"},
+        "udp": {"host": "192.168.10.30", "port": 9000},
+    }
     original = load(section_file(directory, abroad))
     daemon = daemon_configuration(original, ports(original, directory), directory)
     assert daemon.sockets.tcp is not None

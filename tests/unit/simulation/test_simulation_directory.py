@@ -30,7 +30,7 @@ def what_a_killed_simulator_leaves(directory: Path) -> None:
     for folder in ("ports", "state"):
         (directory / folder).mkdir()
     (directory / "ports" / "scale_1").symlink_to("/dev/pts/nothing")
-    for name in ("machine-zero.json", "machine-zero.json.old", ".machine-zero.json.1234"):
+    for name in ("machine-zero.json", "machine-zero.json.old", ".machine-zero.json.1234", "last-readings.json"):
         (directory / "state" / name).write_text("{}")
     (directory / "hidden.answer.json").write_text("{}")
     for name in ("control.sock", "compd.sock"):

@@ -15,9 +15,10 @@ from tests.support.service import PERIOD_S, TIMEOUT_S, setpoint
 STATUS = b'{"class":"STATUS"}\n'
 
 
-def test_a_setpoint_goes_out_before_the_next_request_of_a_flood_is_answered(service):
-    """The first answer is held up until the flood is there; each answer finds the setpoints before it published."""
-    watcher, flooder = service.unix(), service.unix()
+@pytest.mark.parametrize("clients", [1, 4])
+def test_a_setpoint_goes_out_before_the_next_request_of_a_flood_is_answered(service, clients):
+    """With every answer a setpoint is made; each answer finds all setpoints before it published."""
+    watcher, *flooders = service.unix(), *(service.unix() for _ in range(clients))
     watcher.ask({"class": "WATCH"})
     published, now_s = [], MonotonicClock().monotonic()
     service.publisher._observers = (lambda _: None, published.append)
@@ -29,10 +30,11 @@ def test_a_setpoint_goes_out_before_the_next_request_of_a_flood_is_answered(serv
         return {"class": "STATUS"}
 
     service.requests.status = status
-    flooder.send(STATUS * 100)
-    for seq in range(1, 101):
+    for flooder in flooders:
+        flooder.send(STATUS * 100)
+    for seq in range(1, 100 * clients + 1):
         assert watcher.read()["seq"] == seq
-    assert before_answer == list(range(100))
+    assert before_answer == list(range(100 * clients))
 
 
 @pytest.mark.parametrize("flooders", [1, 5])
