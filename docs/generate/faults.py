@@ -65,15 +65,15 @@ rows, and `make soak` lets them happen at random.
 def _unseen() -> str:
     """What no gauge shows, first: it is what a person has to know."""
     rows = [
-        [escape(case.fault), escape(case.injected), f"{_outcome(case).get('worst_um', math.nan):.1f} um"]
+        [escape(case.fault), escape(case.injected), _number(_outcome(case).get("worst_um"), "um", 1)]
         for case in MATRIX
         if case.way is Way.UNSEEN and case.at_least_um
     ]
     return join(
         heading(2, "What nothing shows", target("faults", "unseen")),
-        "Each of these gauges is the only one that measures what it measures. While it drifts the state stays `ok`, "
-        "and the tip is wrong by as much as the last column says. `compd check --what-cannot-be-seen` lists them for "
-        "your machine.",
+        "Each of these gauges is the only one that measures what it measures, and its part may move so. The state "
+        "stays `ok`, and the tip is wrong by as much as the last column says. `compd check --what-cannot-be-seen` "
+        "lists them for your machine.",
         table(["what fails", "what was injected", "tip wrong by"], rows),
     )
 
@@ -87,7 +87,7 @@ def _row(case: Case) -> list[str]:
     return [
         f"{escape(case.fault)}<br>*{escape(case.injected)}*",
         f"{_must(case)}<br>Way out: {'the service manager starts it again' if case.lost else case.way.value}",
-        f"{_number(outcome.get('worst_um'), 'um', 2)}, {_number(outcome.get('valid_share', math.nan) * 100, '%', 0)}",
+        f"{_number(outcome.get('worst_um'), 'um', 2)}, {_share(outcome.get('valid_share'))}",
         f"{_number(outcome.get('shown_s'), 's', 2)}, {_number(outcome.get('back_s'), 's', 2)}",
     ]
 
@@ -110,6 +110,10 @@ def _must(case: Case) -> str:
 def _outcome(case: Case) -> dict[str, Any]:
     outcome: dict[str, Any] = measured()["outcomes"].get(case.id, {})
     return outcome
+
+
+def _share(value: float | None) -> str:
+    return _number(None if value is None else 100 * value, "%", 0)
 
 
 def _number(value: float | None, unit: str, decimals: int) -> str:

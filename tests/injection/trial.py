@@ -51,9 +51,8 @@ class Outcome:
     problems: list[str] = field(default_factory=list)
 
     def as_data(self) -> dict[str, Any]:
-        """For a file, rounded."""
-        data = asdict(self)
-        return {key: round(value, 3) if isinstance(value, float) else value for key, value in data.items()}
+        """For a file: rounded, and null for what is not known."""
+        return {key: _plain(value) for key, value in asdict(self).items()}
 
 
 def settle(machine: InjectedMachine) -> None:
@@ -196,3 +195,9 @@ def _judge(
 def _named(case: Case, seen: Seen) -> bool:
     """A gauge may be called by its name in the configuration, or in words: scale_1, scale 1."""
     return case.names.replace("_", " ") in (seen.setpoint.get("reason") or "").replace("_", " ")
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return None if math.isnan(value) else round(value, 3)

@@ -12,6 +12,7 @@ import logging
 import structlog
 import yaml
 
+from compd.configuration.document import read_document
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import TRIPOD, InjectedMachine, add_votes
 from tests.soak.soak import soak
@@ -44,7 +45,7 @@ def main() -> int:
 
 def _without_faults(hours: float, seed: int) -> int:
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(logging.ERROR))
-    data = yaml.safe_load((CONFIG / TRIPOD).read_text())
+    data = read_document(CONFIG / TRIPOD).data
     add_votes(data)
     with run_directory() as directory:
         path = directory / TRIPOD

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from compd.errors import DaemonError
-from tests.injection.case import Case
+from tests.injection.case import Case, Way
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import accept
@@ -76,7 +76,9 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
         machine.truth.rest_for(lasts_s)
         machine.repair()
         accepted = restarted = False
+        doubts = ""
         if not watcher.ended and not _settles(machine, watcher, BY_ITSELF_S):
+            doubts = watcher.seen[-1]["reason"]
             accepted = accept(machine)
             restarted = not _settles(machine, watcher, AFTER_ACCEPTANCE_S)
         verdict = machine.judge(watcher.seen)
@@ -84,6 +86,8 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
         summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
     fault = summary.add(cases, verdict)
     fault.accepted += accepted
+    if doubts and all(case.way in (Way.UNDISTURBED, Way.UNSEEN) for case in cases):
+        summary.false_alarms.append(f"{[case.id for case in cases]}: {doubts}")
     fault.restarted += restarted
     if ended and not any(case.lost for case in cases):
         summary.broken.append(f"{[case.id for case in cases]}: the connection ended")

@@ -27,7 +27,10 @@ class FaultCount:
 
 @dataclass
 class Summary:
-    """All episodes of a soak."""
+    """All episodes of a soak.
+
+    broken : rules of setpoints. false_alarms : reasons for which a person had to accept a gauge that had no fault.
+    """
 
     seed: int
     faults: dict[str, FaultCount] = field(default_factory=dict)
@@ -38,6 +41,7 @@ class Summary:
     cycles: int = 0
     missed: int = 0
     broken: list[str] = field(default_factory=list)
+    false_alarms: list[str] = field(default_factory=list)
     before: dict[str, Resources] = field(default_factory=dict)
     after: dict[str, Resources] = field(default_factory=dict)
 
@@ -71,7 +75,7 @@ class Summary:
             for name, resources in self.after.items()
             if name in self.before and (growth := resources.growth_since(self.before[name]))
         ]
-        return [*wrong, *stuck, *grown, *self.broken]
+        return [*wrong, *stuck, *grown, *self.broken, *(f"false alarm: {alarm}" for alarm in self.false_alarms)]
 
     def text(self, unseen: Sequence[str]) -> str:
         """For people. unseen : ids of the faults that nothing shows; their errors are told apart."""
