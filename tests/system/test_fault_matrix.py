@@ -26,7 +26,7 @@ def marked(case: Case) -> object:
     return pytest.param(case, id=case.id, marks=() if case.sample else pytest.mark.long)
 
 
-@pytest.mark.parametrize("case", map(marked, MATRIX))
+@pytest.mark.parametrize("case", [marked(case) for case in MATRIX])
 def test_what_must_happen_happens(machine: InjectedMachine, case: Case) -> None:
     settle(machine)
     outcome = try_case(machine, case)
