@@ -94,11 +94,21 @@ def is_possible(
     return True
 
 
+def rest_to_rest_mm(limits: MotionLimits, duration_s: float, tolerance_mm: float) -> float:
+    """How far a part can move, mm, that readings show at rest before and after `duration_s` (s).
+
+    Half of the time it accelerates, half of it it brakes: a t^2 / 4. It may have begun earlier and end later, by the
+    time in which it moves by no more than the readings' tolerance.
+    """
+    if math.isinf(limits.acceleration):
+        return limits.speed * duration_s + tolerance_mm
+    longest_s = duration_s + 2 * math.sqrt(2 * tolerance_mm / limits.acceleration)
+    return min(limits.acceleration * longest_s**2 / 4, limits.speed * longest_s) + tolerance_mm
+
+
 def unseen_jump_mm(limits: MotionLimits, poll_s: float, tolerance_mm: float) -> float:
-    """The largest jump that a part at rest may show twice and that may be motion, mm; inf without limits.
+    """The largest jump of a part at rest that may be motion, mm; inf without limits.
 
     poll_s : from one reading to the next, s.
     """
-    duration_s = poll_s + WINDOW_S
-    speed = min(limits.speed, limits.acceleration * (BASE_S + duration_s) / 2)
-    return tolerance_mm + speed * duration_s
+    return rest_to_rest_mm(limits, poll_s + WINDOW_S, tolerance_mm)

@@ -25,6 +25,7 @@ from compd.live.acquisition.possible_motion import (
     Sample,
     is_possible,
     mean_speed,
+    rest_to_rest_mm,
 )
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
@@ -219,9 +220,12 @@ class ReadingTrust:
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits
         before, base_s = self._speed_before()
-        if is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits) and (
-            stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)
-        ):
+        if self._is_from_rest_to_rest(before, earlier, sample):
+            duration_s = earlier.time_s + earlier.window_s - last.time_s
+            possible = abs(earlier.value - last.value) <= rest_to_rest_mm(limits, duration_s, self._tolerance_mm)
+        else:
+            possible = is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits)
+        if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
             self._history.append(earlier)
             return self._believed(reading, sample)
         if stays:
@@ -229,6 +233,11 @@ class ReadingTrust:
             return self._refused(reading)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm")
+
+    def _is_from_rest_to_rest(self, before: Interval, first: Sample, second: Sample) -> bool:
+        """Whether the part was at rest before, and two answers show it at rest again."""
+        rested = math.isfinite(before.low) and before.low <= 0.0 <= before.high
+        return rested and abs(second.value - first.value) <= self._tolerance_mm
 
     def _goes_on(self, last: Sample, first: Sample, second: Sample) -> bool:
         """Whether the second answer continues the motion that the first one shows; without a limit of acceleration."""
