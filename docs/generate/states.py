@@ -7,7 +7,10 @@ from compd.live.loop.states import State
 
 def page() -> str:
     """Markdown, from the table of states."""
-    rows = [f"| `{state}` | {'yes' if state.valid else 'no'} | {state.code} | {state.text} |" for state in State]
+    rows = [
+        f"| `{state}` | {'yes' if state.valid else 'no'} | {state.code} | {state.text} | {state.left} |"
+        for state in State
+    ]
     return "\n".join(
         [
             "# States of a setpoint",
@@ -15,8 +18,8 @@ def page() -> str:
             "`code` is the number in the UDP packet. A reader that meets a state or a code that it does not know must",
             "treat the setpoint as invalid, because later releases may add some.",
             "",
-            "| state | valid | code | meaning |",
-            "|---|---|---|---|",
+            "| state | valid | code | meaning | how it is left |",
+            "|---|---|---|---|---|",
             *rows,
             "",
         ]

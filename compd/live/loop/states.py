@@ -11,6 +11,9 @@ from enum import StrEnum
 from typing import Self
 
 _LOST = "a comparator is lost, or the daemon is about to end; "
+_BEYOND = "beyond a limit with `on_limit: refuse`, "
+_BACK = "by itself, when every gauge is good again: the correction slews there"
+_LATER = "by itself, with the next pose, target or reading that can be used"
 
 
 class State(StrEnum):
@@ -20,31 +23,49 @@ class State(StrEnum):
     valid : whether a setpoint in this state has values that a controller may use.
     rank : where several states apply to one cycle, the one of the highest rank is reported.
     text : meaning, for people.
+    left : how it is left.
     """
 
     code: int
     valid: bool
     rank: int
     text: str
+    left: str
 
-    def __new__(cls, name: str, code: int, valid: bool, rank: int, text: str) -> Self:
+    def __new__(cls, name: str, code: int, valid: bool, rank: int, text: str, left: str) -> Self:
         state = str.__new__(cls, name)
         state._value_ = name
-        state.code, state.valid, state.rank, state.text = code, valid, rank, text
+        state.code, state.valid, state.rank, state.text, state.left = code, valid, rank, text, left
         return state
 
-    # name in the JSON, code, valid, rank, text
-    STARTING = "starting", 0, False, 4, "not every gauge has been read yet"
-    NO_ZERO = "no_zero", 1, False, 4, "no machine zero fits this configuration; `compd zero`"
-    OK = "ok", 2, True, 0, "every gauge is good, and the correction is the one that they ask for"
-    SLEWING = "slewing", 3, True, 1, "the correction is under way at `limits.slew_mm_per_s`; it never jumps"
-    CLAMPED = "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`"
-    HOLD = "hold", 5, True, 2, _LOST + "the last good set of them is used, at most `loop.hold_s`"
-    FADE = "fade", 6, True, 2, _LOST + "the last good set is taken back to zero over `loop.hold_s`"
-    STOP = "stop", 7, False, 4, "a gauge is lost without a substitute, the loop makes no setpoints, or the daemon ends"
-    REFUSED = "refused", 8, False, 4, "beyond a limit with `on_limit: refuse`, out of reach, or not finite"
-    DEGRADED = "degraded", 9, True, 2, "a correction that `reason` names is absent; `u_tip_um` says what that costs"
-    FAULT = "fault", 10, False, 4, "a gauge is not believed any more; a person looks at it, then `compd accept`"
+    # fmt: off
+    # name in the JSON, code, valid, rank, text, left
+    STARTING = "starting", 0, False, 4, "not every gauge has been read yet", "when every gauge has been good once"
+    NO_ZERO = "no_zero", 1, False, 4, "no machine zero fits this configuration", "`compd zero`"
+    OK = "ok", 2, True, 0, "every gauge is good, and the correction is the one that they ask for", "when that changes"
+    SLEWING = (
+        "slewing", 3, True, 1, "the correction is under way at `limits.slew_mm_per_s`; it never jumps",
+        "when it has arrived",
+    )
+    CLAMPED = (
+        "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`",
+        "when the gauges ask for less",
+    )
+    HOLD = "hold", 5, True, 2, _LOST + "the last good set of them is used, at most `loop.hold_s`", _BACK
+    FADE = "fade", 6, True, 2, _LOST + "the last good set is taken back to zero over `loop.hold_s`", _BACK
+    STOP = (
+        "stop", 7, False, 4, "a gauge is lost without a substitute, the loop makes no setpoints, or the daemon ends",
+        _BACK,
+    )
+    REFUSED = "refused", 8, False, 4, _BEYOND + "out of reach, or not finite", _LATER
+    DEGRADED = (
+        "degraded", 9, True, 2, "a correction that `reason` names is absent; `u_tip_um` says what that costs", _BACK,
+    )
+    FAULT = (
+        "fault", 10, False, 4, "a gauge is not believed any more: it jumped, came back with another value, or others "
+        "contradict it", "never by itself: a person looks at the gauge, then `compd accept`",
+    )
+    # fmt: on
 
 
 def state_named(name: str) -> State | None:
