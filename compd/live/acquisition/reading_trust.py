@@ -109,7 +109,7 @@ class ReadingTrust:
         """
         memory, i = self._memory, self._i
         sample = Sample(reading.value, reading.time_s, window_s)
-        self._count(sample.value)
+        self._count(sample)
         memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
         # one that was accepted while it was asked is asked twice at the next poll
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
@@ -294,14 +294,16 @@ class ReadingTrust:
                 return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
         return 0.0
 
-    def _count(self, value: float) -> None:
+    def _count(self, sample: Sample) -> None:
         """Count how often the very same value comes, for the vote on gauges that are stuck."""
         memory, i = self._memory, self._i
-        change_mm = abs(value - float(memory.shown[i]))
+        change_mm = abs(sample.value - float(memory.shown[i]))
         if change_mm == 0.0:
             memory.repeats[i] += 1
         elif change_mm > 0.0:
-            memory.same[i] += memory.repeats[i]
-            memory.changes[i] += 1
             memory.repeats[i] = 0
+            if memory.changes[i] == 0:
+                memory.first_change_s[i] = sample.time_s
+            memory.changes[i] += 1
+            memory.last_change_s[i] = sample.time_s
             memory.step_mm[i] = min(float(memory.step_mm[i]), change_mm)

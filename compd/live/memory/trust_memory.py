@@ -50,8 +50,8 @@ class TrustMemory:
     witness : (n, n), row i: the values of all channels when channel i was lost, mm.
     lost_s : monotonic time at which the channel was lost, s.
     doubt : a `Doubt`. amount : what it says of it.
-    repeats : how many polls in a row have given the very same value. same, changes : how many polls have given, until
-        `repeats` was 0 last, the same value as the one before and another one.
+    repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
+    first_change_s, last_change_s : when the first and the last of these were, s.
     step_mm : the smallest change seen; inf before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
     voted, heard : how often a vote has named the channel, and how often its thread has followed.
@@ -68,7 +68,8 @@ class TrustMemory:
             array[:] = math.nan
         self.witness = shared_floats(max(n * n, 1))[: n * n].reshape(n, n)
         self.doubt, self.amount, self.step_mm = (shared_floats(max(n, 1)) for _ in range(3))
-        self.repeats, self.same, self.changes = (shared_floats(max(n, 1)) for _ in range(3))
+        self.repeats, self.changes = (shared_floats(max(n, 1)) for _ in range(2))
+        self.first_change_s, self.last_change_s = (shared_floats(max(n, 1)) for _ in range(2))
         self.step_mm[:] = math.inf
         self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
         self.evidence = SharedMessage()
