@@ -62,6 +62,15 @@ class Chain:
         return self.until("at rest at the target", rests)
 
 
+@pytest.fixture(autouse=True)
+def without_a_controller(chain: Chain) -> Iterator[None]:
+    """A test that was the controller is not when it ends: its target would grow old in the next one."""
+    yield
+    if next(chain.setpoints)["mode"] == "machine_tool":
+        chain.daemon.release()
+        chain.until("without a target", lambda setpoint: setpoint["mode"] == "cmm")
+
+
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
     directory = tmp_path_factory.mktemp("chain")
@@ -161,8 +170,7 @@ def test_hold_ends_and_the_numbers_go(chain: Chain) -> None:
 def test_a_lost_scale_leaves_a_cmm_without_a_tip_and_other_lines_go_on(chain: Chain) -> None:
     with connect(chain.directory / "compd.sock", PATIENCE_S) as observer:
         before = observer.status()
-        chain.daemon.release()
-        chain.until("cmm", lambda s: s["mode"] == "cmm" and s["state"] == "ok")
+        chain.until("ok before", lambda s: s["state"] == "ok")
         chain.machine.ask("FAULT", line="scale_2", fault="unplugged")
         try:
             lost = chain.until("invalid", lambda s: not s["valid"])
