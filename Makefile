@@ -43,8 +43,10 @@ SIDE_BY_SIDE ?= 4
 # Likewise the commands of the documentation's pages and the examples of CONTRIBUTING.md.
 DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
+# System tests have both processors for themselves: they run the daemon in real time.
 test: $(STAMP)
-	$(BIN)/pytest $(HIDDEN:%=--ignore=%)
+	$(BIN)/pytest -n 2 --ignore=tests/system
+	$(BIN)/pytest tests/system $(HIDDEN:%=--ignore=%)
 	$(BIN)/pytest -n 2 $(HIDDEN)
 
 long: $(STAMP)

@@ -149,7 +149,9 @@ def _similar(name: str, available: Collection[str]) -> str:
     with_unit = sorted(quantity for quantity in available if quantity.rpartition("_")[0] == name)
     # link 2 is not a way to write link 3
     others = [quantity for quantity in sorted(available) if _NUMBER.sub("", quantity) != _NUMBER.sub("", name)]
-    alike = with_unit or difflib.get_close_matches(name, others, n=1, cutoff=_ALIKE)
+    close = difflib.get_close_matches(name, others, n=3, cutoff=_ALIKE)
+    # temperature_tool is not a way to write temperature_room
+    alike = with_unit or [other for other in close if _words_are_alike(name, other)][:1]
     return f"did you mean {' or '.join(alike)}?" if alike else ""
 
 
@@ -159,3 +161,11 @@ def _gauge_to_add(name: str, wired: bool) -> str:
     if not wired:
         return f"read {gauge} along and record a column `{name}`"
     return f"wire {gauge} under `wiring: quantities:` as `name: {name}`, or record a column of that name"
+
+
+def _words_are_alike(name: str, other: str) -> bool:
+    words, others = name.split("_"), other.split("_")
+    return len(words) == len(others) and all(
+        difflib.SequenceMatcher(None, word, another).ratio() >= _ALIKE
+        for word, another in zip(words, others, strict=True)
+    )

@@ -8,7 +8,7 @@ from compd.live.loop.states import State
 def page() -> str:
     """Markdown, from the table of states."""
     rows = [
-        f"| `{state}` | {'yes' if state.valid else 'no'} | {state.code} | {state.text} | {state.left} |"
+        f"| `{state}` | {state.code}, {'valid' if state.valid else 'invalid'} | {state.text} | {state.left} |"
         for state in State
     ]
     return "\n".join(
@@ -18,8 +18,8 @@ def page() -> str:
             "`code` is the number in the UDP packet. A reader that meets a state or a code that it does not know must",
             "treat the setpoint as invalid, because later releases may add some.",
             "",
-            "| state | valid | code | meaning | how it is left |",
-            "|---|---|---|---|---|",
+            "| state | code | meaning | how it is left |",
+            "|---|---|---|---|",
             *rows,
             "",
         ]

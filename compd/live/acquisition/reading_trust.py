@@ -43,8 +43,6 @@ _HISTORY = 32
 _AGREEMENT = 0.2
 # From one poll to the next a speed changes by at most this factor, where no limit of acceleration is given.
 _SPEED_RATIO = 5.0
-# Faster than any machine tool, mm/s: two answers that would need more do not agree.
-_FASTEST_MM_PER_S = 1000.0
 # How much of the acceleration that is there already is no surprise.
 _ACCELERATION_MARGIN = 2.0
 
@@ -82,6 +80,7 @@ class ReadingTrust:
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
         self._history: deque[Sample] = deque(maxlen=_HISTORY)
+        self._candidate: Sample | None = None  # the last answer, where nothing is believed yet
         self._back_s = math.nan  # since when a gauge that was away answers again
 
     def surprises(self, sample: Sample) -> bool:
@@ -141,9 +140,12 @@ class ReadingTrust:
         """Believe a reading whatever was before it, where two answers agree."""
         if first is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
-        fastest = min(self._settings.limits.speed, _FASTEST_MM_PER_S)
-        apart_mm = abs(sample.value - first.value)
-        if apart_mm > self._tolerance_mm + fastest * (sample.time_s - first.time_s + sample.window_s):
+        earlier = Sample(first.value, first.time_s, sample.window_s)
+        before, self._candidate = self._candidate, None
+        if abs(sample.value - earlier.value) > self._tolerance_mm and not (
+            before is not None and self._goes_on(before, earlier, sample)
+        ):
+            self._candidate = sample  # of a part that moves, the next poll shows more
             return bad(
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )

@@ -25,7 +25,7 @@ UM = re.compile(r"(?<![\w.{])um(?![\w}])")
 
 @pytest.mark.parametrize(
     ("value", "figures", "text"),
-    [(0.1234, 2, "0.12 um"), (99.7, 2, "100 um"), (1234.4, 3, "1234 um"), (7.0, 3, "7 um"), (-250.0, 2, "-250 um")],
+    [(0.1234, 2, "0.12 um"), (99.7, 2, "100 um"), (1234.4, 3, "1234 um"), (7.0, 3, "7.00 um"), (-250.0, 2, "-250 um")],
 )
 def test_large_numbers_have_no_powers_of_ten(value: float, figures: int, text: str) -> None:
     assert format_error(value, figures=figures) == text
@@ -62,8 +62,8 @@ def test_the_unit_changes_words_and_no_number(tmp_path: Path) -> None:
 
 def test_trends_and_covariates_are_in_the_unit(tmp_path: Path) -> None:
     um, arcsec = in_unit(tmp_path, "um"), in_unit(tmp_path, "arcsec")
-    assert any("+0.1 um/mm" in trend.text for trend in um.trends)
-    assert any("+0.0001 arcsec/arcsec" in trend.text for trend in arcsec.trends)
+    assert any("+0.10 um/mm" in trend.text for trend in um.trends)
+    assert any("+0.00010 arcsec/arcsec" in trend.text for trend in arcsec.trends)
     assert not any(UM.search(trend.text) for trend in arcsec.trends)
     place = next(covariate for covariate in covariates(arcsec.aligned) if covariate.name == "x")
     assert place.unit == "arcsec"
