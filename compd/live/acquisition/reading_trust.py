@@ -168,7 +168,9 @@ class ReadingTrust:
         if self._settings.returns_by_itself or math.isnan(memory.value[i]):
             return self._begin(reading, sample, first)
         away_mm = sample.value - float(memory.value[i])
-        if first is not None and abs(first.value - sample.value) > self._tolerance_mm:
+        if first is None:
+            return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
+        if abs(first.value - sample.value) > self._tolerance_mm:
             return bad(
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )
@@ -265,18 +267,18 @@ class ReadingTrust:
         slack_mm += _ACCELERATION_MARGIN * acceleration * passed_s * (passed_s + base_s) / 2
         return abs(sample.value - last.value - speed * passed_s) <= slack_mm
 
-    def _base(self, end: int) -> int | None:
-        """Index of the sample from which the speed until sample `end` (from the last, negative) is measured."""
+    def _base(self) -> int | None:
+        """Index of the sample from which the speed until the last one is measured."""
         history = self._history
-        latest_s = history[end].time_s - max(BASE_S, 4 * history[end].window_s)
-        for k in range(len(history) + end - 1, -1, -1):
+        latest_s = history[-1].time_s - max(BASE_S, 4 * history[-1].window_s)
+        for k in range(len(history) - 2, -1, -1):
             if history[k].time_s <= latest_s:
                 return k
         return None
 
     def _speed_before(self) -> tuple[Interval, float]:
         """Mean speed (mm/s) until the last sample, and over how long (s); without bounds where it is not known."""
-        base = self._base(-1)
+        base = self._base()
         if base is None:
             first_s = self._history[-1].time_s - self._history[0].time_s
             return Interval(-math.inf, math.inf), max(first_s, 0.0)
@@ -285,7 +287,7 @@ class ReadingTrust:
 
     def _acceleration(self, speed: float, base_s: float) -> float:
         """Size of the acceleration that the samples show, mm/s2: from the speed before to `speed`, over `base_s`."""
-        base = self._base(-1)
+        base = self._base()
         if base is None or base == 0:
             return 0.0
         middle = self._history[base]
