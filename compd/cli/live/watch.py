@@ -155,10 +155,10 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
         try:
             while not count or shown < count:
                 newest.wait(min(1 / rate_hz, _LOOK_EVERY_S))
-                is_due = clock.monotonic() >= due_s
-                if (is_due or newest.has_expired) and (picture := newest.picture()) is not None:
+                is_due, has_expired = clock.monotonic() >= due_s, newest.has_expired
+                if (is_due or has_expired) and (picture := newest.picture()) is not None:
                     live.update(picture, refresh=True)
-                    shown += is_due
+                    shown += is_due and not has_expired
                     due_s += 1 / rate_hz if is_due else 0.0
         except CompdError:
             if (picture := newest.picture()) is not None:
