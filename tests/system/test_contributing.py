@@ -25,7 +25,7 @@ REGISTRIES = (
     "tests/unit/live/test_message_keys.py",
     "tests/unit/live/test_setpoint.py",
     "tests/unit/live/test_states.py",
-    "tests/unit/cli/test_status_command.py",
+    "tests/unit/cli/test_where_command.py",
     "tests/unit/docs/test_reference.py",
     "tests/guard",
 )
