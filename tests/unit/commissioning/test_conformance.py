@@ -124,7 +124,8 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
-    session.trust = judged(session)
+    if not driver.registers:  # a Modbus line tells replies apart itself, as long as its requests alternate
+        session.trust = judged(session)
     for faults_by_reply in polls:
         poll = session.poll(faults_by_reply)
         assert not poll.wrong, (faults_by_reply, poll)
