@@ -9,7 +9,7 @@ from typing import Literal
 
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.harness import REST_TIMEOUTS, ConformanceSession, Poll
+from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS, ConformanceSession, Poll
 from compd.gauge import Quality
 
 # What a damaged reply may give. OK is allowed where the driver finds the whole reply in the damage: it must be right.
@@ -199,7 +199,7 @@ def _later(session: ConformanceSession, subject: Subject) -> CaseResult:
     allowed = NO_ANSWER | DAMAGED | GOOD
     complaints = []
     observed: set[str] = set()
-    for timeouts in (2 + REST_TIMEOUTS + share for share in (0.3, 0.6)):
+    for timeouts in (ASKED_AGAIN_TIMEOUTS + share for share in (0.3, 0.6)):
         for delay in (timeouts, 0.9):
             poll = session.poll([faults.late(delay)])
             observed |= {str(quality) for quality in poll.qualities}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -13,7 +12,6 @@ from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.live.acquisition.acquisition import NOTHING_UNDER_WAY
-from compd.live.acquisition.gauge_trust import GaugeTrust
 
 LOOKS = 24  # fault-free polls that the tolerance, a gauge's last digit, is taken from
 COARSEST = 0.01  # of the range: a difference beyond it is no last digit, but a wrong unit, scale or sign
@@ -22,8 +20,8 @@ MARGIN = 2.0
 SMALLEST = 1e-9  # of the range: rounding in floating point
 MOST_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
-# A gauge that did not answer rests for one line timeout, in which the line is drained: no further rest follows.
-REST_TIMEOUTS = 0.0
+# In line timeouts, after a request that was not answered: the wait for the reply, then the line is drained for one more.
+ASKED_AGAIN_TIMEOUTS = 2.0
 
 
 class ConformanceWire(Protocol):
@@ -70,7 +68,6 @@ class ConformanceSession:
     wire: ConformanceWire
     sensors: SensorValues
     tolerance: dict[str, float] = field(default_factory=dict)  # by channel, in its unit
-    trust: GaugeTrust | None = None  # judges the readings, as the daemon's does; None: the driver alone
     _line: Any = None
 
     def poll(self, faults: Iterable[Fault] = (), new_values: bool = True) -> Poll:
@@ -132,10 +129,7 @@ class ConformanceSession:
         try:
             if self._line is None:
                 self._line = self.wire.open()
-            if self.trust is None:
-                return self.gauge.read(self._line)
-            line = self._line
-            return self.trust.judge(self.trust.read(lambda: self.gauge.read(line)), self.wire.clock.monotonic())
+            return self.gauge.read(self._line)
         except LineFault as fault:
             now_s = self.wire.clock.monotonic()
             self._after(fault)
@@ -153,8 +147,6 @@ class ConformanceSession:
             if fault.quality is not Quality.LINE_LOST:
                 if fault.quality not in NOTHING_UNDER_WAY:
                     self._line.drain()
-                if fault.quality is Quality.TIMEOUT:
-                    self.wire.clock.wait(threading.Event(), REST_TIMEOUTS * self.wire.timeout_s)
                 return
         except LineFault:
             pass  # lost while draining: closed like any lost line

@@ -16,13 +16,9 @@ from hypothesis import strategies as st
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.cases import CaseResult, Subject, run_case
 from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.harness import ConformanceSession
+from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
-from compd.live.acquisition.gauge_trust import GaugeTrust
-from compd.live.acquisition.possible_motion import MotionLimits
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
-from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import GAUGES, names
 from compd.simulation.wires.device import SimulatedByteDevice
 
@@ -99,8 +95,8 @@ harmless_to_format = st.one_of(
     st.builds(faults.garbage_inside, share, junk),
     st.builds(faults.cut, share),
     st.builds(faults.split, share, st.floats(0.0, 0.9)),
-    # up to when the gauge is asked again: what is later than that, a wire without its own guard cannot tell
-    st.builds(faults.late, st.floats(1.05, 3.9)),
+    # until the gauge is asked again; what is later is the business of the line's thread (test_reply_order.py)
+    st.builds(faults.late, st.floats(1.05, ASKED_AGAIN_TIMEOUTS - 0.1)),
 )
 modbus_only = st.one_of(
     st.builds(faults.flipped, st.integers(0, 10_000)),
@@ -111,21 +107,10 @@ modbus_only = st.one_of(
 with_checksum = st.one_of(harmless_to_format, st.builds(faults.flipped, st.integers(0, 10_000)))
 
 
-def judged(session: ConformanceSession) -> GaugeTrust:
-    """As the acquisition judges an absolute gauge of whose motion nothing is known."""
-    lengths = [channel.name for channel in session.gauge.channels if channel.unit == "mm"]
-    memory = TrustMemory(lengths, [tolerance_mm(None)] * len(lengths))
-    unlimited = TrustSettings(MotionLimits(), returns_by_itself=True, stale_after_s=math.inf)
-    judges = {name: ReadingTrust(memory, name, unlimited) for name in lengths}
-    return GaugeTrust([judges.get(channel.name) for channel in session.gauge.channels], session.wire.clock)
-
-
 def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> None:
     """No poll under any of the faults gives a wrong number, and when they end the readings are right."""
     session = driver.virtual()
     assert session.calibrate() is None
-    if not driver.registers:  # a Modbus line tells replies apart itself, as long as its requests alternate
-        session.trust = judged(session)
     for faults_by_reply in polls:
         poll = session.poll(faults_by_reply)
         assert not poll.wrong, (faults_by_reply, poll)
