@@ -20,7 +20,7 @@ MARGIN = 2.0
 SMALLEST = 1e-9  # of the range: rounding in floating point
 MOST_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
-# In line timeouts, after a request that was not answered: the wait for the reply, then the line is drained for one more.
+# In line timeouts, after a request without an answer: the wait for the reply, then the line is drained for one more.
 ASKED_AGAIN_TIMEOUTS = 2.0
 
 

@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.possible_motion import (
@@ -27,6 +28,7 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
+from compd.live.acquisition.witnesses import moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 # Last digit of a display that stands still, mm, where no noise is declared.
@@ -35,8 +37,10 @@ UNREST_MM = 0.001
 _SIGMAS = 6 * math.sqrt(2)
 # A gauge that was not asked for longer, s, may have been switched off: it was away.
 LONGEST_OWN_GAP_S = 10.0
-# Where all gauges were away, s, until those that are back are compared without those that are not.
-_WAIT_FOR_OTHERS_S = 2.0
+# After a silence, s, until the others have been read that have begun to move at the same time.
+_WAIT_FOR_MOTION_S = 0.3
+# In tolerances: less than that, a gauge may move in a short silence while no other shows it.
+_LEAST_MOTION = 10.0
 # Samples of motion that are kept.
 _HISTORY = 32
 # Two answers show the same value where they differ by less than this share of the jump that they show.
@@ -82,6 +86,8 @@ class ReadingTrust:
         self._history: deque[Sample] = deque(maxlen=_HISTORY)
         self._candidate: Sample | None = None  # the last answer, where nothing is believed yet
         self._back_s = math.nan  # since when a gauge that was away answers again
+        self._before_silence: NDArray[np.float64] | None = None  # what all showed when it first did not answer
+        self._heard_s = math.nan  # since when it answers again after that
 
     def surprises(self, sample: Sample) -> bool:
         """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
@@ -96,6 +102,9 @@ class ReadingTrust:
         memory, i = self._memory, self._i
         if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
             memory.lose(i, now_s)
+        elif self._before_silence is None:
+            self._before_silence = memory.value[: len(memory.channels)].copy()
+        self._heard_s = math.nan
 
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
         """The reading as it may be published: itself, the first answer, or one without a value.
@@ -153,6 +162,7 @@ class ReadingTrust:
         return self._believed(reading, sample)
 
     def _believed(self, reading: Reading, sample: Sample) -> Reading:
+        self._before_silence = None
         self._history.append(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
         return reading
@@ -177,38 +187,13 @@ class ReadingTrust:
         if abs(away_mm) > self._tolerance_mm:
             memory.distrust(i, Doubt.RETURNED, away_mm)
             return self._refused(reading)
-        moved, compared = self._moved_meanwhile(sample.time_s)
+        moved, compared = moved_while_away(memory, i, self._back_s, sample.time_s)
         if not compared:
             return bad(reading.time_s, Quality.STALE, "is back; the other gauges are not yet")
         if moved is not None:
             memory.distrust(i, Doubt.MOVED_MEANWHILE, moved)
             return self._refused(reading)
         return self._begin(reading, sample, first)
-
-    def _moved_meanwhile(self, now_s: float) -> tuple[int | None, bool]:
-        """Number of a channel that has moved since this one was lost, and whether enough could be compared.
-
-        What counts are the channels that have been good all the time. Where there are none, because everything was off,
-        half of those that are back are enough to say that the machine has stood still.
-        """
-        memory, i = self._memory, self._i
-        n = len(memory.channels)
-        others = np.arange(n) != i
-        witness = memory.witness[i]
-        tolerance = memory.tolerance_mm
-        lost_s = float(memory.lost_s[i])
-        stayed = others & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(witness)
-        if stayed.any():
-            moved = stayed & (np.abs(memory.value[:n] - witness) > tolerance)
-            return (int(np.flatnonzero(moved)[0]) if moved.any() else None), True
-        known = others & ~np.isnan(witness)
-        back = known & (memory.shown_s[:n] > lost_s)
-        if back.sum() < known.sum() and now_s - self._back_s < _WAIT_FOR_OTHERS_S:
-            return None, False
-        moved = back & (np.abs(memory.shown[:n] - witness) > tolerance)
-        if 2 * moved.sum() > back.sum():
-            return int(np.flatnonzero(moved)[0]), True
-        return None, True
 
     def _continued(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
         """A reading that follows others, of a gauge that was never away."""
@@ -220,6 +205,8 @@ class ReadingTrust:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
         if self._is_expected(earlier):
             return self._believed(first, earlier)
+        if self._before_silence is not None and self._has_moved_alone(sample, self._before_silence):
+            return self._moved_alone(reading, sample)
         last = self._history[-1]
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits
@@ -237,6 +224,24 @@ class ReadingTrust:
             return self._refused(reading)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm")
+
+    def _has_moved_alone(self, sample: Sample, before: NDArray[np.float64]) -> bool:
+        """Whether a gauge that may count anew shows another value after a silence, and no other gauge does."""
+        away_mm = abs(sample.value - self._history[-1].value)
+        return (
+            not self._settings.returns_by_itself
+            and away_mm > _LEAST_MOTION * self._tolerance_mm
+            and stood_still(self._memory, self._i, before)
+        )
+
+    def _moved_alone(self, reading: Reading, sample: Sample) -> Reading:
+        """No value yet where the others may still show the same motion; after that the gauge counts anew."""
+        if math.isnan(self._heard_s):
+            self._heard_s = sample.time_s
+        if sample.time_s - self._heard_s < _WAIT_FOR_MOTION_S:
+            return bad(reading.time_s, Quality.MISMATCH, "has moved while it was silent; no other gauge has")
+        self._memory.distrust(self._i, Doubt.RETURNED, sample.value - self._history[-1].value)
+        return self._refused(reading)
 
     def _is_from_rest_to_rest(self, before: Interval, first: Sample, second: Sample) -> bool:
         """Whether the part was at rest before, and two answers show it at rest again."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,9 @@ from compd.errors import ConfigurationError, Problem
 from compd.files import write_files
 from compd.output_file import check_replaceable
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
+from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
 Port = str | tuple[str, int]
-LOOPBACK = "127.0.0.1"
 
 
 def daemon_path(configuration: Configuration, directory: Path) -> Path:
@@ -35,11 +34,15 @@ def daemon_path(configuration: Configuration, directory: Path) -> Path:
     return path
 
 
-def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port], directory: Path) -> Configuration:
+def daemon_configuration(
+    configuration: Configuration, ports: Mapping[str, Port], directory: Path, tcp_port: int = ANY
+) -> Configuration:
     """Write and load a copy of the configuration, under the same file name in `directory`, with these ports.
 
-    ports : by line, a device path or (host, port). Unix socket and state directory are in `directory`. TCP and UDP are
-    bound to this computer, so that no real controller receives setpoints for a machine that does not exist.
+    ports : by line, a device path or (host, port). tcp_port : where the daemon listens, if it does over TCP.
+
+    Unix socket and state directory are in `directory`. TCP and UDP are bound to this computer, so that no real
+    controller receives setpoints for a machine that does not exist.
     """
     path = daemon_path(configuration, directory)
     data = read_document(configuration.path).data
@@ -52,24 +55,13 @@ def daemon_configuration(configuration: Configuration, ports: Mapping[str, Port]
     sockets = data["sockets"]
     sockets["unix"] = {"path": str(directory / DAEMON_SOCKET)}
     if configuration.sockets.tcp is not None:
-        sockets["tcp"] = {"host": LOOPBACK, "port": _free_port(configuration.sockets.tcp.port)}
+        sockets["tcp"] = {"host": LOOPBACK, "port": tcp_port}
     if configuration.sockets.udp is not None:
         sockets["udp"] = {"host": LOOPBACK, "port": configuration.sockets.udp.port}
     data["state"] = {"directory": str(directory / STATE)}
     (directory / STATE).mkdir(exist_ok=True)
     _write(path, configuration.path, data)
     return load(path)
-
-
-def _free_port(wanted: int) -> int:
-    """The configured TCP port, or 0 (any) where it is already in use on this computer."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOOPBACK, wanted))
-        except OSError:
-            return 0
-    return wanted
 
 
 def _write(path: Path, original: Path, data: dict[str, Any]) -> None:

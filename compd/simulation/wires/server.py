@@ -22,6 +22,7 @@ from compd.simulation.wires.live_world import LiveWorld
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
+from compd.simulation.wires.tcp_port import ANY, claimed_port
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02
@@ -91,7 +92,9 @@ class Simulation:
             ports[name] = line.start()
             self._running.callback(line.stop)
         self.ports = ports
-        daemon = daemon_configuration(self.configuration, ports, self.directory)
+        tcp = self.configuration.sockets.tcp
+        tcp_port = ANY if tcp is None else self._running.enter_context(claimed_port(tcp.port))
+        daemon = daemon_configuration(self.configuration, ports, self.directory, tcp_port)
         self._thread.start()
         self._running.callback(self._thread.join)
         self._running.callback(self._stop.set)

@@ -228,6 +228,32 @@ def test_silence_until_the_last_reading_is_stale_is_a_loss(shop):
     assert "came back 0.020 mm away" in shop.reading("scale_1").detail
 
 
+def test_a_gauge_that_moves_alone_in_a_short_silence_counts_anew(shop):
+    """In 0.3 s its acceleration would allow 9 mm."""
+    shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)] * int(0.3 / POLL_S)
+    shop.poll(int(0.3 / POLL_S / 3))
+    shop.damage["scale_1"] = []
+    shop.shows["scale_1"] = lambda _: 5.0
+    values = []
+    for _ in range(50):
+        shop.poll()
+        values += [shop.reading("scale_1").value] if shop.reading("scale_1").ok else []
+    assert max(values, default=0.0) < 0.001
+    assert "came back 5.000 mm away" in shop.reading("scale_1").detail
+
+
+def test_a_machine_that_begins_to_move_in_a_short_silence_is_followed(shop):
+    begins_s = shop.now_s + 0.02
+    for name, way_mm in zip(GAUGES, (40.0, 30.0, -20.0), strict=True):
+        shop.shows[name] = driven(begins_s, way_mm)
+    shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)] * 8
+    shop.poll(60)
+    assert shop.reading("scale_1").ok
+    assert shop.reading("scale_1").value == pytest.approx(
+        shop.shows["scale_1"](shop.reading("scale_1").time_s), abs=1e-3
+    )
+
+
 def test_a_gauge_that_is_accepted_between_a_poll_and_its_judgement_is_believed_at_the_next(shop):
     """Readings may wait until their line is known to be in step."""
     shop.poll(20)

@@ -98,15 +98,6 @@ def test_daemon_configuration_differs_only_in_where_things_are(path: Path, direc
     assert daemon.state.directory == str(directory / "state")
 
 
-def test_a_taken_tcp_port_is_exchanged_for_any(directory: Path) -> None:
-    original = load(TRIPOD)
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        data = section_file(directory, {"tcp": {"host": "127.0.0.1", "port": taken.getsockname()[1]}})
-        daemon = daemon_configuration(load(data), ports(original, directory), directory)
-    assert daemon.sockets.tcp is not None
-    assert daemon.sockets.tcp.port == 0
-
-
 def test_no_setpoint_leaves_this_computer(directory: Path) -> None:
     """The simulated machine's setpoints must never reach the real machine's controller."""
     abroad = {
