@@ -66,7 +66,10 @@ def read_small_file(path: Path, limit_bytes: int) -> bytes:
 def read_descriptor(descriptor: int, limit_bytes: int) -> bytes:
     """What `read_small_file` does, for a file that is open; it is closed in any case."""
     with open(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, "it is a directory")
+        if not stat.S_ISREG(mode):
             raise OSError(errno.EINVAL, "it is not a regular file")
         content = file.read(limit_bytes + 1)
     if len(content) > limit_bytes:

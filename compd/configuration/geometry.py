@@ -107,7 +107,7 @@ class Geometry(Section):
         return LINKS[self.kinematics]
 
 
-class Contradiction(NamedTuple):
+class GeometryProblem(NamedTuple):
     """What does not fit together in a geometry. location : below `geometry`."""
 
     location: Location
@@ -117,7 +117,7 @@ class Contradiction(NamedTuple):
     next_step: str = ""
 
 
-def contradictions(geometry: Any) -> list[Contradiction]:
+def contradictions(geometry: Any) -> list[GeometryProblem]:
     """Everything in a geometry that does not fit together, as far as it could be read.
 
     geometry : a `Geometry`, or what `section.readable` makes of a faulty one.
@@ -131,7 +131,7 @@ def contradictions(geometry: Any) -> list[Contradiction]:
     ]
 
 
-def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
+def _frame_contradictions(base: Any) -> Iterator[GeometryProblem]:
     """{B} is the frame of its supports: origin at their centroid, z_B their normal, y_B towards b1."""
     supports = getattr(base, "supports_B_mm", None)
     if supports is None:
@@ -142,17 +142,17 @@ def _frame_contradictions(base: Any) -> Iterator[Contradiction]:
         mean = (b1[axis] + b2[axis] + b3[axis]) / 3
         if abs(mean) > CONVENTION_TOLERANCE_MM and name != "z":
             what = f"the centroid must be the origin of {{B}}, its {name} is {mean:.6g} mm"
-            yield Contradiction(place, what, next_step=f"subtract {mean:.12g} from every {name}")
+            yield GeometryProblem(place, what, next_step=f"subtract {mean:.12g} from every {name}")
     for k, support in enumerate(supports):
         if abs(support[2]) > CONVENTION_TOLERANCE_MM:
-            yield Contradiction((*place, k), "must lie in the plane z = 0 of {B}", f"z {support[2]:g} mm", "0")
+            yield GeometryProblem((*place, k), "must lie in the plane z = 0 of {B}", f"z {support[2]:g} mm", "0")
     if abs(b1[0]) > CONVENTION_TOLERANCE_MM or b1[1] <= 0:
-        yield Contradiction((*place, 0), "b1 must lie on +y", str(list(b1)), "[0, y, 0] with y > 0")
+        yield GeometryProblem((*place, 0), "b1 must lie on +y", str(list(b1)), "[0, y, 0] with y > 0")
     if (b2[0] - b1[0]) * (b3[1] - b1[1]) - (b2[1] - b1[1]) * (b3[0] - b1[0]) <= 0:
-        yield Contradiction(place, "(b2-b1) x (b3-b1) must point along +z", next_step="exchange b2 and b3")
+        yield GeometryProblem(place, "(b2-b1) x (b3-b1) must point along +z", next_step="exchange b2 and b3")
 
 
-def _point_contradictions(geometry: Any) -> Iterator[Contradiction]:
+def _point_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
     """Points that are the same, and a plate whose points lie in line."""
     lists: tuple[tuple[Location, Any], ...] = (
         (("base", "joints_B_mm"), getattr(getattr(geometry, "base", None), "joints_B_mm", None)),
@@ -163,15 +163,15 @@ def _point_contradictions(geometry: Any) -> Iterator[Contradiction]:
         known = [(i, point) for i, point in enumerate(points or ()) if point is not None]
         for (i, one), (k, other) in combinations(known, 2):
             if math.dist(one, other) < CONVENTION_TOLERANCE_MM:
-                yield Contradiction((*location, k), f"is the same point as entry {i + 1}", str(list(other)))
+                yield GeometryProblem((*location, k), f"is the same point as entry {i + 1}", str(list(other)))
     plate = lists[-1][1]
     if plate is not None:
         sides_mm = sorted(math.dist(one, other) for one, other in combinations(plate, 2))
         if sides_mm[2] > 0 and sides_mm[0] + sides_mm[1] - sides_mm[2] < CONVENTION_TOLERANCE_MM and sides_mm[0] > 0:
-            yield Contradiction(lists[-1][0], "the three points lie on one line", next_step="let them span the plate")
+            yield GeometryProblem(lists[-1][0], "the three points lie on one line", next_step="let them span the plate")
 
 
-def _count_contradictions(geometry: Any) -> Iterator[Contradiction]:
+def _count_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
     """As many joints and axes as links, and nothing that a tripod cannot have."""
     kinematics = getattr(geometry, "kinematics", None)
     if kinematics is None:
@@ -187,16 +187,16 @@ def _count_contradictions(geometry: Any) -> Iterator[Contradiction]:
         entries = getattr(getattr(geometry, part, None), key, None)
         if entries is not None and len(entries) != count:
             what = f"has {len(entries)} entries, {kinematics} needs {count}"
-            yield Contradiction((part, key), what, next_step="write one for each link" if count else "leave it out")
+            yield GeometryProblem((part, key), what, next_step="write one for each link" if count else "leave it out")
     rotation = getattr(getattr(geometry, "tool", None), "zero_rotation_P_in_M_rad", None)
     if n == 3 and rotation is not None and any(rotation):
         what = "a tripod's attitude follows from its tip"
-        yield Contradiction(("tool", "zero_rotation_P_in_M_rad"), what, str(list(rotation)), next_step="leave it out")
+        yield GeometryProblem(("tool", "zero_rotation_P_in_M_rad"), what, str(list(rotation)), next_step="leave it out")
 
 
-def _length_contradictions(geometry: Any) -> Iterator[Contradiction]:
+def _length_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
     limits = getattr(geometry, "link_length_mm", None)
     if limits is not None and limits[0] >= limits[1]:
-        yield Contradiction(
+        yield GeometryProblem(
             ("link_length_mm",), "must be the shortest length first, then the longest", str(list(limits))
         )

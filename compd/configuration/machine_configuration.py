@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,11 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
 from compd.configuration.geometry import LINKS, Geometry, contradictions
+from compd.configuration.hashes import NOT_IN_ZERO, hash_of
 from compd.configuration.lines import LineSettings
 from compd.configuration.operation import (
     AcquisitionSettings,
@@ -23,7 +22,6 @@ from compd.configuration.operation import (
     LoopSettings,
     SocketSettings,
     StateSettings,
-    TargetSettings,
     VoteSettings,
     Wiring,
 )
@@ -192,48 +190,17 @@ class Configuration:
         fields = ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state")
         # an optional section that says nothing changes no hash: recordings and controllers know those of older releases
         said = tuple(name for name, default in OPTIONAL_SECTIONS.items() if getattr(self, name) != default)
-        return _hash(self, (*fields, *said))
+        return hash_of(self, (*fields, *said))
 
     @property
     def geometry_hash(self) -> str:
         """Hash of what a model is fitted on, the geometry without the limits of the links' length."""
-        return _hash(self, ("geometry",), without=("link_length_mm",))
+        return hash_of(self, ("geometry",), without=("link_length_mm",))
 
     @property
     def zero_hash(self) -> str:
         """Hash of what machine zero depends on, geometry, gauges and wiring, but no port, rate, limit or noise."""
-        return _hash(self, ("machine", "geometry", "gauges", "wiring"), without=_NOT_IN_ZERO)
-
-
-# What says how far a gauge is believed, and not what it shows.
-_NOT_IN_ZERO = ("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss")
-_LATER_OPTIONS: Mapping[str, Any] = {
-    "fastest_mm_per_s": None,
-    "acceleration_mm_per_s2": None,
-    "absolute": None,
-    "trust_after_loss": False,
-    "allow": [],
-    "token_file": None,
-    "target": TargetSettings().model_dump(mode="json"),
-}
-
-
-# Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
-_FORMER_SPEED_LIMITS: Mapping[str, float] = {
-    "heidenhain_nd28x": 200.0,
-    **dict.fromkeys(
-        (
-            "keyence_gt2_dlrs1a",
-            "keyence_dlen1",
-            "mahr_c1202",
-            "serial_ascii",
-            "serial_frame",
-            "sylvac_optors",
-            "tesa_tt80",
-        ),
-        0.5,
-    ),
-}
+        return hash_of(self, ("machine", "geometry", "gauges", "wiring"), without=NOT_IN_ZERO)
 
 
 class Examined(NamedTuple):
@@ -381,29 +348,7 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
     return None
 
 
-def _said(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
-    said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
-    if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
-        said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
-    return said
-
-
 def _line_number(where: str) -> int:
     """The line in "file:line key.path"; 0 where there is none, so that problems of the whole file come first."""
     found = re.search(r":(\d+)(?: |$)", where)
     return int(found[1]) if found else 0
-
-
-def _hash(configuration: Configuration, fields: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
-    """First 16 hexadecimal digits of the SHA-256 of these fields as JSON, the keys in `without` left out."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, BaseModel):
-            value = value.model_dump(mode="json")
-        if isinstance(value, Mapping):
-            return {k: plain(v) for k, v in _said(value).items() if k not in without}
-        return [plain(v) for v in value] if isinstance(value, list) else value
-
-    text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

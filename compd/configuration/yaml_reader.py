@@ -7,9 +7,7 @@ within themselves, aliases that unfold into more than anybody writes.
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +21,7 @@ except ImportError:
     from yaml import SafeLoader  # type: ignore[assignment]
 
 from compd.errors import ConfigurationError, Problem
+from compd.files import read_small_file
 
 Location = tuple[str | int, ...]
 
@@ -80,14 +79,7 @@ def read_text(path: Path, kind: str) -> str:
     than LARGEST_BYTES, is in another encoding.
     """
     try:
-        # a pipe without a writer would wait for ever
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        with os.fdopen(descriptor, "rb") as file:
-            mode = os.fstat(descriptor).st_mode
-            if not stat.S_ISREG(mode):
-                what = "is a directory" if stat.S_ISDIR(mode) else "is no regular file"
-                raise _unusable(path, what, next_step=f"give the path of {kind}")
-            content = file.read(LARGEST_BYTES + 1)
+        content = read_small_file(path, LARGEST_BYTES)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise _unusable(path, f"cannot be read: {why}", next_step=f"give the path of {kind}") from error

@@ -100,9 +100,9 @@ class RtuMaster:
         self._stream.close()
 
     @property
-    def requests(self) -> int:
-        """How many requests were sent."""
-        return self._stream.requests
+    def last_request_s(self) -> float:
+        """Monotonic time of the last request, s; -inf before the first."""
+        return self._stream.last_request_s
 
     @property
     def unexpected_bytes(self) -> int:

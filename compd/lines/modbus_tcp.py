@@ -8,6 +8,7 @@ ConnectionException, a device's exception by returning ExceptionResponse.
 from __future__ import annotations
 
 import logging
+import math
 import struct
 
 from pymodbus.client import ModbusTcpClient
@@ -26,7 +27,7 @@ logging.getLogger("pymodbus").propagate = False
 class ModbusTcp:
     """A `RegisterLine` over Modbus TCP. Used by one thread."""
 
-    requests = 0  # not counted: a reply names its request
+    last_request_s = -math.inf  # not noted: a reply names its request
     unexpected_bytes = 0  # pymodbus drops them by their transaction number, uncounted
 
     def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:

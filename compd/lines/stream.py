@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 from compd.clock import Clock
@@ -24,7 +25,8 @@ class StreamLine:
     """A `ByteLine` over a port. Used by one thread.
 
     Two rules keep a reply with its request: a request is written only when nothing has come for `gap_s`, and what came
-    without a request is discarded and counted in `unexpected_bytes`. `requests` counts what was sent.
+    without a request is discarded and counted in `unexpected_bytes`. `last_request_s` is the monotonic time of the
+    last request, s; -inf before the first.
     """
 
     def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock) -> None:
@@ -33,7 +35,7 @@ class StreamLine:
         `gap_s`: silence before a request, s.
         """
         self.unexpected_bytes = 0
-        self.requests = 0
+        self.last_request_s = -math.inf
         self._port = port
         self._timeout_s = timeout_s
         self._gap_s = gap_s
@@ -48,10 +50,9 @@ class StreamLine:
         Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST.
         """
         self._wait_for_silence()
-        started_s = self._clock.monotonic()
-        self.requests += 1
+        self.last_request_s = self._clock.monotonic()
         self._port.write(request)
-        return started_s + len(request) * self._port.character_s
+        return self.last_request_s + len(request) * self._port.character_s
 
     def listen(self) -> float:
         """Discard what has come so far, without waiting for silence; the monotonic time (s) now.

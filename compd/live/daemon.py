@@ -44,7 +44,7 @@ from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.request import TargetKeys
+from compd.live.service.request_context import RequestContext, TargetKeys
 from compd.live.service.requests import Requests
 from compd.live.service.status_message import StatusReport
 from compd.live.service.tcp_access import TcpAccess
@@ -164,18 +164,20 @@ class Daemon:
             rotation=configuration.geometry.kinematics == "hexapod_6ups",
         )
         requests = Requests(
-            version,
-            keys,
-            self.commands,
-            report.message,
-            zero_capture.start,
-            ReadingsMessage(self._wires, self.latest.channels),
-            model_switch.start,
-            lambda: adopted.summary,
-            self.trust.accept,
-            sockets.target,
-            access,
-            clock,
+            RequestContext(
+                version,
+                keys,
+                self.commands,
+                report.message,
+                zero_capture.start,
+                ReadingsMessage(self._wires, self.latest.channels),
+                model_switch.start,
+                lambda: adopted.summary,
+                self.trust.accept,
+                sockets.target,
+                access,
+                clock,
+            )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
         self.service = ServiceProcess(

@@ -16,7 +16,8 @@ from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError
-from compd.live.service.requests import REQUESTS, SENT_MESSAGES, Requests, TargetKeys
+from compd.live.service.request_context import RequestContext, TargetKeys
+from compd.live.service.requests import REQUESTS, SENT_MESSAGES, Requests
 from tests.fuzz.bounds import examples
 
 # Answered by the next setpoint, or later.
@@ -57,12 +58,14 @@ def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
 def requests(tip: str, rotation: bool) -> Requests:
     commands = Commands(StateError(Problem(where="zero", what="none")))
     return Requests(
-        {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00", "links": 3},
-        TargetKeys(tip, rotation),  # type: ignore[arg-type]
-        commands,
-        lambda: {"class": "STATUS"},
-        lambda *_: None,
-        switch_model=lambda *_: None,
+        RequestContext(
+            {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00", "links": 3},
+            TargetKeys(tip, rotation),  # type: ignore[arg-type]
+            commands,
+            lambda: {"class": "STATUS"},
+            lambda *_: None,
+            switch_model=lambda *_: None,
+        )
     )
 
 
@@ -98,10 +101,10 @@ def test_every_line_has_an_answer_an_error_or_a_documented_silence(
             assert message["code"] in set(ErrorCode)
             assert message["text"]
             assert len(answer) < 2000
-        target = asked.commands.target
+        target = asked.context.commands.target
         if target is not None:
             assert all(abs(number) <= LARGEST_NUMBER for number in target.tip_mm)
-            assert asked.controller is client
+            assert asked.context.controller is client
 
 
 @given(pieces=st.lists(st.binary(max_size=3000) | LINES | st.just(b"\n"), max_size=12))

@@ -48,7 +48,7 @@ NUMBERS: tuple[Case, ...] = (
         "a register holds a number beyond all measure",
         "u1 = 1e30",
         shows("frame_u", "u1", 1e30),
-        Way.ACCEPTED,
+        Way.ITSELF,
         SUBSTITUTED | {State.REFUSED},
         "u1",
     ),

@@ -6,6 +6,7 @@ import contextlib
 import multiprocessing
 import os
 import random
+import signal
 import socket
 import struct
 import time
@@ -54,7 +55,7 @@ def deaf(unix: str, tcp: Address) -> None:
     connections = [_connected(tcp) for _ in range(20)]
     for connection in connections:
         connection.sendall(b'{"class":"WATCH"}\n')
-    time.sleep(3600)
+    signal.pause()
 
 
 def idle(unix: str, tcp: Address) -> None:
@@ -63,7 +64,7 @@ def idle(unix: str, tcp: Address) -> None:
     for _ in range(60):
         with contextlib.suppress(OSError):
             kept.append(_connected(tcp))
-    time.sleep(3600)
+    signal.pause()
 
 
 def endless(unix: str, tcp: Address) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from contextlib import contextmanager
 from pathlib import Path
@@ -105,3 +106,9 @@ class Run:
         recorder.start()
         yield recorder
         recorder.close()
+
+
+def rows_of(path):
+    """The rows of a recording's file, as text by column."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))

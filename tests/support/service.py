@@ -19,7 +19,7 @@ from compd.live.loop.states import Mode, State
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.service.listeners import Listeners
 from compd.live.service.publisher import Publisher
-from compd.live.service.request import TargetKeys
+from compd.live.service.request_context import RequestContext, TargetKeys
 from compd.live.service.requests import Requests
 from compd.live.service.tcp_access import TcpAccess
 
@@ -126,16 +126,18 @@ class Service:
             self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, self.clock, [self.observed.append]
         )
         self.requests = Requests(
-            VERSION,
-            target_keys,
-            self.commands,
-            self.status,
-            lambda replace, answer: self.zeros.append((replace, answer)),
-            switch_model=lambda *arguments: self.models.append(arguments),
-            accept=self.accept,
-            targets=sockets.target,
-            access=TcpAccess.of(sockets.tcp),
-            clock=self.clock,
+            RequestContext(
+                VERSION,
+                target_keys,
+                self.commands,
+                self.status,
+                lambda replace, answer: self.zeros.append((replace, answer)),
+                switch_model=lambda *arguments: self.models.append(arguments),
+                accept=self.accept,
+                targets=sockets.target,
+                access=TcpAccess.of(sockets.tcp),
+                clock=self.clock,
+            )
         )
         self.stopping = threading.Event()
         self.thread = threading.Thread(target=self.run, args=(self.requests,))

@@ -42,8 +42,8 @@ class OpenLine(Protocol):
     """What acquisition itself needs of a line; the rest is between the line and the driver."""
 
     @property
-    def requests(self) -> int:
-        """How many requests were sent since the line was opened; not counted where a reply names its request."""
+    def last_request_s(self) -> float:
+        """Monotonic time of the last request, s; -inf before the first, and where a reply names its request."""
 
     @property
     def unexpected_bytes(self) -> int:
@@ -102,7 +102,7 @@ class LineThread:
         self._opener = opener
         self._line: OpenLine | None = None
         self._order = ReplyOrder([driver for _, driver in gauges], settings.timeout_s)
-        self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the duration of their poll, s
+        self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the time from request to reply, s
         self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
         self._back_off = BackOff(*settings.back_off_s)
         self._stop = threading.Event()
@@ -165,7 +165,7 @@ class LineThread:
         self.opened += 1
         self.state, self.detail = "open", ""
         log.info("line is open", line=self.name)
-        self._order.missed(self._clock.monotonic())
+        self._order.opened(self._clock.monotonic())
         for gauge in self.gauges:
             gauge.resume()
 
@@ -204,15 +204,18 @@ class LineThread:
 
     def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
         with self._faults_of(gauge, line):
-            asked_s, requests = self._clock.monotonic(), line.requests
+            before_s = line.last_request_s
+            self._order.asked(self._clock.monotonic())
             readings = gauge.read(line)
             now_s = self._clock.monotonic()
             self._back_off.succeeded()
             # a device that speaks unasked has no late replies
-            if line.requests > requests and self._order.in_doubt(now_s):
+            asked_s = line.last_request_s
+            if asked_s > before_s and self._order.in_doubt(now_s):
                 self._waiting.append((gauge, readings, now_s - asked_s))
             else:
-                self._order.answered(now_s - asked_s)
+                if asked_s > before_s:
+                    self._order.answered(now_s - asked_s)
                 gauge.put(readings, now_s)
 
     def _publish_waiting(self, line: OpenLine) -> None:
@@ -221,11 +224,14 @@ class LineThread:
             return
         # what came just before a request was dropped: the reply before it may have been another one's
         dropped = line.unexpected_bytes - self._dropped_before
-        came = line.drain(self._order.listen_s)
+        listen_s = self._order.listen_s(self._clock.monotonic() - line.last_request_s)
+        came = line.drain(listen_s)
         if came or dropped:
+            if listen_s < self._settings.timeout_s:
+                line.drain()
             seen = shown(came) if came else f"{dropped} bytes"
             self._discard_waiting(f"{seen} came that nobody asked for: replies may belong to other requests")
-            line.drain()
+        self._order.kept_silent()
         waiting, self._waiting = self._waiting, []
         for gauge, readings, duration_s in waiting:
             with self._faults_of(gauge, line):
@@ -239,6 +245,7 @@ class LineThread:
         self._order.missed(now_s)
         for gauge, _, _ in waiting:
             gauge.fail(Quality.MISMATCH, why, now_s)
+            gauge.resume()  # the silence has been kept
 
     @contextmanager
     def _faults_of(self, gauge: PolledGauge, line: OpenLine) -> Iterator[None]:
@@ -266,10 +273,10 @@ class LineThread:
         if quality in NOTHING_UNDER_WAY:
             gauge.fail(quality, detail, failed_s)
             return
-        self._order.missed(failed_s)
         # A silence as long as the timeout has been kept already. It is kept once more where nothing else would tell a
         # late reply from the next, but not for a unit that has been absent before: the others would wait for it.
         absent = gauge.failures > 0 and len(self.gauges) > 1
+        self._order.missed(failed_s, absent)
         if quality is not Quality.TIMEOUT:
             line.drain()
             self._discard_waiting(f"does not count: {gauge.name}, in the same round, had {quality} {detail}".rstrip())

@@ -4,8 +4,10 @@ Most gauges on a line of bytes answer with a bare number, which says neither who
 reply that comes long after its timeout then passes for the answer to the request that is waiting, the true answer for
 that of the next one, and so on: every gauge has the value of the one before, and no reply is missing or damaged. What
 gives it away is that one reply more than wanted is under way after the last request. So the readings of a round wait
-until the line has been silent for longer than its devices ever take to answer; where something comes, none of them
-counts. What this cannot see is a late reply and, in the same round behind it, one that is lost for good.
+until any answer to the last request would be there, since devices hardly take longer than they ever do; where
+something comes, none of them counts. After a missed reply, that silence is longer than the longest time between two
+requests since then: if every reply is late from now on, they come at the intervals of their requests. What this
+cannot see is a late reply and, in the same round behind it, one that is lost for good.
 """
 
 from __future__ import annotations
@@ -28,6 +30,11 @@ LATER_S = 2e-3
 # A line with one gauge is in doubt only after a reply was missed, and after it was opened: what was asked before may
 # still be answered. A reply that is later than this, s, has been lost.
 LATEST_REPLY_S = 10.0
+# After a missed reply the line is listened to for at most so long, s: requests are as far apart at most, but for gauges
+# that are asked seldom.
+LONGEST_LISTEN_S = 2.0
+# By how much more two late replies may be apart than their requests, s.
+JITTER_S = 10e-3
 
 
 class ReplyOrder:
@@ -42,6 +49,9 @@ class ReplyOrder:
         self._durations_s: deque[float] = deque(maxlen=POLLS_IN_MIND)
         self._fewest_polls = max(FEWEST_POLLS, len(gauges))
         self._in_doubt_until_s = -math.inf
+        self._in_step = False
+        self._asked_s = math.nan  # when the last request was made
+        self._apart_s = 0.0  # the longest time between two requests since the line was in step
 
     @property
     def guarded(self) -> bool:
@@ -49,20 +59,43 @@ class ReplyOrder:
         return self._several or self._one
 
     def in_doubt(self, now_s: float) -> bool:
-        """Whether a reading must wait until the line has been silent for `listen_s`."""
+        """Whether a reading must wait until the line has been silent for that long."""
         return self._several or (self._one and now_s < self._in_doubt_until_s)
 
-    @property
-    def listen_s(self) -> float:
-        """Time (s) within which the answer to the last request would come, if another reply was taken for it."""
-        if len(self._durations_s) < self._fewest_polls:
+    def listen_s(self, passed_s: float) -> float:
+        """Time (s) within which the answer to the last request would come, if another reply was taken for it.
+
+        passed_s : since that request, s.
+        """
+        if not self._in_step and self._apart_s > 0.0:
+            return min(self._apart_s + JITTER_S, LONGEST_LISTEN_S)
+        if not self._in_step or len(self._durations_s) < self._fewest_polls:
             return self._timeout_s
-        return min(self._timeout_s, SLOWER * max(self._durations_s) + LATER_S)
+        return min(self._timeout_s, max(SLOWER * max(self._durations_s) - passed_s, 0.0) + LATER_S)
+
+    def asked(self, now_s: float) -> None:
+        """A request is made now."""
+        if not self._in_step and not math.isnan(self._asked_s):
+            self._apart_s = max(self._apart_s, now_s - self._asked_s)
+        self._asked_s = now_s
+
+    def opened(self, now_s: float) -> None:
+        """The line is new: what it was asked before, and when, is not known."""
+        self.missed(now_s)
+        self._asked_s, self._apart_s = math.nan, 0.0
 
     def answered(self, duration_s: float) -> None:
-        """A poll was answered; `duration_s`: from its request to its last byte, s."""
+        """A request was answered; `duration_s`: from then to the reply's last byte, s."""
         self._durations_s.append(duration_s)
 
-    def missed(self, now_s: float) -> None:
-        """A reply did not come, or not whole, and may come later; or the line was opened, and it is not known."""
+    def missed(self, now_s: float, absent: bool = False) -> None:
+        """A reply did not come, or not whole, and may come later.
+
+        absent : of a gauge that did not answer before either, while others on its line may: the line is not late.
+        """
         self._in_doubt_until_s = now_s + LATEST_REPLY_S
+        self._in_step = self._in_step and absent
+
+    def kept_silent(self) -> None:
+        """After an answer nothing more came for `listen_s`: no reply is under way any more."""
+        self._in_step, self._apart_s = True, 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 import structlog
 from pydantic import Field, field_validator, model_validator
@@ -11,10 +11,8 @@ from pydantic import Field, field_validator, model_validator
 from compd.live.service.client_session import ClientSession
 from compd.live.service.message_keys import ModelsKeys, SentMessage
 from compd.live.service.messages import ErrorCode, ProtocolError, line
-from compd.live.service.request import Asker, Request, SendLater
-
-if TYPE_CHECKING:
-    from compd.live.service.requests import Requests
+from compd.live.service.request import Asker, Request
+from compd.live.service.request_context import RequestContext, SendLater
 
 # In no file's name: the null character, and halves of surrogate pairs.
 _NOT_IN_PATHS = re.compile("[\0\ud800-\udfff]")
@@ -41,9 +39,9 @@ class AcceptRequest(Request):
     refusal = "gauges are accepted over the Unix socket only"
     gauge: Annotated[str, Field(min_length=1)] = Field(description='a gauge, one channel as "gauge.channel", or "all"')
 
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
-            channels = list(requests.accept(self.gauge))
+            channels = list(context.accept(self.gauge))
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
         _log.warning("gauges accepted", gauge=self.gauge, channels=channels, client=client.name)
@@ -76,8 +74,8 @@ class ZeroRequest(Request):
     refusal = "machine zero is taken over the Unix socket only"
     replace: bool = Field(default=False, description="true: take it whatever the machine zero before it was")
 
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        requests.take_zero(self.replace, send_later)
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        context.take_zero(self.replace, send_later)
         return b""
 
 
@@ -118,10 +116,10 @@ class ModelRequest(Request):
             raise ValueError("needs file, a text (shadow: true or false)")
         return self
 
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
-        if requests.switch_model is None:
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        if context.switch_model is None:
             raise ProtocolError(ErrorCode.UNIX_ONLY, self.refusal)
         if self.model_fields_set:
-            requests.switch_model(self.file, self.shadow, client.user, send_later)
+            context.switch_model(self.file, self.shadow, client.user, send_later)
             return b""
-        return line({"class": self.wire_name, **requests.models()})
+        return line({"class": self.wire_name, **context.models()})

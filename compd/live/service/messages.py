@@ -1,8 +1,8 @@
 """The wire format of the daemon's sockets: one JSON object per line, with its name under "class".
 
 Every message, in both directions, is one line of UTF-8 that ends with a newline. There is no null and no NaN: what is
-unknown is left out. What a client may send is declared in `compd.live.service.requests`; what the daemon sends is made
-by `Setpoint.to_json`, `ReadingsMessage`, `StatusReport` and the answers to the requests.
+unknown is left out. What a client may send is declared in `client_requests` and `local_requests`; what the
+daemon sends is made by `Setpoint.to_json`, `ReadingsMessage`, `StatusReport` and the answers to the requests.
 """
 
 from __future__ import annotations

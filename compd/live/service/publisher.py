@@ -156,7 +156,7 @@ class Publisher:
     def _take_turns(self) -> None:
         """Answer one request of each client that waits: of the controller now, of the others when they are due."""
         start_s = self._clock.monotonic()
-        controller = self._requests.controller
+        controller = self._requests.context.controller
         others = start_s >= self._next_turn_s
         turns = [session for session in self._waiting if others or session is controller]
         for session in turns:
@@ -196,7 +196,7 @@ class Publisher:
             return
         self._next_look_s = now_s + _LOOK_EVERY_S
         for session in list(self._sessions):
-            lost = seat_lost(session, session is self._requests.controller, now_s)
+            lost = seat_lost(session, session is self._requests.context.controller, now_s)
             if now_s >= session.dismissed_s:
                 lost = ProtocolError(ErrorCode.NOT_AUTHORIZED, "the token is wrong, or AUTH was not the first line")
             if lost is None:
@@ -225,7 +225,7 @@ class Publisher:
                 self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
             cycle = self._unpacker.unpack(content)
-            readings = self._requests.readings
+            readings = self._requests.context.readings
             assert readings is not None, "who watches them has been told their columns"
             self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
         if (stop := self._watch.missing(self._clock.monotonic())) is not None:
@@ -289,5 +289,5 @@ class Publisher:
             self._selector.modify(connection, events, partial(self._serve, session))
         if not session.open:
             self._sessions.discard(session)
-            self._requests.release(session)
+            self._requests.context.release(session)
             session.close()

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
 from compd.live.service.client_session import ClientSession
 from compd.live.service.message_keys import SentMessage
-
-if TYPE_CHECKING:
-    from compd.live.service.requests import Requests
-
-# Sends a line to the client that asked, from any thread: the answer to a request that takes time.
-SendLater = Callable[[bytes], None]
+from compd.live.service.request_context import RequestContext, SendLater
 
 
 class Asker(Enum):
@@ -26,22 +19,6 @@ class Asker(Enum):
     ANYBODY = "any client"
     CONTROLLER = "the controller, and clients of the Unix socket"
     LOCAL = "clients of the Unix socket"
-
-
-@dataclass(frozen=True)
-class TargetKeys:
-    """Which keys TARGET has on this machine.
-
-    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate.
-    rotation : whether "rotation_B0_rad" is allowed: a hexapod's attitude is free, a tripod's follows from its tip.
-    """
-
-    tip: Literal["tip_B0_mm", "tip_P_mm"]
-    rotation: bool
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (self.tip, "rotation_B0_rad") if self.rotation else (self.tip,)
 
 
 class Request(BaseModel):
@@ -58,12 +35,12 @@ class Request(BaseModel):
     refusal: ClassVar[str] = ""
 
     @classmethod
-    def allowed_keys(cls, requests: Requests) -> tuple[str, ...]:
+    def allowed_keys(cls, context: RequestContext) -> tuple[str, ...]:
         """The keys that this machine accepts, for the error about an unknown one."""
         return tuple(cls.model_fields)
 
     @abstractmethod
-    def answer(self, requests: Requests, client: ClientSession, send_later: SendLater) -> bytes:
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         """Do it, on the publisher's thread, and return the answer's line; b"" where there is none or it comes later.
 
         Raises ProtocolError where it cannot be done.

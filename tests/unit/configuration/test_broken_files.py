@@ -90,7 +90,7 @@ def test_a_text_that_is_no_configuration_is_refused_with_its_line(
 
 @pytest.mark.parametrize(
     ("path", "words"),
-    [("/dev/zero", "no regular file"), ("/tmp", "directory"), ("/nowhere/machine.yaml", "No such file")],
+    [("/dev/zero", "not a regular file"), ("/tmp", "directory"), ("/nowhere/machine.yaml", "No such file")],
 )
 def test_what_is_no_file_is_refused(path: str, words: str) -> None:
     with pytest.raises(ConfigurationError, match=words):

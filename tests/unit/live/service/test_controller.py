@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 
-from compd.live.service.request import TargetKeys
+from compd.live.service.request_context import TargetKeys
 from tests.support.service import Service
 
 

@@ -1,0 +1,63 @@
+"""Hashes of a configuration, which recordings, models and machine zero repeat: equal for what says the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+from compd.configuration.operation import TargetSettings
+
+# What says how far a gauge is believed, and not what it shows.
+NOT_IN_ZERO = ("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss")
+# Options that a later release has brought, with the value that leaves everything as it was.
+_LATER_OPTIONS: Mapping[str, Any] = {
+    "fastest_mm_per_s": None,
+    "acceleration_mm_per_s2": None,
+    "absolute": None,
+    "trust_after_loss": False,
+    "allow": [],
+    "token_file": None,
+    "target": TargetSettings().model_dump(mode="json"),
+}
+# Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
+_FORMER_SPEED_LIMITS: Mapping[str, float] = {
+    "heidenhain_nd28x": 200.0,
+    **dict.fromkeys(
+        (
+            "keyence_gt2_dlrs1a",
+            "keyence_dlen1",
+            "mahr_c1202",
+            "serial_ascii",
+            "serial_frame",
+            "sylvac_optors",
+            "tesa_tt80",
+        ),
+        0.5,
+    ),
+}
+
+
+def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, ...] = ()) -> str:
+    """First 16 hexadecimal digits of the SHA-256 of these fields as JSON, the keys in `without` left out."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, BaseModel):
+            value = value.model_dump(mode="json")
+        if isinstance(value, Mapping):
+            return {k: plain(v) for k, v in _said(value).items() if k not in without}
+        return [plain(v) for v in value] if isinstance(value, list) else value
+
+    text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _said(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
+    said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
+        said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
+    return said

@@ -1,0 +1,162 @@
+"""What any client may ask: setpoints and readings, targets, the daemon's status and version."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from compd.live.service.client_session import ClientSession, Stream
+from compd.live.service.message_keys import Keys, SentMessage, StatusKeys, VersionKeys
+from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError, line, unknown_key
+from compd.live.service.request import Asker, Request
+from compd.live.service.request_context import RequestContext, SendLater
+
+Coordinate = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
+Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+
+class ColumnKeys(Keys):
+    """One column of a recording: sign * (value - machine zero) for a length, the value itself for anything else."""
+
+    column: str = Field(description="the column's name, which ends in its unit")
+    channel: str = Field(description='the gauge\'s channel, "gauge.channel", as in READINGS')
+    sign: Literal[1, -1] | None = Field(default=None, description="lengths: -1 where the display falls as it grows")
+    stale_after_s: float = Field(description="a reading older than this is stale, s")
+
+
+class WatchKeys(SentMessage):
+    """Answers WATCH, with the keys of the request."""
+
+    wire_name = "WATCH"
+    what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
+    rate_hz: float | None = Field(default=None, description="as in the request, Hz")
+    columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
+
+
+class WatchRequest(Request):
+    """Asks for setpoints, or for the readings behind them, from now on.
+
+    The answer has the same keys. Then the messages come until the connection ends or another `WATCH` asks for others.
+    """
+
+    wire_name = "WATCH"
+    reply = WatchKeys
+    what: Literal["setpoints", "readings"] = Field(
+        default="setpoints",
+        description="setpoints: `SETPOINT` messages; readings: `READINGS` messages, over the Unix socket only",
+    )
+    rate_hz: Annotated[int | float, Field(ge=0, le=LARGEST_NUMBER)] = Field(
+        default=math.inf, description="messages per second (Hz); left out: one for every cycle; 0: none"
+    )
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        message = {"class": self.wire_name, **self.model_dump(exclude_unset=True)}
+        if self.what == "setpoints":
+            client.watch(self.rate_hz, Stream.SETPOINTS)
+            return line(message)
+        if not client.local or context.readings is None:
+            # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
+            raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
+        client.watch(self.rate_hz, Stream.READINGS)
+        return line(message | {"columns": context.readings.columns})
+
+
+class TargetRequest(Request):
+    """Asks for setpoints that bring the tip to this target. There is no answer; the next setpoint is for it.
+
+    The first client that sends a valid one is the controller, until it sends `RELEASE`, a client of the Unix socket
+    does, or its connection ends. A target may be used for `sockets.target.valid_for_s`: repeat it, also while the
+    machine stands still. Which of the two tips it gives depends on where the machine has its tool.
+    """
+
+    wire_name = "TARGET"
+    tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, mm: [x, y, z]; tool on the platform")
+    tip_P_mm: Vector | None = Field(
+        default=None, description="the touched place in {P}, mm: [x, y, z]; tool on the surface plate"
+    )
+    rotation_B0_rad: Vector | None = Field(
+        default=None,
+        description="hexapod: rotation vector of {P} in {B0}, rad; left out: the attitude at machine zero",
+    )
+
+    @classmethod
+    def allowed_keys(cls, context: RequestContext) -> tuple[str, ...]:
+        return context.target_keys.names
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        keys = context.target_keys
+        if foreign := sorted(self.model_fields_set.difference(keys.names)):
+            raise unknown_key(self.wire_name, foreign[0], keys.names)
+        tip_mm = getattr(self, keys.tip)
+        if tip_mm is None:
+            raise ProtocolError(ErrorCode.BAD_MESSAGE, f"needs {keys.tip}, three numbers")
+        rotation = self.rotation_B0_rad
+        context.set_target(client, tuple(tip_mm), None if rotation is None else tuple(rotation))
+        return b""
+
+
+class ReleaseKeys(SentMessage):
+    """Answers RELEASE: the mode is CMM again."""
+
+    wire_name = "RELEASE"
+
+
+class ReleaseRequest(Request):
+    """Gives the controller's role back: the mode is CMM again.
+
+    A client of the Unix socket ends with it the role of whoever has it. A controller that loses its role in this way
+    gets the error `role_taken` for every further `TARGET`, until it connects again.
+    """
+
+    wire_name = "RELEASE"
+    reply = ReleaseKeys
+    asker = Asker.CONTROLLER
+    refusal = "only the controller, or a client of the Unix socket, can end the controller's role"
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        context.end_role(client)
+        return line({"class": self.wire_name})
+
+
+class AuthKeys(SentMessage):
+    """Greets a TCP client in place of VERSION where a token is configured: send AUTH with it."""
+
+    wire_name = "AUTH"
+
+
+class AuthRequest(Request):
+    """Shows that this client may use TCP; the first line of every client where a token is configured.
+
+    The daemon greets such a client with `AUTH` in place of `VERSION`. With a wrong token, or without one, the
+    connection is closed.
+    """
+
+    wire_name = "AUTH"
+    reply = VersionKeys
+    token: str = Field(description="what is in the file `sockets.tcp.token_file`", repr=False)
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        context.authorize(client, self.token)
+        return context.version
+
+
+class StatusRequest(Request):
+    """Asks how the daemon, its lines and its gauges are doing."""
+
+    wire_name = "STATUS"
+    reply = StatusKeys
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        return line(context.status())
+
+
+class VersionRequest(Request):
+    """Asks which daemon, machine and configuration this is. The answer also greets every new client."""
+
+    wire_name = "VERSION"
+    reply = VersionKeys
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        return context.version

@@ -1,0 +1,132 @@
+"""What requests work on: the daemon's answers and errands, and which client is the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import structlog
+
+from compd.clock import Clock, MonotonicClock
+from compd.configuration.operation import TargetSettings
+from compd.live.loop.commands import Commands, Target
+from compd.live.service.client_session import ClientSession
+from compd.live.service.messages import ErrorCode, ProtocolError, line
+from compd.live.service.readings_message import ReadingsMessage
+from compd.live.service.tcp_access import TcpAccess
+
+# Sends a line to the client that asked, from any thread: the answer to a request that takes time.
+SendLater = Callable[[bytes], None]
+
+_log = structlog.get_logger()
+
+
+@dataclass(frozen=True)
+class TargetKeys:
+    """Which keys TARGET has on this machine.
+
+    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate.
+    rotation : whether "rotation_B0_rad" is allowed: a hexapod's attitude is free, a tripod's follows from its tip.
+    """
+
+    tip: Literal["tip_B0_mm", "tip_P_mm"]
+    rotation: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (self.tip, "rotation_B0_rad") if self.rotation else (self.tip,)
+
+
+def _accept_nothing(gauge: str) -> Sequence[str]:
+    return ()
+
+
+class RequestContext:
+    """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`."""
+
+    def __init__(
+        self,
+        version: Mapping[str, Any],
+        target_keys: TargetKeys,
+        commands: Commands,
+        status: Callable[[], Mapping[str, Any]],
+        take_zero: Callable[[bool, SendLater], None],
+        readings: ReadingsMessage | None = None,
+        switch_model: Callable[[str, bool, int, SendLater], None] | None = None,
+        models: Callable[[], Mapping[str, Any]] = dict,
+        accept: Callable[[str], Sequence[str]] = _accept_nothing,
+        targets: TargetSettings | None = None,
+        access: TcpAccess | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        """`version`: the VERSION message; `status`: makes the STATUS message; `readings`: makes READINGS messages;
+        `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
+
+        `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (file, shadow,
+        user who asks) to adopt a model; both answer later, and raise ProtocolError (busy) while another such request is
+        being worked on. `accept` makes the acquisition believe a gauge, "gauge.channel" or "all" again, and returns the
+        channels that it did not believe; it raises ValueError, with a text for the client, for a name that is none.
+        `access`: who may use TCP; None: everybody who reaches it.
+        """
+        self.version = line(version)
+        self.target_keys = target_keys
+        self.commands = commands
+        self.status = status
+        self.take_zero = take_zero
+        self.readings = readings
+        self.switch_model = switch_model
+        self.models = models
+        self.accept = accept
+        self.controller: ClientSession | None = None
+        self._targets = targets or TargetSettings()
+        self.access = access
+        self._clock = clock or MonotonicClock()
+
+    def authorize(self, client: ClientSession, token: str) -> None:
+        """Let a client in that shows the token. Raises ProtocolError (not_authorized) for another one."""
+        if client.authorized:
+            return
+        if self.access is None or not self.access.knows(token):
+            raise ProtocolError(ErrorCode.NOT_AUTHORIZED, "this is not the token")
+        client.authorized = True
+
+    def set_target(
+        self, client: ClientSession, tip_mm: tuple[float, ...], rotation_B0_rad: tuple[float, ...] | None
+    ) -> None:
+        """Take a target, and with it `client` as the controller. Raises ProtocolError where it may not be."""
+        if self._targets.unix_only and not client.local:
+            raise ProtocolError(
+                ErrorCode.UNIX_ONLY, "targets are given over the Unix socket only (sockets.target.unix_only)"
+            )
+        if client.lost_role:
+            raise ProtocolError(
+                ErrorCode.ROLE_TAKEN, "the role was taken from this client over the Unix socket: connect again"
+            )
+        if self.controller not in {None, client}:
+            raise ProtocolError(ErrorCode.ROLE_TAKEN, "another client is the controller")
+        if self.controller is None:
+            _log.info("controller", client=client.name)
+        self.controller = client
+        valid_until_s = self._clock.monotonic() + self._targets.valid_for_s
+        self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s)
+
+    def end_role(self, client: ClientSession) -> None:
+        """End the controller's role, which `client` has or, over the Unix socket, takes from whoever has it.
+
+        Raises ProtocolError (not_controller) where nobody has it.
+        """
+        controller = self.controller
+        if controller is None:
+            raise ProtocolError(ErrorCode.NOT_CONTROLLER, "no client is the controller")
+        if controller is not client:
+            controller.lost_role = True
+            _log.warning("the controller has lost its role", client=controller.name, by=client.name)
+        self.release(controller)
+
+    def release(self, client: ClientSession) -> None:
+        """Take the controller's role from `client`, if it has it: without a controller the mode is CMM."""
+        if self.controller is client:
+            self.controller = None
+            self.commands.target = None
+            _log.info("no controller any more", client=client.name)

@@ -1,0 +1,362 @@
+"""Polling in turn, rest and back-off of gauges and lines, on scripted lines in simulated time."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+import structlog
+
+from compd.clock import Clock, MonotonicClock
+from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
+from compd.live.acquisition.acquisition import LineThread
+from compd.live.service.message_keys import LineStatusKeys
+from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
+
+OK = Quality.OK
+BACK_OFF_S = (0.05, 0.2)
+STALE_AFTER_S = 0.5
+SETTINGS_TCP = SETTINGS.validate_python({"kind": "tcp", "host": "x", "port": 1, "timeout_s": 0.1})
+
+
+class Line:
+    """A line that only counts what acquisition does with it."""
+
+    last_request_s = -math.inf
+    unexpected_bytes = 0
+
+    def __init__(self) -> None:
+        self.drained = 0
+        self.closed = False
+
+    def drain(self, quiet_s: float | None = None) -> bytes:
+        self.drained += 1
+        return b""
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Scripted(Gauge[Any]):
+    """A driver that does what `poll` does."""
+
+    def __init__(self, poll: Callable[[], Sequence[Any]], channels: int = 1) -> None:
+        super().__init__(None)
+        self._poll = poll
+        self._channels = [Channel(f"c{i}") for i in range(channels)]
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self._channels
+
+    def read(self, line: Any) -> Sequence[Reading]:
+        return self._poll()
+
+
+class Stop(Exception):
+    """Ends a script."""
+
+
+class ScriptedThread:
+    """One LineThread on an InstantClock, run to the end of its script on its own thread."""
+
+    def __init__(self, *drivers: Gauge[Any], opener: Any = None, settings: Any = SETTINGS_TCP) -> None:
+        self.clock = InstantClock()
+        self.lines: list[Line] = []
+        names = [(f"g{i}", driver) for i, driver in enumerate(drivers)]
+        self.latest = WatchedLatest([f"{name}.{c.name}" for name, driver in names for c in driver.channels])
+        stale_after_s = {name: STALE_AFTER_S for name, _ in names}
+        self.thread = LineThread("line", settings, names, stale_after_s, self.latest, self.clock, opener or self.open)
+
+    def open(self, settings: Any, clock: Clock) -> Line:
+        self.lines.append(Line())
+        return self.lines[-1]
+
+    def run(self) -> None:
+        self.thread.start()
+        assert self.thread.join(PATIENCE_S)
+        assert self.thread.status()["state"] == "stopped"
+        assert all(line.closed for line in self.lines)
+        LineStatusKeys.model_validate_json(json.dumps(self.thread.status(), allow_nan=False))
+
+    def qualities(self, channel: str) -> list[Quality]:
+        return [reading.quality for name, reading in self.latest.history if name == channel]
+
+
+def test_a_line_that_cannot_be_opened_is_tried_again_later_and_later() -> None:
+    def closed(settings: Any, clock: Clock) -> Line:
+        raise LineFault(Quality.LINE_LOST, "cannot open it")
+
+    scripted = ScriptedThread(Scripted(lambda: []), opener=closed)
+    scripted.clock.on_wait = lambda: scripted.thread.stop() if len(scripted.clock.waits_s) == 7 else None
+    scripted.run()
+    assert scripted.clock.waits_s == [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0]
+    assert scripted.qualities("g0.c0") == [Quality.LINE_LOST] * 7
+    assert scripted.thread.status()["lost"] == 1
+    assert "cannot open it" in scripted.thread.status()["detail"]
+
+
+def test_a_lost_line_is_closed_and_made_anew_and_success_shortens_the_wait() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        if polls in (2, 3, 5):
+            raise LineFault(Quality.LINE_LOST, "pulled")
+        if polls == 6:
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert len(scripted.lines) == 4
+    assert scripted.thread.status()["lost"] == 3
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.5] == [0.5, 1.0, 0.5]
+
+
+def test_an_absent_unit_rests_and_the_others_go_on() -> None:
+    def present() -> list[Reading]:
+        scripted.clock.now_s += 0.01
+        if scripted.clock.now_s > 120.0:
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    def absent() -> list[Reading]:
+        scripted.clock.now_s += 0.1
+        raise LineFault(Quality.TIMEOUT, "no byte")
+
+    scripted = ScriptedThread(Scripted(present), Scripted(absent))
+    scripted.run()
+    status = scripted.thread.status()["gauges"]
+    assert status["g1"]["faults"] == {"timeout": status["g1"]["polls"]}
+    assert status["g1"]["polls"] == 22, "rests of 0.1, 0.2, 0.4 and 0.8 s, then of 0.9 s"
+    assert status["g0"]["polls"] > 1000
+    assert scripted.lines[0].drained == 0, "a miss costs the others one timeout"
+
+
+def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        scripted.clock.now_s += 0.01
+        if polls <= 3:
+            raise LineFault(Quality.TIMEOUT, "no byte")
+        if polls == 50:
+            scripted.thread.stop()
+        return [good(float(polls), scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == pytest.approx([0.2, 0.4]), "then at once"
+    assert scripted.clock.now_s < 102.0
+
+
+def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        scripted.clock.now_s += 0.01
+        if polls == 1:
+            raise LineFault(Quality.CRC, "b'..'")
+        if polls == 2:
+            raise LineFault(Quality.DEVICE_ERROR, "busy")
+        scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    assert scripted.lines[0].drained == 1, "after a device's own error nothing is under way"
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == pytest.approx([0.1]), (
+        "the second in a row rests"
+    )
+
+
+def polls_with_faults(*faults: LineFault | None, period_s: float = 0.1) -> ScriptedThread:
+    """A gauge polled once per fault, `period_s` apart: with None it is well and shows the number of the poll."""
+    left = list(enumerate(faults, start=1))
+
+    def poll() -> list[Reading]:
+        number, fault = left.pop(0)
+        scripted.clock.now_s += period_s
+        if not left:
+            scripted.thread.stop()
+        if fault is not None:
+            raise fault
+        return [good(float(number), scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll))
+    scripted.run()
+    return scripted
+
+
+@pytest.mark.parametrize("quality", [Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH])
+def test_a_good_reading_outlives_a_fault_of_the_wire(quality: Quality) -> None:
+    scripted = polls_with_faults(None, LineFault(quality, "noise"), None)
+    assert scripted.qualities("g0.c0") == [OK, OK]
+    status = scripted.thread.status()["gauges"]["g0"]
+    assert (status["polls"], status["ok"], status["faults"]) == (3, 2, {str(quality): 1})
+
+
+def test_a_good_reading_goes_when_it_is_stale() -> None:
+    missing = LineFault(Quality.TIMEOUT, "no byte")
+    scripted = polls_with_faults(None, *[missing] * 4)
+    (_, last), (_, first_missing), *_ = scripted.latest.history
+    assert (last.quality, first_missing.quality) == (OK, Quality.TIMEOUT)
+    assert first_missing.time_s - last.time_s > STALE_AFTER_S
+    assert scripted.thread.gauges[0].faults[Quality.TIMEOUT] == 4
+    assert len(scripted.latest.history) < 5, "the first of them took nothing away"
+
+
+@pytest.mark.parametrize("quality", [Quality.DEVICE_ERROR, Quality.SILENT, Quality.SENSOR_FAULT, Quality.LINE_LOST])
+def test_what_the_device_or_the_port_says_takes_a_reading_at_once(quality: Quality) -> None:
+    scripted = polls_with_faults(None, LineFault(quality, "said so"))
+    assert scripted.qualities("g0.c0") == [OK, quality]
+
+
+def test_a_library_that_raises_anything_loses_the_line_and_not_its_thread() -> None:
+    tries = 0
+
+    def failing(settings: Any, clock: Clock) -> Line:
+        nonlocal tries
+        tries += 1
+        if tries <= 2:
+            raise NotImplementedError("write_timeout is currently not supported")
+        return scripted.open(settings, clock)
+
+    def poll() -> list[Reading]:
+        scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll), opener=failing)
+    with structlog.testing.capture_logs() as logs:
+        scripted.run()
+    assert scripted.qualities("g0.c0") == [Quality.LINE_LOST, Quality.LINE_LOST, OK]
+    assert scripted.clock.waits_s[:2] == [0.5, 1.0], "the back-off of the line"
+    assert [entry["detail"] for entry in logs if entry["event"] == "line is lost"] == [
+        "NotImplementedError: write_timeout is currently not supported"
+    ]
+    assert len([entry for entry in logs if entry["event"] == "line failed"]) == 1, "with a traceback, once"
+
+
+def test_a_line_that_fails_while_it_is_drained_or_closed_is_lost_too() -> None:
+    class Broken(Line):
+        def drain(self, quiet_s: float | None = None) -> bytes:
+            raise RuntimeError("no such thing")
+
+        def close(self) -> None:
+            super().close()
+            raise RuntimeError("nor this")
+
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        if polls == 1:
+            raise LineFault(Quality.CRC, "noise")
+        scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    def opener(settings: Any, clock: Clock) -> Line:
+        scripted.lines.append(Broken())
+        return scripted.lines[-1]
+
+    scripted = ScriptedThread(Scripted(poll), opener=opener)
+    scripted.run()
+    assert scripted.qualities("g0.c0") == [Quality.LINE_LOST, OK]
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        ZeroDivisionError("a defect"),
+        Stop("an exception of the driver's own"),
+        [],
+        [good(1.0, 1.0), good(1.0, 1.0)],
+        [Reading(math.nan, 1.0, OK)],
+        [Reading(math.inf, 1.0, OK)],
+        [Reading(1.0, math.nan, OK)],
+        [Reading(1.0, 1e9, OK)],
+        [None],
+        None,
+    ],
+    ids=repr,
+)
+def test_a_defect_of_a_driver_is_named_logged_once_and_survived(answer: Any) -> None:
+    polls = 0
+
+    def poll() -> Any:
+        nonlocal polls
+        polls += 1
+        if polls > 2:
+            scripted.thread.stop()
+            return [good(5.0, scripted.clock.now_s)]
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    scripted = ScriptedThread(Scripted(poll))
+    with structlog.testing.capture_logs() as logs:
+        scripted.run()
+    assert scripted.qualities("g0.c0") == [Quality.DRIVER_ERROR, Quality.DRIVER_ERROR, OK]
+    assert len([entry for entry in logs if entry["event"] == "driver failed"]) == 1
+    assert scripted.thread.status()["gauges"]["g0"]["faults"] == {"driver_error": 2}
+
+
+def test_channels_of_one_poll_have_their_own_qualities() -> None:
+    def poll() -> list[Reading]:
+        scripted.thread.stop()
+        now_s = scripted.clock.now_s
+        return [good(1.0, now_s), Reading(math.nan, now_s, Quality.SENSOR_FAULT, "?"), good(math.inf, now_s)]
+
+    scripted = ScriptedThread(Scripted(poll, channels=3))
+    scripted.run()
+    assert [scripted.qualities(f"g0.c{i}") for i in range(3)] == [[OK], [Quality.SENSOR_FAULT], [Quality.NOT_FINITE]]
+    status = scripted.thread.status()["gauges"]["g0"]
+    assert status["polls"] == 1
+    assert status["ok"] == 0
+    assert status["faults"] == {"sensor_fault": 1, "not_finite": 1}
+    assert "last_ok_s" not in status
+
+
+def test_rounds_keep_the_pace_that_is_configured() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        scripted.clock.now_s += 0.03
+        if polls == 10:
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll), settings=SETTINGS_TCP.model_copy(update={"poll_every_s": 0.1}))
+    scripted.run()
+    assert scripted.clock.waits_s[:9] == pytest.approx([0.07] * 9)
+    assert scripted.thread.status()["round_s"] == pytest.approx(0.03)
+
+
+def test_stopping_cuts_a_back_off_short() -> None:
+    tried = threading.Event()
+
+    def closed(settings: Any, clock: Clock) -> Line:
+        tried.set()
+        raise LineFault(Quality.LINE_LOST, "no")
+
+    settings = SETTINGS_TCP.model_copy(update={"back_off_s": (1e6, 1e6)})
+    latest = WatchedLatest(["g.c0"])
+    gauges = [("g", Scripted(lambda: []))]
+    thread = LineThread("line", settings, gauges, {"g": STALE_AFTER_S}, latest, MonotonicClock(), closed)
+    thread.start()
+    assert tried.wait(PATIENCE_S)
+    thread.stop()
+    assert thread.join(PATIENCE_S)
