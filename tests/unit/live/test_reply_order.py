@@ -210,6 +210,24 @@ def test_a_late_reply_does_not_leave_a_single_gauge_one_reply_behind(late_s: flo
     assert [r.time_s for r in readings] == pytest.approx([heard[round(r.value)] for r in readings])
 
 
+@pytest.mark.parametrize("late_s", np.linspace(0.32, 3.0, 14).tolist())
+def test_replies_that_are_all_late_from_now_on_never_count(late_s: float) -> None:
+    counter = itertools.count(1)
+
+    class Late(Comparators):
+        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, heard_s, timeout_s)
+            heard[number := next(counter)] = heard_s
+            delay_s = late_s if number >= 30 else piece.delay_s
+            return [Piece(delay_s, f"+{number:08.4f}\r".encode())]
+
+    heard: dict[int, float] = {}
+    run = Run(Late(), [comparator(1)], 20.0)
+    readings = [reading for _, reading in run.latest.history if reading.ok]
+    assert len(readings) > 20
+    assert [r.time_s for r in readings] == pytest.approx([heard[round(r.value)] for r in readings])
+
+
 @pytest.mark.parametrize("timeout_s", [0.1, 0.15])
 def test_a_display_that_loses_every_twentieth_reply_is_never_stale(timeout_s: float) -> None:
     """At 0.5 s, as both example configurations have it; the display takes 30 ms to answer."""
