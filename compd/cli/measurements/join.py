@@ -39,8 +39,8 @@ def join(
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
 ) -> None:
     """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
+    from compd.joining.by_time import Instrument, join_reference
     from compd.recording.instrument_export import read_track
-    from compd.recording.join import Instrument, join_reference
     from compd.recording.reader import read_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}

@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.clock_offset import ClockOffset, estimate_offset, evaluate_offset
+from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.recording.columns import link_reference_column
 from compd.recording.instrument_export import LENGTH, Track
 from compd.recording.recording import Recording

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from compd.arrays import FloatArray
 from compd.cli.measurements.join import join as join_command
 from compd.errors import RecordingError
-from compd.recording.clock_offset import estimate_offset
+from compd.joining.by_time import Instrument, join_reference
+from compd.joining.clock_offset import estimate_offset
 from compd.recording.instrument_export import Track, read_track
-from compd.recording.join import Instrument, join_reference
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 from tests.support.two_clocks import TipPath, random_path, track_of
