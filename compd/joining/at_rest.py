@@ -39,6 +39,7 @@ class RestJoin:
     rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
     next_best : (shift by so many dwells, its rms in mm), of an assignment by order; None where there is no other.
     left_out : reason -> points or dwells, in words, that are in no row.
+    of_lengths : whether the points are lengths along a link.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class RestJoin:
     rms_mm: float
     next_best: tuple[int, float] | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
+    of_lengths: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,7 @@ def join_at_rest(
         assigned.rms_mm,
         assigned.next_best,
         left_out,
+        instrument.link is not None,
     )
 
 

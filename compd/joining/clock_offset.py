@@ -26,7 +26,7 @@ from scipy.signal import correlate, correlation_lags
 
 from compd.arrays import BoolArray, FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.instrument_export import Track
+from compd.instruments.track import Track
 
 # Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
 MOTION_MM = 0.01
