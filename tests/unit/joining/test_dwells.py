@@ -33,7 +33,7 @@ def standing_rows(motion: TipPath, time_s: FloatArray) -> list[FloatArray]:
 def test_every_dwell_is_found_with_its_mean(tmp_path: Path, seed: int, noise_mm: float) -> None:
     rng = np.random.default_rng(seed)
     motion = random_path(rng, 30, (2.0, 5.0))
-    time_s = np.arange(0.0, motion.end_s, 0.1)
+    time_s = np.arange(motion.arrive_s[0], motion.end_s, 0.1)
     scale_mm = motion.scales(time_s)
     temperature_degC = 20.0 + time_s / 100.0
     recording = recorded(
