@@ -76,7 +76,9 @@ def _of_group(
             problems.add(0, "has no column of groups", f"--group {options.group}", "no --group")
         return table
     counts = Counter(labels)
-    listed = ", ".join(f"{label or '(none)'} ({count} row{'s' * (count != 1)})" for label, count in counts.most_common(_SHOWN_GROUPS))
+    listed = ", ".join(
+        f"{label or '(none)'} ({count} row{'s' * (count != 1)})" for label, count in counts.most_common(_SHOWN_GROUPS)
+    )
     listed += f" and {len(counts) - _SHOWN_GROUPS} more" if len(counts) > _SHOWN_GROUPS else ""
     if options.group == ALL_GROUPS or (options.group is None and len(counts) == 1):
         taken["group"] = f"{taken.get('group', '')}: {'all of ' if len(counts) > 1 else ''}{listed}".lstrip(": ")
@@ -192,9 +194,7 @@ def _unit(
             next_step="export in one unit, or leave out the option that differs",
         )
     elif said and len(without) not in (0, len(axes)) and not option and not table.unit:
-        problems.add(
-            table.header_line, f"{', '.join(without)} has no unit, where others have one", allowed=allowed
-        )
+        problems.add(table.header_line, f"{', '.join(without)} has no unit, where others have one", allowed=allowed)
     elif not said:
         problems.ask(
             f"no unit of {axes[0]} in its name, nor in the file",
@@ -237,7 +237,9 @@ def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportP
     first = next((cell for cell in cells if cell), "")
     if not is_stamp(first):
         return _time_of_numbers(table, roles, cells, table.line, problems)
-    return read_stamps(_whole_stamps(table, roles, column), table.line, options.dates, column_text(table, column), problems)
+    return read_stamps(
+        _whole_stamps(table, roles, column), table.line, options.dates, column_text(table, column), problems
+    )
 
 
 def _whole_stamps(table: RawTable, roles: Roles, column: int) -> Sequence[str]:

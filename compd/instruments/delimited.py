@@ -208,8 +208,7 @@ def _take_header(
     if last in units:
         repeats.append(tops[last])
         names = tuple(
-            f"{name} [{unit.strip('[](){} ')}]" if unit else name
-            for name, unit in zip(names, tops[last], strict=True)
+            f"{name} [{unit.strip('[](){} ')}]" if unit else name for name, unit in zip(names, tops[last], strict=True)
         )
         last += 1
     return _Header(names, int(line[first]), last, above + first, tuple(repeats))

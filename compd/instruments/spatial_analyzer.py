@@ -47,7 +47,11 @@ def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
             told["frame"] = frame[1]
         if axes:
             own = unit_named(axes[3] or "")
-            if axes[1].lower() != "cartesian" or [name.strip().lower() for name in axes[2].split(",")] != ["x", "y", "z"]:
+            if axes[1].lower() != "cartesian" or [name.strip().lower() for name in axes[2].split(",")] != [
+                "x",
+                "y",
+                "z",
+            ]:
                 problems.add(number, "the axes are not X, Y, Z", line.strip(), "CARTESIAN: X, Y, Z", "export these")
             elif unit and own != unit:
                 problems.add(number, f"units are mixed: {own or 'none'} after {unit}", line.strip(), "one unit")

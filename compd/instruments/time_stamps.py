@@ -249,7 +249,8 @@ def _order(parsed: _Parsed, wanted: str | None, problems: ExportProblems) -> tup
         return possible[0], _ONE_DATE
     if not possible:
         wrong = next(
-            (i for i, key in enumerate(keys) if all(_ordinal(key, order) is None for order in DATE_ORDERS)), len(keys) - 1
+            (i for i, key in enumerate(keys) if all(_ordinal(key, order) is None for order in DATE_ORDERS)),
+            len(keys) - 1,
         )
         problems.add(
             parsed.line_of_date[wrong],

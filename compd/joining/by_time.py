@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.instruments.track import LENGTH, Track
-from compd.recording.clock_offset import ClockOffset, estimate_offset, evaluate_offset
+from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.recording.columns import ATTITUDE_COLUMNS, link_reference_column
 from compd.recording.recording import Recording
 from compd.recording.reference import Frame
