@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 import typer
 
-from compd.errors import Problem, RecordingError
-from compd.instruments.export import InstrumentExport
-from compd.joining.at_rest import By, RestJoin, join_at_rest
-from compd.joining.by_order import REPEAT_MM
-from compd.joining.by_time import Instrument
+if TYPE_CHECKING:
+    from compd.instruments.export import InstrumentExport
+    from compd.joining.at_rest import RestJoin
+    from compd.joining.by_time import Instrument
 
 # Samples further apart in time and place are points, each of its own, and no track of a target.
 _TRACK_PERIOD_S = 1.0
@@ -31,6 +30,11 @@ def choose_by(by: ByChoice | None, export: InstrumentExport) -> ByChoice:
 
     Raises RecordingError where that is not clear: an export without times, or of single points.
     """
+    import numpy as np
+
+    from compd.errors import Problem, RecordingError
+    from compd.joining.by_order import REPEAT_MM
+
     if by is not None:
         return by
     names = "" if export.name is None else ", or --by name: the points' names are those of the recording or of a plan"
@@ -52,17 +56,26 @@ def choose_by(by: ByChoice | None, export: InstrumentExport) -> ByChoice:
     return ByChoice.TIME
 
 
+def check_options(by: ByChoice, offset: float | None, moving: bool, plan: Path | None) -> None:
+    """Raise typer.BadParameter for an option that does not go with what puts rows together."""
+    if by != ByChoice.TIME and (offset is not None or moving):
+        raise typer.BadParameter(f"does not go with --by {by}", param_hint="--moving" if moving else "--offset")
+    if by != ByChoice.NAME and plan is not None:
+        raise typer.BadParameter(f"does not go with --by {by}", param_hint="--plan")
+
+
 def join_points(
     gauges: Path,
     export: InstrumentExport,
     out: Path,
     instrument: Instrument,
-    by: By,
+    by: Literal["order", "name"],
     machine: Path | None,
     plan: Path | None,
 ) -> RestJoin:
     """Join the recording `gauges` with the points by order or name, and print what was joined."""
     from compd.comparison.open import read_with_machine
+    from compd.joining.at_rest import join_at_rest
 
     recording, configuration = read_with_machine(gauges, machine, needs_reference=False)
     joined = join_at_rest(recording, configuration, export, out, instrument, by, plan)
