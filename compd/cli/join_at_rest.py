@@ -87,7 +87,7 @@ def _report(joined: RestJoin) -> None:
     typer.echo(
         f"joined by {joined.by}: {joined.joined} of {joined.points} points, {len(joined.dwells)} dwells of the machine"
     )
-    for line, dwell in dict.fromkeys((joined.first, joined.last)):
+    for line, dwell in (joined.first, joined.last):
         typer.echo(f"    line {line}: {dwell}")
     next_best = ""
     if joined.next_best is not None:

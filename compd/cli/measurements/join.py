@@ -61,14 +61,11 @@ def join(
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
     by: Annotated[
         ByChoice | None,
-        typer.Option(
-            help="By one clock; or points at rest, by their order or their names. By time for a track in time."
-        ),
+        typer.Option(help="Put rows together by one clock; points at rest by their order, or by their names."),
     ] = None,
     machine: MachineOption = None,
     plan: Annotated[
-        Path | None,
-        typer.Option(help="With --by name: the plan that was measured; its row k is point k, such as P00k."),
+        Path | None, typer.Option(help="With --by name: the plan that was measured; its row k is the point P00k.")
     ] = None,
 ) -> None:
     """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
@@ -87,7 +84,7 @@ def join(
     chosen = choose_by(by, exported)
     check_options(chosen, offset, moving, plan)
     if chosen != ByChoice.TIME:
-        join_points(gauges, exported, out, instrument, chosen.value, machine, plan)
+        join_points(gauges, exported, out, instrument, "order" if chosen == ByChoice.ORDER else "name", machine, plan)
         return
     recording = read_recording(gauges, needs_reference=False)
     track = track_of(exported)
