@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,10 +29,12 @@ _STARTS = 12
 _ROUNDS = 6
 # A point farther from its dwell than so many times the rms of the others does not belong to it.
 _LIMIT_SIGMAS = 6.0
-# Another assignment competes if it has a dwell for nearly as many points, and for fewer than this share of them the
-# same one; it must then be worse by this factor.
-_COMPETES = 0.9
+# Another assignment competes if it lacks no more dwells of points than are allowed, and if fewer than this share of its
+# pairs are the same; it must then be worse by the factor CLEARLY_WORSE, as clock offsets must.
+_OTHER = 0.9
 CLEARLY_WORSE = 2.0
+# Share of the points that a shift must leave a dwell to be compared.
+_MOST = 0.75
 # Share of the points, or one, that may be without a dwell.
 _MOST_WITHOUT = 0.05
 
@@ -45,13 +47,15 @@ class Assignment:
     ----------
     dwell : (G,) number of the dwell from 0, -1 for none. rms_mm : of what the distances between the points differ by.
     limit_mm : points farther from their dwell than this have none.
-    unclear : (G,) points that would fit another dwell as well; they have none.
+    other : (G,) the dwell that each point fits next best, -1 for none.
+    unclear : (G,) points that would fit another dwell as well; they have none in what `assign_by_order` returns.
     next_best : (by how many dwells all points are shifted, rms in mm), None where there is no other.
     """
 
     dwell: IntArray
     rms_mm: float
     limit_mm: float
+    other: IntArray
     unclear: BoolArray
     next_best: tuple[int, float] | None = None
 
@@ -175,11 +179,12 @@ def _grown(
         typical_mm = float(np.median(residual_mm[dwell[points], points])) * 1.5
         limit_mm = max(_LIMIT_SIGMAS * typical_mm, near_mm)
     unclear = (dwell >= 0) & (match.margin < CLEAR_MARGIN)
-    dwell = np.where(unclear, -1, dwell)
     points = np.flatnonzero(dwell >= 0)
     if not is_spread(expected_mm[dwell[points]]):
         return None
-    return Assignment(dwell, distances_rms_mm(expected_mm[dwell[points]], measured_mm[points]), limit_mm, unclear)
+    return Assignment(
+        dwell, distances_rms_mm(expected_mm[dwell[points]], measured_mm[points]), limit_mm, match.other, unclear
+    )
 
 
 def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: FloatArray) -> Assignment | NoAssignment:
@@ -195,11 +200,14 @@ def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: Floa
             f"{best.rms_mm:.3g} mm rms",
             f"{allowed_mm:.3g} mm or less",
         )
+    may_lack = max(1.0, _MOST_WITHOUT * len(best.dwell))
     rivals = [
         each
         for each in ordered[1:]
-        if each.count >= _COMPETES * best.count and (each.dwell == best.dwell)[points].mean() < _COMPETES
+        if each.count >= best.count - may_lack and (each.dwell == best.dwell)[points].mean() < _OTHER
     ]
+    if best.unclear.sum() > may_lack:
+        rivals.append(_with_other_dwells(best, expected_mm, measured_mm))
     for rival in rivals:
         if rival.rms_mm < CLEARLY_WORSE * best.rms_mm:
             return NoAssignment(
@@ -208,19 +216,43 @@ def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: Floa
                 f"({rival.rms_mm:.3g} mm rms)",
                 "one that is clearly better",
             )
-    without = np.flatnonzero(best.dwell < 0)
-    if len(without) > max(1.0, _MOST_WITHOUT * len(best.dwell)):
+    without = _without_dwell(best, len(expected_mm), may_lack)
+    best = replace(best, dwell=np.where(best.unclear, -1, best.dwell))
+    if not is_spread(expected_mm[best.dwell[best.dwell >= 0]]):
+        return NoAssignment("too few points have a clear dwell", str(best.count), "three or more, not on one line")
+    if len(without) > may_lack:
         first = int(without[0])
         before = best.dwell[:first][best.dwell[:first] >= 0]
-        what = "points fit several dwells alike" if best.unclear[first] else "points fit no dwell"
         return NoAssignment(
-            f"{len(without)} of {len(best.dwell)} {what}",
+            f"{len(without)} of {len(best.dwell)} points fit no dwell in order",
             f"{best.rms_mm:.3g} mm rms of the others",
             f"one, or {_MOST_WITHOUT:.0%}",
             first,
-            int(before[-1]) + 1 if len(before) else max(int(best.dwell[points[0]]) - first, 0),
+            int(before[-1]) + 1 if len(before) else 0,
         )
-    return Assignment(best.dwell, best.rms_mm, best.limit_mm, best.unclear, _next_best(best, expected_mm, measured_mm))
+    return replace(best, next_best=_next_best(best, expected_mm, measured_mm))
+
+
+def _with_other_dwells(best: Assignment, expected_mm: FloatArray, measured_mm: FloatArray) -> Assignment:
+    """The assignment with the next best dwell of each point whose dwell is not clear."""
+    dwell = np.where(best.unclear, best.other, best.dwell)
+    points = np.flatnonzero(dwell >= 0)
+    return replace(best, dwell=dwell, rms_mm=distances_rms_mm(expected_mm[dwell[points]], measured_mm[points]))
+
+
+def _without_dwell(best: Assignment, dwells: int, may_lack: float) -> IntArray:
+    """Points that have no dwell or no clear one, without those before and after the recording.
+
+    These precede or follow points that have the first or the last dwells.
+    """
+    points = np.flatnonzero(best.dwell >= 0)
+    first, last = int(points[0]), int(points[-1])
+    without = (best.dwell < 0) | best.unclear
+    if best.dwell[first] < 1 + may_lack:
+        without[:first] = False
+    if best.dwell[last] >= dwells - 1 - may_lack:
+        without[last + 1 :] = False
+    return np.flatnonzero(without)
 
 
 def _first(assignment: Assignment) -> int:
@@ -229,13 +261,13 @@ def _first(assignment: Assignment) -> int:
 
 
 def _next_best(best: Assignment, expected_mm: FloatArray, measured_mm: FloatArray) -> tuple[int, float] | None:
-    """(shift, rms in mm) of the best shift of all points by whole dwells that leaves half of them one."""
+    """(shift, rms in mm) of the best shift of all points by whole dwells that leaves most of them one."""
     points = np.flatnonzero(best.dwell >= 0)
     results = []
     for shift in range(-len(expected_mm) + 1, len(expected_mm)):
         dwell = best.dwell[points] + shift
         inside = (dwell >= 0) & (dwell < len(expected_mm))
-        if shift and inside.sum() >= max(3, 0.5 * len(points)):
+        if shift and inside.sum() >= max(3, _MOST * len(points)):
             rms_mm = distances_rms_mm(expected_mm[dwell[inside]], measured_mm[points[inside]])
             results.append((rms_mm, shift))
     if not results:

@@ -17,15 +17,14 @@ CLEAR_MARGIN = 0.3
 
 @dataclass(frozen=True)
 class Match:
-    """dwell : (G,) number of each point's dwell from 0, -1 for none. margin : (G,) what the next best dwell costs."""
+    """dwell : (G,) number of each point's dwell from 0, -1 for none.
+
+    other : (G,) its next best dwell, -1 for none. margin : (G,) what that costs.
+    """
 
     dwell: IntArray
+    other: IntArray
     margin: FloatArray
-
-    @property
-    def score(self) -> int:
-        """How many points have a dwell."""
-        return int((self.dwell >= 0).sum())
 
 
 def match_in_order(residual_mm: FloatArray, limit_mm: float) -> Match:
@@ -43,12 +42,12 @@ def match_in_order(residual_mm: FloatArray, limit_mm: float) -> Match:
     through[possible] = matched[possible] + matched_back[possible] - gain[possible]
     dwell = _trace(gain, matched, best)
     total = best[-1, -1]
-    margin = np.full(len(dwell), np.inf)
-    for j in np.flatnonzero(dwell >= 0):
-        others = np.delete(through[:, j], dwell[j])
-        if len(others) and np.isfinite(others).any():
-            margin[j] = total - others.max()
-    return Match(dwell, margin)
+    chosen = np.flatnonzero(dwell >= 0)
+    through[dwell[chosen], chosen] = -np.inf
+    other = through.argmax(axis=0)
+    margin = total - through[other, np.arange(len(dwell))]
+    possible_other = (dwell >= 0) & np.isfinite(margin)
+    return Match(dwell, np.where(possible_other, other, -1), np.where(possible_other, margin, np.inf))
 
 
 def _forward(gain: FloatArray) -> tuple[FloatArray, FloatArray]:
