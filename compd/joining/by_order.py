@@ -22,8 +22,8 @@ from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 # Points nearer than this are repeats at one place, where the uncertainty is not larger: six standard deviations of a
 # laser tracker's 8 um at a few metres. Also the least distance at which a point no longer belongs to a dwell.
 REPEAT_MM = 0.05
-# Points of one window: 28 distances.
-_WINDOW = 8
+# Points of one window: 28, 10 or 6 distances. Shorter ones are tried where gaps leave no longer part without one.
+_WINDOWS = (8, 5, 4)
 # Starts that are followed; repeats of one motion make as many equally good ones as there are cycles.
 _STARTS = 12
 _ROUNDS = 6
@@ -91,34 +91,34 @@ def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: 
     repeat_mm = repeat_distance_mm(sigma_mm)
     stop, place = _collapsed(expected_mm, repeat_mm)
     group, point = _collapsed(measured_mm, repeat_mm)
-    window = min(_WINDOW, len(place), len(point))
-    if window < 3 or not is_spread(place) or not is_spread(point):
+    most = min(len(place), len(point))
+    if most < 3 or not is_spread(place) or not is_spread(point):
         return NoAssignment(
             "too few different places to tell by their distances",
             f"{len(place)} of the machine, {len(point)} of the instrument",
             "three or more that are not on one line",
         )
-    starts = _starts(place, point, window)
-    grown = [_grown(expected_mm, measured_mm, int(stop[i]), int(group[j]), window, repeat_mm) for _, i, j in starts]
-    found = [assignment for assignment in grown if assignment is not None]
-    if not found:
-        rms_mm, i, j = starts[0]
+    refusals = []
+    for window in sorted({min(window, most) for window in _WINDOWS}, reverse=True):
+        starts = _starts(place, point, window)
+        grown = [_grown(expected_mm, measured_mm, int(stop[i]), int(group[j]), window, repeat_mm) for _, i, j in starts]
+        found = [assignment for assignment in grown if assignment is not None]
+        result = _decided(found, expected_mm, measured_mm) if found else None
+        if isinstance(result, Assignment) or (result is not None and result.point is None):
+            return result
         mirrored = measured_mm.shape[1] == 3 and any(
             _grown(expected_mm, -measured_mm, int(stop[i]), int(group[j]), window, repeat_mm) for _, i, j in starts
         )
-        if mirrored:
+        if not found and mirrored:
             return NoAssignment(
                 "the points are a mirror image of the dwells", "a left-handed frame", "x, y, z of a right-handed frame"
             )
+        rms_mm, i, j = starts[0]
+        allowed_mm = largest_rms_mm(place[i : i + window])
         best = f"{window} points in succession differ by {rms_mm:.3g} mm rms at best{_unit_hint(place, point)}"
-        return NoAssignment(
-            "no order of the dwells has the distances between the points",
-            best,
-            f"{largest_rms_mm(place[i : i + window]):.3g} mm or less",
-            int(group[j]),
-            int(stop[i]),
-        )
-    return _decided(found, expected_mm, measured_mm)
+        what = "no order of the dwells has the distances between the points"
+        refusals.append(result or NoAssignment(what, best, f"{allowed_mm:.3g} mm or less", int(group[j]), int(stop[i])))
+    return refusals[0]
 
 
 def repeat_distance_mm(sigma_mm: float) -> float:

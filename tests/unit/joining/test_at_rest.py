@@ -104,7 +104,7 @@ def test_by_order_from_dwells_that_nobody_numbered(tmp_path: Path) -> None:
     assert provenance["distances_rms_mm"] == pytest.approx(joined.rms_mm, abs=1e-6)
     assert provenance["next_best"]["distances_rms_mm"] > 1
     comparison = compare(open_recording(tmp_path / "joined.csv"))
-    assert comparison.residual_rms_um < 1.5e3 * NOISE_MM
+    assert comparison.rms_um < 1.5e3 * NOISE_MM
 
 
 def test_repeats_are_rows_of_one_visit_and_a_place_visited_later_is_the_same_point(tmp_path: Path) -> None:
