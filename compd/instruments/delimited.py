@@ -236,7 +236,9 @@ def _header_above(
             )
     last = [(number, text) for number, text in found.comments if number < line[0]][-1:]
     for number, text in last:
-        bare = text.lstrip("#%/;").strip() if not text.startswith("#" + delimiter) else text
+        # "#;X;Y" has a first column of numbers
+        numbered = delimiter.strip() and text.startswith("#" + delimiter)
+        bare = text if numbered else text.lstrip("#%/;").strip()
         names = split_header(bare, delimiter, count)
         # one column: any word would be its name
         if len(names) == count > 1 and not any(map(is_number, names)):

@@ -139,7 +139,8 @@ class _Parsed:
         self.failed = False
         self.date = np.zeros(0, dtype=np.int64)
         self.second_s = np.zeros(0)
-        quick = self._parse_minutes(cells, line)
+        # stamps of whole seconds are few
+        quick = self._parse_minutes(cells, line) if 2 * len(set(cells)) > len(cells) else None
         wrong = self._parse_each(cells, line) if quick is None else quick
         for i in wrong[:3]:
             more = f" ({len(wrong)} cells like this)" if len(wrong) > 1 else ""
@@ -195,7 +196,7 @@ class _Parsed:
         for i, cell in enumerate(cells):
             if cell not in known:
                 known[cell] = self._parse(cell, int(line[i]))
-        found = [known[cell] for cell in cells]
+        found = list(map(known.__getitem__, cells))
         self.date = np.array([-1 if value is None else value[0] for value in found], dtype=np.int64)
         self.second_s = np.array([np.nan if value is None else value[1] for value in found], dtype=np.float64)
         return [i for i, value in enumerate(found) if value is None]
@@ -291,7 +292,7 @@ def _order(parsed: _Parsed, wanted: str | None, problems: ExportProblems) -> tup
         )
         return "", ""
     problems.ask(
-        "the order of day and month cannot be told: no day is above 12",
+        "the order of day, month and year cannot be told: the dates can be read in several",
         ", ".join(_date_text(key) for key in keys[:3]),
         [f"--dates {order} ({_reading(keys[0], order)})" for order in possible],
         parsed.line_of_date[0],
