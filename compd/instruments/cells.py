@@ -18,7 +18,8 @@ _SURELY_DECIMAL = re.compile(
 )
 # No length or time in any unit is larger.
 LARGEST = 1e30
-_PLAIN_CHARACTERS = re.compile(r"[^0-9+\-.eE]")
+OTHER_CHARACTERS = re.compile(r"[^0-9+\-.,eE]")
+_TWO_MARKS, _POINT, _COMMA = re.compile(r"[.,][^\n.,]*[.,]"), re.compile(r"\."), re.compile(",")
 # A column is one of numbers where so many of its first cells are; the others are then refused.
 _SHARE = 0.5
 _LOOKED_AT = 500
@@ -43,57 +44,64 @@ def decimal_mark(
     A problem is added where both are used, where numbers have marks of thousands, and where "1,234" may be either.
     wanted : as a person said; None to find out.
     """
-    commas = [cells for cells in columns if any("," in cell for cell in cells)]
+    joined = ["\n".join(cells) for cells in columns]
+    commas = [text for text in joined if "," in text]
     if not commas and wanted is None:
         # "1.234" alone is not asked about: programs that write thousands with a point write decimals with a comma
         return ".", "no number has a comma"
     if wanted is not None:
         _refuse_other_marks(columns, line, wanted, problems)
         return wanted, "given"
-    column = commas[0]
-    row = next(i for i, cell in enumerate(column) if "," in cell)
-    for cells in columns:
-        for i, cell in enumerate(cells):
-            if ("," in cell and "." in cell) or cell.count(",") > 1 or cell.count(".") > 1:
-                problems.add(
-                    int(line[i]),
-                    "a number has marks of thousands",
-                    cell,
-                    "1234.5 or 1234,5",
-                    "say which mark is the decimal one with --decimal",
-                )
-                return ".", ""
-    sure = [cells for cells in commas if _SURELY_DECIMAL.search("\n".join(cells))]
-    if not sure and any("." in cell for cells in columns for cell in cells):
+    for text in joined:
+        row, cell = _first_with(_TWO_MARKS, text)
+        if cell:
+            problems.add(
+                int(line[row]),
+                "a number has marks of thousands",
+                cell,
+                "1234.5 or 1234,5",
+                "say which mark is the decimal one with --decimal",
+            )
+            return ".", ""
+    pointed = next((text for text in joined if "." in text), "")
+    if any(map(_SURELY_DECIMAL.search, commas)):
+        if pointed:
+            row, cell = _first_with(_POINT, pointed)
+            problems.add(
+                int(line[row]),
+                "a number has a point, where others have a decimal comma",
+                cell,
+                "one decimal mark in the whole file",
+                "export with one decimal mark",
+            )
+        return ",", "no mark of thousands stands so"
+    row, cell = _first_with(_COMMA, commas[0])
+    if pointed:
         problems.add(
             int(line[row]),
             "numbers have points and commas",
-            column[row],
+            cell,
             "one decimal mark in the whole file",
             "say with --decimal which mark it is; the other one is then of thousands",
         )
-        return ".", ""
-    if not sure:
-        cell = column[row]
+    else:
         problems.ask(
             "the decimal mark cannot be told: every comma has three digits behind it",
             cell,
             [f"--decimal , ({cell.replace(',', '.')})", f"--decimal . ({cell.replace(',', '')})"],
             int(line[row]),
         )
-        return ".", ""
-    for cells in columns:
-        for i, cell in enumerate(cells):
-            if "." in cell:
-                problems.add(
-                    int(line[i]),
-                    "a number has a point, where others have a decimal comma",
-                    cell,
-                    "one decimal mark in the whole file",
-                    "export with one decimal mark",
-                )
-                return ",", ""
-    return ",", "no mark of thousands stands so"
+    return ".", ""
+
+
+def _first_with(marks: re.Pattern[str], joined: str) -> tuple[int, str]:
+    """(row, cell) of the first of the cells, joined by line ends, that has these marks; (0, "") for none."""
+    found = marks.search(joined)
+    if found is None:
+        return 0, ""
+    row = joined.count("\n", 0, found.start())
+    begin = joined.rfind("\n", 0, found.start()) + 1
+    return row, joined[begin:].partition("\n")[0]
 
 
 def _refuse_other_marks(
@@ -103,6 +111,9 @@ def _refuse_other_marks(
     other = "." if decimal == "," else ","
     grouped = re.compile(rf"[-+]?\d{{1,3}}(?:\{other}\d{{3}})+(?:\{decimal}\d*)?", re.ASCII)
     for cells in columns:
+        joined = "\n".join(cells)
+        if other not in joined and not _TWO_MARKS.search(joined):
+            continue
         for i, cell in enumerate(cells):
             if (other in cell or cell.count(decimal) > 1) and not grouped.fullmatch(cell):
                 problems.add(
@@ -126,9 +137,10 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
 
     line : (N,) of the cells. what : for a person, what the column holds.
     """
-    if not _PLAIN_CHARACTERS.search("".join(cells)):
+    if not OTHER_CHARACTERS.search("".join(cells)):
         try:
-            values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
+            filled = cells if "" not in cells else [cell or "nan" for cell in cells]
+            values = np.array(list(map(float, filled)), dtype=np.float64)
         except ValueError:
             pass  # below, with the line
         else:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.instruments.cells import numbers
-from compd.instruments.column_roles import ATTITUDE_AXES, AXES, Roles, column_text, find_roles
-from compd.instruments.export import InstrumentExport, ReadOptions
+from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
+from compd.instruments.export import ATTITUDE_AXES, InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.raw_table import RawTable
 from compd.instruments.time_stamps import StampedTime, is_clock, is_date, is_stamp, read_stamps, spread_within
@@ -39,7 +39,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     time = _time(table, roles, options, problems)
     values = _values(table, roles, axes, options, taken, problems)
     problems.check()
-    complete = ~np.isnan(values).any(axis=1)
+    complete: BoolArray = ~np.isnan(values).any(axis=1)
     if time is not None:
         complete &= ~np.isnan(time.time_s)
         taken["time"] = f"{taken['time']}, {time.told}" if "time" in taken else time.told
@@ -51,7 +51,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     if not complete.all():
         left_out["with an empty cell"] = int((~complete).sum())
         if names is not None:
-            names = tuple(name for name, whole in zip(names, complete, strict=True) if whole)
+            names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
     return InstrumentExport(
         path=table.path,
         shape=table.shape,
@@ -117,7 +117,7 @@ def _names(table: RawTable, roles: Roles, taken: dict[str, str]) -> tuple[str, .
     names = table.columns[roles.column["name"]]
     labels = _labels(table, roles)
     if labels is not None and len(set(labels)) > 1:
-        pairs = {pair for pair in zip(labels, names, strict=True)}
+        pairs = set(zip(labels, names, strict=True))
         if len(pairs) > len(set(names)):
             taken["name"] += ", with the group in front, as names occur in several"
             return tuple(f"{label}::{name}" for label, name in zip(labels, names, strict=True))
@@ -253,7 +253,7 @@ def _whole_stamps(table: RawTable, roles: Roles, column: int) -> Sequence[str]:
         date_column, column = column, column + 1
         cells = table.columns[column]
     half = table.columns[column + 1] if column + 1 < len(table.columns) else ()
-    if half and {cell.upper() for cell in half} <= _HALF_DAY:
+    if half and half[0].upper() in _HALF_DAY and {cell.upper() for cell in half} <= _HALF_DAY:
         cells = [f"{cell} {other}" for cell, other in zip(cells, half, strict=True)]
     if date_column is None:
         return cells
@@ -283,8 +283,11 @@ def _time_of_numbers(
         )
         return None
     ratio = factor or 1.0
-    if any("e" in cell or "E" in cell for cell in cells):
-        return StampedTime(values * ratio, 0.0, told)
+    time_s = values * ratio
+    repeated = bool(np.any(np.diff(filled) == 0.0))
+    joined = "".join(cells) if repeated else "e"
+    if "e" in joined or "E" in joined:
+        return StampedTime(time_s, 0.0, told)
     decimals = max(len(cell.partition(".")[2]) for cell in cells)
-    time_s, std_s, spread = spread_within(values * ratio, ratio * 10.0**-decimals)
+    time_s, std_s, spread = spread_within(time_s, ratio * 10.0**-decimals)
     return StampedTime(time_s, std_s, f"{told}; {spread}" if spread else told)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import IntArray
-from compd.instruments.cells import NUMBER, decimal_mark, is_number, is_number_column, with_points
+from compd.instruments.cells import OTHER_CHARACTERS, decimal_mark, is_number, is_number_column, with_points
 from compd.instruments.delimiter import BLANKS, NAMES, WIDE_BLANKS, find_delimiter, split_cells, split_header
 from compd.instruments.export import ReadOptions
 from compd.instruments.export_problems import ExportProblems
@@ -20,6 +20,7 @@ from compd.instruments.time_stamps import is_stamp
 from compd.units import unit_named
 
 _COMMENT = ("#", "%", "//")
+_MAY_BE_NO_ROW = "#%/"
 _SEPARATOR_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
 _UNIT_COMMENT = re.compile(r"\b(?:units?|einheit(?:en)?)\b\W*([^\W\d]+)", re.IGNORECASE)
 
@@ -93,15 +94,16 @@ class _Header:
 
 def _rows_and_comments(lines: Sequence[str]) -> _Rows:
     found = _Rows()
-    for number, line in enumerate(lines, start=1):
-        stripped = line.strip()
-        if not stripped:
-            continue
+    gone = set()
+    # of a million lines few begin so; an empty line "begins" with any of them
+    for i in [i for i, line in enumerate(map(str.lstrip, lines)) if line[:1] in _MAY_BE_NO_ROW]:
+        stripped = lines[i].strip()
         if stripped.startswith(_COMMENT):
-            found.comments.append((number, stripped))
-        else:
-            found.rows.append(line)
-            found.number.append(number)
+            found.comments.append((i + 1, stripped))
+        if not stripped or stripped.startswith(_COMMENT):
+            gone.add(i)
+    found.rows = [line for i, line in enumerate(lines) if i not in gone]
+    found.number = [i for i in range(1, len(lines) + 1) if i - 1 not in gone]
     return found
 
 
@@ -114,16 +116,17 @@ def _take_delimiter(found: _Rows, options: ReadOptions) -> str:
         del found.rows[0], found.number[0]
         delimiter = separator[1]
     else:
-        table = [row for row in found.rows if not row.lstrip().startswith(";")]
+        table = [row for row, bare in zip(found.rows, map(str.lstrip, found.rows), strict=True) if bare[0] != ";"]
         delimiter = find_delimiter(table, options.decimal) if table else ","
     if options.shape == "blanks" and delimiter not in (BLANKS, WIDE_BLANKS):
         delimiter = BLANKS
     if delimiter != ";":
-        marked = [i for i, row in enumerate(found.rows) if row.lstrip().startswith(";")]
+        marked = [i for i, row in enumerate(map(str.lstrip, found.rows)) if row[:1] == ";"]
         found.comments += [(found.number[i], found.rows[i].strip()) for i in marked]
         found.comments.sort()
         _drop(found, marked)
-    _drop(found, [i for i, row in enumerate(found.rows) if not row.strip(delimiter + " \t")])
+    between = delimiter + " \t"
+    _drop(found, [i for i, row in enumerate(found.rows) if row[0] in between and not row.strip(between)])
     return delimiter
 
 
@@ -136,7 +139,7 @@ def _drop(found: _Rows, places: Sequence[int]) -> None:
 
 def _count_cells(found: _Rows, delimiter: str, problems: ExportProblems) -> tuple[int, int]:
     """Number of cells that most rows have, and how many lines of prose stand above the table."""
-    if delimiter in (BLANKS, WIDE_BLANKS) or any('"' in row for row in found.rows):
+    if delimiter in (BLANKS, WIDE_BLANKS) or '"' in "".join(found.rows):
         counts = [len(split_cells(row, delimiter)) for row in found.rows]
     else:
         counts = [row.count(delimiter) + 1 for row in found.rows]
@@ -171,7 +174,7 @@ def _split(found: _Rows, delimiter: str, count: int, above: int) -> tuple[list[l
     line = np.array(found.number[above:], dtype=np.int64)
     if delimiter == BLANKS:
         flat = " ".join(rows).split()
-    elif delimiter == WIDE_BLANKS or any('"' in row for row in rows):
+    elif delimiter == WIDE_BLANKS or '"' in "".join(rows):
         flat = [cell for row in rows for cell in split_cells(row, delimiter)]
     else:
         joined = delimiter.join(rows)
@@ -233,7 +236,9 @@ def _header_above(
             )
     last = [(number, text) for number, text in found.comments if number < line[0]][-1:]
     for number, text in last:
-        bare = text.lstrip("#%/;").strip() if not text.startswith("#" + delimiter) else text
+        # "#;X;Y" has a first column of numbers
+        numbered = delimiter.strip() and text.startswith("#" + delimiter)
+        bare = text if numbered else text.lstrip("#%/;").strip()
         names = split_header(bare, delimiter, count)
         # one column: any word would be its name
         if len(names) == count > 1 and not any(map(is_number, names)):
@@ -254,7 +259,9 @@ def _drop_headers(
     """The rows below the header, without its repeats; another header between them is refused."""
     columns, line = [cells[header.rows :] for cells in columns], line[header.rows :]
     probe = next((cells for cells in columns if len(line) and is_number(cells[0])), [])
-    odd = [i for i, cell in enumerate(probe) if cell and not NUMBER.fullmatch(cell) and not is_number(cell)]
+    # a name has other characters than a number
+    suspicious = OTHER_CHARACTERS.search("".join(probe)) is not None
+    odd = [i for i, cell in enumerate(probe) if cell and not is_number(cell)] if suspicious else []
     again = set()
     for i in odd:
         row = tuple(cells[i] for cells in columns)

@@ -5,33 +5,32 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from compd.instruments.export import ATTITUDE_AXES, POSITION_AXES
 from compd.units import unit_named
 
 _PARTS = re.compile(r"[^0-9a-z]+")
 _UNIT_BEHIND = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]\s*$")
 _LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "µ": "u", "μ": "u"})
 
-# Words of a name that make it something else than what was measured.
-_NOT_MEASURED = frozenset(
-    "nominal nom soll sollwert theo theoretical dev deviation abweichung delta error err fehler sigma std rms "
-    "uncertainty unsicherheit tol tolerance toleranz min max offset".split()
-)
-# Words that do not change what a name means.
-_MEASURED = frozenset("actual act measured meas ist istwert mess gemessen value wert".split())
-_TIME = frozenset(
-    "t time timestamp zeit zeitstempel uhrzeit messzeit elapsed seconds sekunden datetime zeitpunkt".split()
-)
-_DATE = frozenset("date datum".split())
-_LENGTH = frozenset(
-    "length distance displacement position l d laenge abstand weg entfernung verschiebung strecke".split()
-)
-_NAME = frozenset(
-    "name target point punkt punktname pointname targetname label bezeichnung targetid pointid punktbezeichnung".split()
-)
-_NUMBER = frozenset("id nr no num number nummer punktnummer index punktnr pointnumber".split())
-_GROUP = frozenset("group gruppe pointgroup punktgruppe".split())
-_COLLECTION = frozenset("collection sammlung".split())
-_ANGLES = frozenset("roll pitch yaw a b c rollen nicken gieren".split())
+# Words, tidied, by what they make of a column, in English and German.
+_WORDS = {
+    "not measured": "nominal nom soll sollwert theo theoretical dev deviation abweichung delta error err fehler sigma "
+    "std rms uncertainty unsicherheit tol tolerance toleranz min max offset",
+    "measured": "actual act measured meas ist istwert mess gemessen value wert",
+    "time": "t time timestamp zeit zeitstempel uhrzeit messzeit elapsed seconds sekunden datetime zeitpunkt",
+    "date": "date datum",
+    "length": "length distance displacement position l d laenge abstand weg entfernung verschiebung strecke",
+    "name": "name target point punkt punktname pointname targetname label targetid pointid "
+    "bezeichnung punktbezeichnung",
+    "number": "id nr no num number nummer punktnummer index punktnr pointnumber",
+    "group": "group gruppe pointgroup punktgruppe",
+    "collection": "collection sammlung",
+    "angle": "roll pitch yaw a b c rollen nicken gieren",
+    **{axis: axis for axis in (*POSITION_AXES, *ATTITUDE_AXES)},
+}
+_MEANING = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
+# These count as the last word of a name too: "Tracker X", "raw time".
+_LAST = ("time", *POSITION_AXES, *ATTITUDE_AXES, "length")
 _LINK = re.compile(r"link_?\d+")
 
 
@@ -54,10 +53,15 @@ def tidy_name(name: str) -> str:
 def understand(name: str) -> HeaderName:
     """Role and unit of a column by its name alone."""
     stem, unit = split_unit(name)
-    parts = [part for part in stem.split("_") if part not in _MEASURED]
-    if not parts or not _NOT_MEASURED.isdisjoint(parts):
+    # "actual x" is x
+    parts = [part for part in stem.split("_") if _MEANING.get(part) != "measured"]
+    if not any(parts) or any(_MEANING.get(part) == "not measured" for part in parts):
         return HeaderName("", unit)
-    return HeaderName(_role(parts), unit)
+    whole, last = _MEANING.get("".join(parts), ""), _MEANING.get(parts[-1], "")
+    if whole or last in _LAST or (last == "angle" and len(parts[-1]) > 1):
+        return HeaderName(whole or last, unit)
+    numbered = parts[-1].isdigit() and len(parts) > 1 and _MEANING.get(parts[-2]) == "length"
+    return HeaderName("length" if numbered or _LINK.fullmatch("_".join(parts[-2:])) else "", unit)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -76,27 +80,3 @@ def split_unit(name: str) -> tuple[str, str]:
         return tidy_name(name), ""
     stem = tidy_name(head)
     return (stem.removesuffix("_in") if unit != "inch" else stem), unit
-
-
-def _role(parts: list[str]) -> str:
-    last, whole = parts[-1], "".join(parts)
-    if last in _TIME or whole in _TIME:
-        return "time"
-    if whole in _DATE or whole in {"datetime"}:
-        return "date"
-    if last in {"x", "y", "z", "rx", "ry", "rz"}:
-        return last
-    if last in _ANGLES and (len(last) > 1 or len(parts) == 1):
-        return "angle"
-    for role, words in (
-        ("name", _NAME),
-        ("number", _NUMBER),
-        ("group", _GROUP),
-        ("collection", _COLLECTION),
-    ):
-        if whole in words:
-            return role
-    numbered = last.isdigit() and len(parts) > 1 and parts[-2] in _LENGTH
-    if last in _LENGTH or numbered or _LINK.fullmatch("_".join(parts[-2:])):
-        return "length"
-    return ""

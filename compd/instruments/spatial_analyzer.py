@@ -39,12 +39,11 @@ def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
     """The table of such an export; without comments too (`number, x, y, z`). Raises RecordingError."""
     problems = ExportProblems(text.path)
     told, unit = {}, ""
-    for number, line in enumerate(text.lines, start=1):
-        if not line.lstrip().startswith("//"):
-            continue
+    for i in [i for i, line in enumerate(map(str.lstrip, text.lines)) if line[:2] == "//"]:
+        number, line = i + 1, text.lines[i]
         frame, axes = _FRAME.search(line), _AXES.search(line)
-        if frame:
-            told["frame"] = frame[1]
+        if frame and told.setdefault("frame", frame[1]) != frame[1]:
+            problems.add(number, f"another frame begins here, after {told['frame']}", frame[1], "one frame in a file")
         if axes:
             own = unit_named(axes[3] or "")
             if axes[1].lower() != "cartesian" or [name.strip().lower() for name in axes[2].split(",")] != [

@@ -13,6 +13,7 @@ from compd.instruments.export_problems import ExportProblems
 # Some four million rows; a tracker with 50 samples a second writes them in a day.
 MOST_BYTES = 256 * 2**20
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL_BYTES = bytes([*range(9), *range(14, 32), 127])
 _UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -62,7 +63,9 @@ def decode_text(path: Path, content: bytes) -> TextFile:
             text, encoding = _decoded(content, "cp1252", problems), "Windows-1252, as it is no UTF-8"
     # programs of DOS times end a file so
     text = text.removesuffix("\x1a")
-    control = _CONTROL.search(text)
+    # bytes are looked through ten times faster than characters
+    clean = encoding != "UTF-16" and len(content.translate(None, _CONTROL_BYTES)) == len(content)
+    control = None if clean else _CONTROL.search(text)
     if control:
         problems.add(
             text.count("\n", 0, control.start()) + 1,

@@ -267,3 +267,49 @@ def test_length_needs_its_link(tmp_path: Path) -> None:
     assert joined.reference_links == (1,)
     assert joined.reference is not None
     assert joined.reference.quantity == "link_length"
+
+
+def test_an_attitude_is_joined_and_a_turn_on_the_spot_is_motion(tmp_path: Path) -> None:
+    """The platform turns by 0.1 rad about the target between 20 s and 25 s, while the target itself stands still."""
+    rng = np.random.default_rng(5)
+    motion = random_path(rng, 30, (1.5, 4.0))
+    standing = standing_still(motion)
+    time_s = np.arange(2.0, 40.0, 0.5)
+    recording = read_recording(gauges(tmp_path / "g.csv", standing, time_s, rng), needs_reference=False)
+    seen_s = np.arange(0.0, 50.0, 0.1)
+    rotation_rad = np.column_stack([np.interp(seen_s, [20, 25], [0.3, 0.4]), np.zeros((len(seen_s), 2))])
+    track = Track(tmp_path / "p.csv", seen_s, standing.tip(seen_s), ("x", "y", "z"), rotation_rad=rotation_rad)
+    result = join_reference(recording, track, tmp_path / "out.csv", Instrument(), 0.0)
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference is not None
+    assert joined.reference.quantity == "tool_pose"
+    assert joined.reference_rotation_rad is not None
+    moving = (time_s > 19.8) & (time_s < 25.2)
+    assert result.left_out == {"in motion": int(moving.sum())}
+    assert np.array_equal(np.isnan(joined.reference_rotation_rad).any(axis=1), moving)
+    assert np.ptp(joined.reference_rotation_rad[time_s < 19]) == pytest.approx(0.3)
+    np.testing.assert_allclose(joined.reference_rotation_rad[time_s > 26, 0], 0.4, atol=1e-12)
+
+
+def test_whole_seconds_are_for_rows_at_rest_alone(tmp_path: Path) -> None:
+    """Ten rows in each second with stamps of whole seconds: dwells of 4 s are matched, and their edges are not."""
+    rng = np.random.default_rng(5)
+    motion = random_path(rng, 40, (3.0, 6.0))
+    time_s = np.arange(5.0, motion.end_s - 5.0, 0.2)
+    recording = read_recording(gauges(tmp_path / "g.csv", motion, time_s, rng), needs_reference=False)
+    seen_s = np.arange(0.0, motion.end_s, 0.1) + 0.05
+    rows = [
+        f"16:{int(second) // 60:02}:{int(second) % 60:02},{','.join(f'{value:.6f}' for value in tip)}"
+        for second, tip in zip(seen_s, motion.tip(seen_s) + rng.normal(0.0, 1e-4, (len(seen_s), 3)), strict=True)
+    ]
+    (tmp_path / "t.csv").write_text("\n".join(["Time,X [mm],Y [mm],Z [mm]", *rows]) + "\n")
+    track = read_track(tmp_path / "t.csv")
+    with pytest.raises(RecordingError, match="too coarse for rows in motion"):
+        join_reference(recording, track, tmp_path / "out.csv", Instrument(), moving=True)
+    result = join_reference(recording, track, tmp_path / "out.csv", Instrument(frame="machine"))
+    assert 100 < result.matched < len(time_s)
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference_mm is not None
+    error_mm = joined.reference_mm - motion.tip(joined.time_s)
+    assert np.nanmax(np.abs(error_mm)) < 0.002
+    assert joined.sidecar.provenance["join"]["time_std_s"] == pytest.approx(0.2887, abs=1e-4)
