@@ -13,12 +13,13 @@ from compd.arrays import FloatArray, IntArray
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.instruments.export import LENGTH_AXES, POSITION_AXES, InstrumentExport
-from compd.joining.by_name import SHOWN_NAMES, NameCheck, assign_by_name, check_names
+from compd.joining.by_name import assign_by_name, check_names
 from compd.joining.by_order import NoAssignment, assign_by_order, repeat_distance_mm
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns, find_dwells
 from compd.joining.expected_places import expected_places_mm
 from compd.joining.joined_rows import joined_columns, joined_sidecar
+from compd.joining.misplaced_names import lines_text, listed, name_problems
 from compd.joining.plan_points import dwells_of_plan, read_plan_points
 from compd.recording.recording import Recording
 from compd.recording.writer import write_recording
@@ -198,12 +199,12 @@ def _by_order(
     left_out = {}
     fits_none = np.flatnonzero((result.dwell < 0) & ~result.unclear)
     if len(fits_none):
-        left_out[f"points of no dwell, none within {result.limit_mm:.2g} mm"] = _lines_text(export, fits_none)
+        left_out[f"points of no dwell, none within {result.limit_mm:.2g} mm"] = lines_text(export, fits_none)
     if result.unclear.any():
-        left_out["points that fit two dwells alike"] = _lines_text(export, np.flatnonzero(result.unclear))
+        left_out["points that fit two dwells alike"] = lines_text(export, np.flatnonzero(result.unclear))
     without = np.setdiff1d(np.arange(len(dwells)), result.dwell)
     if len(without):
-        left_out["dwells without a point"] = _listed([str(dwells[i].number) for i in without])
+        left_out["dwells without a point"] = listed([str(dwells[i].number) for i in without])
     return _Assigned(result.dwell, result.rms_mm, result.next_best, left_out)
 
 
@@ -221,76 +222,30 @@ def _by_name(
                 next_step="give --plan PLAN.csv, or join --by order",
             )
         )
-    named = assign_by_name(ids, [len(dwell.rows) for dwell in dwells], export.name)
+    order = np.arange(len(export.name)) if export.time_s is None else np.argsort(export.time_s, kind="stable")
+    named = assign_by_name(ids, [len(dwell.rows) for dwell in dwells], [export.name[j] for j in order])
+    dwell_of = named.dwell[np.argsort(order)]
     left_out = {}
     if named.unknown:
-        left_out["names that no dwell has"] = _listed(named.unknown)
+        left_out["names that no dwell has"] = listed(named.unknown)
     if named.unclear:
-        left_out["names measured another number of times than visited"] = _listed(named.unclear)
+        left_out["names of which it is not clear at which visit each point was measured"] = listed(named.unclear)
     if named.without:
-        left_out["points of the recording without a name in the export"] = _listed(named.without)
-    if not (named.dwell >= 0).any():
+        left_out["points of the recording without a name in the export"] = listed(named.without)
+    if not (dwell_of >= 0).any():
         raise RecordingError(
             Problem(
                 where=str(export.path),
-                what="no name is a point of the recording",
-                value=_listed(export.name),
-                allowed=_listed([own for own in dict.fromkeys(ids) if own]),
-                next_step="name the points as the recording or the plan does, or join --by order",
+                what="no name is a point of the recording"
+                if not named.unclear
+                else "the places were visited several times, and the points do not stand in the order of measuring",
+                value=listed(export.name),
+                allowed=listed([own for own in dict.fromkeys(ids) if own]),
+                next_step="name the points as the recording or the plan does, list them in the order of measuring or "
+                "with times, or join --by order",
             )
         )
-    check = check_names(places_mm, measured_mm, named.dwell, repeat_distance_mm(sigma_mm))
+    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm))
     if check.why or len(check.wrong) or check.rms_mm > check.allowed_mm:
-        raise RecordingError(_name_problems(check, dwells, export, named.dwell))
-    return _Assigned(named.dwell, check.rms_mm, None, left_out)
-
-
-def _name_problems(check: NameCheck, dwells: list[Dwell], export: InstrumentExport, dwell: IntArray) -> list[Problem]:
-    """Every name that is at another place than its point; two that are at each other's are named together."""
-    assert export.name is not None
-    if check.why or not len(check.wrong):
-        return [
-            Problem(
-                where=str(export.path),
-                what=check.why
-                or "the distances between points are farther from those of the dwells than a machine can be wrong",
-                value=f"{check.rms_mm:.3g} mm rms" if np.isfinite(check.rms_mm) else "",
-                allowed=f"{check.allowed_mm:.3g} mm or less"
-                if np.isfinite(check.allowed_mm)
-                else "three places or more",
-                next_step="check names, unit and machine; or join --by order",
-            )
-        ]
-    problems = []
-    for point, nearest, off_mm in zip(check.wrong, check.nearest, check.off_mm, strict=True):
-        name, own = export.name[point], dwells[dwell[point]].point
-        there = dwells[nearest].point or f"dwell {dwells[nearest].number}" if nearest >= 0 else ""
-        swapped = [
-            export.name[other]
-            for other in check.wrong
-            if other != point
-            and nearest >= 0
-            and dwells[dwell[other]].point == dwells[nearest].point
-            and dwells[check.nearest[list(check.wrong).index(other)]].point == own
-        ]
-        told = f"; it is where {there} is" if there else "; it is at no dwell's place"
-        told += f": {name} and {swapped[0]} are swapped" if swapped else ""
-        problems.append(
-            Problem(
-                where=f"{export.path}:{export.line[point]}",
-                what=f"{name} is {off_mm:.3g} mm from where point {own} was{told}",
-                next_step="mend the names in the export, or delete the line",
-            )
-        )
-    return problems
-
-
-def _lines_text(export: InstrumentExport, points: IntArray) -> str:
-    return f"line{'s' * (len(points) != 1)} " + _listed([str(export.line[j]) for j in points])
-
-
-def _listed(texts: list[str] | tuple[str, ...]) -> str:
-    """The first few, each once."""
-    different = list(dict.fromkeys(texts))
-    more = len(different) - SHOWN_NAMES
-    return ", ".join(different[:SHOWN_NAMES]) + (f" and {more} more" if more > 0 else "")
+        raise RecordingError(name_problems(check, dwells, export, dwell_of))
+    return _Assigned(dwell_of, check.rms_mm, None, left_out)

@@ -16,8 +16,6 @@ _LAST_NUMBER = re.compile(r"(?:.*\D)?0*(\d+)")
 # Robust registration: points far off are left out of it, until the same ones are.
 _ROUNDS = 10
 _WRONG_SIGMAS = 6.0
-# Names that a message lists.
-SHOWN_NAMES = 8
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class NamedAssignment:
     ----------
     dwell : (G,) number of the dwell from 0, -1 for none.
     unknown : names that no dwell has. without : ids of dwells that no point has.
-    unclear : names measured several times, at a place visited another number of times.
+    unclear : names of places visited several times of which it cannot be told when each was measured.
     """
 
     dwell: IntArray
@@ -60,17 +58,18 @@ def assign_by_name(ids: Sequence[str], sizes: Sequence[int], names: Sequence[str
     """The dwell of each named point.
 
     ids : of S dwells in the order of time, "" for none. sizes : rows of each dwell.
-    names : of G points in the order of the file.
+    names : of G points in the order of time, or of the file where they have none.
 
     A name is an id as it stands, without regard to case; else by its last number, as P001 is 1, where ids are numbers
     and no other name has the same one. A name measured as often as its place was visited: the k-th time at the k-th
     visit; measured as often as there are rows of the recording, one after the other; in as many successions of lines as
     there were visits, the k-th of them at the k-th visit; measured several times at a place visited once: repeats. Any
-    other is unclear.
+    other is unclear, and so are all names of places visited several times if this does not leave these visits in the
+    order of time: then the points are not listed in the order in which they were measured.
     """
     id_of = _ids_of_names(ids, names)
     dwell = np.full(len(names), -1, dtype=np.int64)
-    unclear = []
+    unclear, visited_again = [], []
     for name, own in id_of.items():
         points = [j for j, other in enumerate(names) if other == name]
         dwells = [i for i, other in enumerate(ids) if other == own]
@@ -85,6 +84,12 @@ def assign_by_name(ids: Sequence[str], sizes: Sequence[int], names: Sequence[str
             dwell[points] = np.array(dwells)[run]
         else:
             unclear.append(name)
+        if len(dwells) > 1:
+            visited_again += points
+    at_visits = dwell[np.sort(np.array(visited_again, dtype=np.int64))]
+    if (np.diff(at_visits[at_visits >= 0]) < 0).any():
+        dwell[visited_again] = -1
+        unclear = list(dict.fromkeys(names[j] for j in sorted(visited_again)))
     unknown = tuple(dict.fromkeys(name for name in names if name not in id_of))
     taken = {*id_of.values()}
     without = tuple(dict.fromkeys(own for own in ids if own and own not in taken))

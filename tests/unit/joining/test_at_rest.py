@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -173,6 +174,22 @@ def test_by_name_of_a_plans_rows(tmp_path: Path) -> None:
     other = plan_file(tmp_path / "other.csv", [{"tip_x_mm": 500.0, "tip_z_mm": 100.0}])
     with pytest.raises(RecordingError, match="dwelled at no place of the plan"):
         measured.join(export, "name", plan=other)
+
+
+def test_times_say_which_visit_a_name_in_a_sorted_list_is_of(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    tip_mm, scale_mm = (np.tile(values, (2, 1)) for values in targets(rng, 8))
+    ids = np.tile(1.0 + np.arange(8), 2)
+    write_gauges(tmp_path / "gauges.csv", 60.0 * np.arange(16), scale_mm, point=ids)
+    measured = Measured(tmp_path / "gauges.csv", tip_mm, scale_mm)
+    by_name = np.argsort(ids, kind="stable")
+    own_mm = seen(rng, tip_mm)
+    export = points(own_mm[by_name], [f"P{k:.0f}" for k in ids[by_name]])
+    with pytest.raises(RecordingError, match="order of measuring"):
+        measured.join(export, "name")
+    measured.join(replace(export, time_s=1000.0 + by_name), "name")
+    recording = read_recording(tmp_path / "joined.csv")
+    assert recording.reference_mm == pytest.approx(own_mm)
 
 
 def test_names_without_ids_of_dwells_are_refused(tmp_path: Path) -> None:

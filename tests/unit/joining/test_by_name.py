@@ -41,6 +41,14 @@ def test_names_at_rows_of_visits() -> None:
     assert assign_by_name(["1", "2", "1"], [3, 1, 3], ["1", "1", "1", "1", "1", "2"]).unclear == ("1",)
 
 
+def test_visits_are_not_guessed_in_a_list_that_is_sorted_by_name() -> None:
+    ids = ["1", "2", "3", "1", "2"]
+    assert assign_by_name(ids, [1] * 5, ["1", "2", "3", "1", "2"]).dwell.tolist() == [0, 1, 2, 3, 4]
+    by_name = assign_by_name(ids, [1] * 5, ["1", "1", "2", "2", "3"])
+    assert by_name.dwell.tolist() == [-1, -1, -1, -1, 2]
+    assert by_name.unclear == ("1", "2")
+
+
 def test_swapped_names_are_found_by_the_distances() -> None:
     rng = np.random.default_rng(1)
     place_mm = rng.uniform(-100, 100, (20, 3))
