@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import io
 import re
 import zipfile
 from collections.abc import Callable, Sequence
@@ -57,7 +56,9 @@ def refused(path: Path, **options: Any) -> str:
 
 
 def test_numbers_are_exact_and_lines_are_rows_of_the_sheet(tmp_path: Path) -> None:
-    table = read(book(tmp_path, LIST))
+    digits = ("<v>0.3</v>", "<v>0.30000000000000004</v>")  # Excel writes 17, the writer of this test 16
+    path = edit(book(tmp_path, LIST), "xl/worksheets/sheet1.xml", lambda xml: xml.replace(*digits))
+    table = read(path)
     assert table.header == ("name", "X [mm]", "Y [mm]")
     assert (table.shape, table.header_line, table.line.tolist()) == ("xlsx", 1, [2, 3, 4])
     assert [list(column) for column in table.columns] == [
@@ -244,11 +245,3 @@ def test_names_of_cells() -> None:
         "ZZ4",
         "AAA5",
     ]
-
-
-def test_no_other_stream_is_left_open(tmp_path: Path) -> None:
-    path = book(tmp_path, LIST)
-    content = io.BytesIO(path.read_bytes())
-    read(path)
-    path.unlink()
-    assert content.getvalue()[:2] == b"PK"
