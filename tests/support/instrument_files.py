@@ -15,6 +15,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +79,7 @@ class SplitCampaign:
         begins = [0, *(np.flatnonzero(np.diff(knots_s) > NIGHT_S) + 1), len(knots_s)]
         times = [
             np.arange(np.ceil(part[0] * rate_hz), part[-1] * rate_hz) / rate_hz
-            for part in (knots_s[a:b] for a, b in zip(begins[:-1], begins[1:], strict=True))
+            for part in (knots_s[a:b] for a, b in pairwise(begins))
         ]
         time_s = np.concatenate(times)
         seen = np.column_stack([np.interp(time_s, knots_s, column) for column in knots.T])

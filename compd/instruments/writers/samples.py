@@ -89,3 +89,5 @@ class Samples:
                     next_step="choose another format for points",
                 )
             )
+        if time and len(self.values) < 2:
+            raise CompdError(Problem(where=shape, what="has no rate with fewer than two samples"))

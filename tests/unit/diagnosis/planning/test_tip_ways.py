@@ -11,7 +11,7 @@ from compd.arrays import FloatArray
 from compd.diagnosis.planning.tip_ways import LONGEST_MM, STEADY_S, TRAVEL_MM, TipWays, plan_ways
 from compd.machine_builder import build_model
 from compd.simulation.truth.mechanism import Mechanism
-from tests.support.simulated import tripod, wiring
+from tests.support.simulated import HEXAPOD, hexapod, tripod, wiring
 
 PLACES = ((0.0, 0.0, 190.0), (60.0, -70.0, 150.0), (-80.0, 30.0, 210.0))
 
@@ -64,8 +64,19 @@ def test_links_whose_direction_does_not_matter(ways: TipWays, mechanism: Mechani
     assert lengths_mm(mechanism, tip_M_mm)[1] < lengths_mm(mechanism, way.via_M_mm)[1]
 
 
-def test_a_place_out_of_reach_has_no_way(ways: TipWays) -> None:
-    assert ways.way(np.array([0.0, 0.0, 5000.0]), np.ones(3), 0.0) is None
+def test_a_hexapod_that_keeps_its_attitude_has_ways_for_some_sides_alone() -> None:
+    ways, mechanism = TipWays(build_model(hexapod(), wiring(HEXAPOD))), Mechanism(hexapod())
+    tip_M_mm = mechanism.tip0_M + np.array([5.0, -8.0, 3.0])
+    found = {}
+    for signs in product((1.0, -1.0), repeat=6):
+        way = found[signs] = ways.way(tip_M_mm, np.array(signs), 0.0)
+        if way is not None:
+            moved = lengths_mm(mechanism, tip_M_mm) - lengths_mm(mechanism, way.via_M_mm)
+            assert np.sign(moved).tolist() == list(signs)
+    # six planes through a point part space into 32 regions at most
+    assert 2 <= sum(way is not None for way in found.values()) <= 32
+    assert found[(1.0,) * 6] is not None
+    assert found[(-1.0,) * 6] is not None
 
 
 def test_ways_of_rows() -> None:
