@@ -107,7 +107,7 @@ def join_at_rest(
     if by == "order":
         assigned = _by_order(kept, places_mm, export, measured_mm, sigma_mm)
     else:
-        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan)
+        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, instrument.frame == "machine")
     points = np.flatnonzero(assigned.dwell >= 0)
     columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument.link)
     left_out = dict(assigned.left_out)
@@ -214,6 +214,7 @@ def _by_name(
     measured_mm: FloatArray,
     sigma_mm: float,
     plan: Path | None,
+    in_M: bool,
 ) -> _Assigned:
     assert export.name is not None
     if plan is None:
@@ -258,7 +259,7 @@ def _by_name(
                 "with times, or join --by order",
             )
         )
-    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm))
+    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm), in_M)
     if check.why or len(check.wrong) or check.rms_mm > check.allowed_mm:
         raise RecordingError(name_problems(check, dwells, export, dwell_of))
     return _Assigned(dwell_of, target_of, check.rms_mm, None, left_out)
