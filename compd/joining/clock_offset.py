@@ -152,7 +152,8 @@ class _SharedMotion:
                 what=f"the clock offset cannot be told: {what}",
                 value=value,
                 allowed=allowed,
-                next_step="record with moves between dwells of different length, or give --offset S",
+                next_step="record with moves between dwells of different length, or give --offset S; join points at "
+                "rest --by order or --by name",
             )
         )
 

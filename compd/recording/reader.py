@@ -205,6 +205,7 @@ def _build(
         left_out={reason: count for reason, count in left_out.items() if count},
         columns=columns,
         warnings=warnings,
+        point_labels=table.labels.get("point", ()),
     )
 
 

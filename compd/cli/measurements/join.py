@@ -1,4 +1,4 @@
-"""`compd join`: a reference instrument's export beside the gauges, by time."""
+"""`compd join`: a reference instrument's export beside the gauges, by time, by order or by name."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from compd.cli.export_options import (
     SheetOption,
     UnitOption,
 )
+from compd.cli.join_at_rest import ByChoice
+from compd.cli.options import MachineOption
 
 
 class FrameChoice(StrEnum):
@@ -57,21 +59,36 @@ def join(
     ] = FrameChoice.INSTRUMENT,
     sigma_um: Annotated[float | None, typer.Option(help="Standard uncertainty of the instrument per axis, um.")] = None,
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
+    by: Annotated[
+        ByChoice | None,
+        typer.Option(help="Put rows together by one clock; points at rest by their order, or by their names."),
+    ] = None,
+    machine: MachineOption = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="With --by name: the plan that was measured; its row k is the point P00k.")
+    ] = None,
 ) -> None:
-    """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
+    """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
     from compd.cli.export_options import echo_taken, read_options
+    from compd.cli.join_at_rest import check_options, choose_by, join_points
     from compd.instruments.read import read_export
     from compd.instruments.track import track_of
     from compd.joining.by_time import Instrument, join_reference
     from compd.recording.reader import read_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
-    recording = read_recording(gauges, needs_reference=False)
     options = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
     exported = read_export(export, options)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
+    instrument = Instrument(frame.value, sigma_um, link)
+    chosen = choose_by(by, exported)
+    check_options(chosen, offset, moving, plan)
+    if chosen != ByChoice.TIME:
+        join_points(gauges, exported, out, instrument, "order" if chosen == ByChoice.ORDER else "name", machine, plan)
+        return
+    recording = read_recording(gauges, needs_reference=False)
     track = track_of(exported)
-    joined = join_reference(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
+    joined = join_reference(recording, track, out, instrument, offset, moving)
     clock = joined.offset
     if math.isnan(clock.std_s):
         agreement = "not known" if math.isnan(clock.agreement) else f"{clock.agreement:.4f}"
