@@ -144,7 +144,7 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
         except ValueError:
             pass  # below, with the line
         else:
-            _check_finite(values, cells, line, what, problems)
+            _check_size(values, cells, line, what, problems)
             return values
     wrong = [i for i, cell in enumerate(cells) if cell and not (NUMBER.fullmatch(cell) and "," not in cell)]
     for i in wrong[:3]:
@@ -156,13 +156,14 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
     values = np.array(
         [np.nan if i in skipped or not cell else float(cell) for i, cell in enumerate(cells)], dtype=np.float64
     )
-    _check_finite(values, cells, line, what, problems)
+    _check_size(values, cells, line, what, problems)
     return values
 
 
-def _check_finite(
+def _check_size(
     values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems
 ) -> None:
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     if len(beyond):
         problems.add(int(line[beyond[0]]), f"{what} is larger than anything measured", cells[int(beyond[0])])
+        values[beyond] = np.nan

@@ -156,7 +156,8 @@ def _values(
             columns += [np.full(len(table.line), np.nan)] * len(of_kind)
             continue
         for axis in of_kind:
-            taken[axis] += f", {known.unit} {known.said}"
+            # a unit in the name stands in the name
+            taken[axis] += f", {known.unit}" + ("" if roles.unit.get(axis) else f" {known.said}")
             columns.append(raw[axis] * factor)
     return np.column_stack(columns)
 
@@ -269,7 +270,7 @@ def _time_of_numbers(
     values = numbers(cells, line, what, problems)
     unit = roles.unit.get("time", "")
     factor = unit_factor(unit, "s") if unit else None
-    told = f"{unit} by its name" if unit else "s, as it has decimals and no unit"
+    told = unit or "s, as it has decimals and no unit"
     filled = values[~np.isnan(values)]
     if unit and factor is None:
         problems.add(table.header_line, "is no unit of time", unit, "s, ms, us, min, h", "give --columns with time[s]")

@@ -2,8 +2,8 @@
 would have exported, in every shape.
 
     split = split_campaign(tmp_path / "first.csv", tmp_path / "gauges.csv")
-    export = write_export(tmp_path / "track.txt", "sa", split.track())
-    points = write_export(tmp_path / "points.csv", "german", split.points())
+    track = write_export(tmp_path, "sa", split.track())
+    points = write_export(tmp_path, "german", split.points(), stem="points")
 
 Joining `split.gauges` and the export must give the campaign's reference back, but for `split.to_instrument`.
 """
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.instruments.writers.registry import FORMATS
 from compd.instruments.writers.samples import LENGTH, POSITION, Samples
 from compd.units import UM_PER_MM
@@ -47,7 +47,7 @@ class SplitCampaign:
     ----------
     gauges : the recording of gauges alone. time_s : (N,) of its rows.
     values : (N, d) the reference in {M}, mm, or a length, nan where only the gauges were read. axes : of it.
-    session : (N,) from 1. place : (N,) number of the nominal target, 0 where there is none.
+    session : (N,) from 1. place : (N,) number of the nominal target; -1 in motion.
     rotation, shift_mm : instrument = rotation M + shift. offset_s : recording time = instrument time + offset_s.
     """
 
@@ -75,7 +75,7 @@ class SplitCampaign:
         kept = np.isfinite(self.values).all(axis=1)
         if sessions:
             kept &= np.isin(self.session, sessions)
-        knots_s, knots = _knots(self.time_s[kept], self.values[kept])
+        knots_s, knots = _knots(self.time_s[kept], self.values[kept], self.at_rest()[kept])
         begins = [0, *(np.flatnonzero(np.diff(knots_s) > NIGHT_S) + 1), len(knots_s)]
         times = [
             np.arange(np.ceil(part[0] * rate_hz), part[-1] * rate_hz) / rate_hz
@@ -98,9 +98,9 @@ class SplitCampaign:
         texts = [f"P{number:03d}" if names == "place" else f"P{number}" for number in numbers]
         return Samples(self.axes, self.to_instrument(self.values[kept]), names=texts if names else None)
 
-    def at_rest(self) -> np.ndarray:
+    def at_rest(self) -> BoolArray:
         """(N,) whether the machine stood still in a row."""
-        return _half_dwells(self.time_s, self.values) > 0
+        return self.place >= 0
 
 
 def split_campaign(
@@ -109,7 +109,8 @@ def split_campaign(
     """Take the reference off a campaign's recording, and write the recording of gauges alone.
 
     link : for a campaign with interferometers, which of them measures. keep : of the columns session, point and visit,
-    which a campaign knows and a live recording has not.
+    which a campaign knows and a live recording has not. To join points by order or name keep all three: a campaign has
+    one row in a dwell, so that the scales cannot tell where the dwells are.
     """
     with recording.open(newline="") as file:
         header, *rows = list(csv.reader(file))
@@ -129,7 +130,7 @@ def split_campaign(
         values=np.column_stack([columns[name] for name in names]),
         axes=axes,
         session=columns["session"].astype(np.int64),
-        place=np.nan_to_num(columns["point"]).astype(np.int64),
+        place=np.nan_to_num(columns["point"], nan=-1.0).astype(np.int64),
         rotation=Rotation.random(random_state=rng.integers(1 << 31)),
         shift_mm=np.array([1200.0, -300.0, 80.0]),
     )
@@ -142,16 +143,16 @@ def write_export(directory: Path, shape: str, samples: Samples, unit: str = "mm"
     return path
 
 
-def _half_dwells(time_s: FloatArray, values: FloatArray) -> FloatArray:
-    """(N,) how long the machine rests before and after each row; 0 in motion."""
+def _half_dwells(time_s: FloatArray, at_rest: BoolArray) -> FloatArray:
+    """(N,) how long the machine rests before and after each row; 0 in motion, and where the next row is too near."""
     gaps = np.concatenate([[np.inf], np.diff(time_s), [np.inf]])
     half_s = np.minimum(DWELL_S, 0.3 * np.minimum(gaps[:-1], gaps[1:]))
-    return np.where(half_s >= LEAST_DWELL_S, half_s, 0.0)
+    return np.where(at_rest & (half_s >= LEAST_DWELL_S), half_s, 0.0)
 
 
-def _knots(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _knots(time_s: FloatArray, values: FloatArray, at_rest: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Times and places between which the machine moves straight."""
-    half_s = _half_dwells(time_s, values)
+    half_s = _half_dwells(time_s, at_rest)
     rests = half_s > 0
     times = np.concatenate([time_s - half_s, (time_s + half_s)[rests]])
     order = np.argsort(times, kind="stable")
