@@ -8,9 +8,11 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 
-# What a further point at the same dwell counts for, of the 1 of the first one: between a dwell that was skipped and one
-# that was visited anew, the new one is the better reading.
-REPEAT_LOSS = 0.6
+# What is lost of the 1 that a point at its dwell counts for: where it is a further one at the same dwell, and where
+# dwells before it have no point. So the next dwell at the same place is a better reading of a second point than the
+# same dwell, and that a better one than a later visit.
+REPEAT_LOSS = 0.5
+GAP_LOSS = 0.9
 # A point whose best other dwell costs less than this in all is one whose dwell cannot be told.
 CLEAR_MARGIN = 0.3
 
@@ -28,60 +30,70 @@ class Match:
 
 
 def match_in_order(residual_mm: FloatArray, limit_mm: float) -> Match:
-    """The matching with the greatest sum of 1 - (residual / limit)^2, in which later points have later dwells.
+    """The matching with the greatest sum of 1 - (residual / limit)^2, less losses, in which later points have later
+    dwells.
 
     residual_mm : (S, G) how far point j would be from dwell i; nan where that is not known.
-    limit_mm : no pair is farther apart. A dwell may have several points in succession, which count REPEAT_LOSS less.
+    limit_mm : no pair is farther apart. A dwell may have several points in succession.
     """
     gain = 1.0 - (residual_mm / limit_mm) ** 2
     gain[~(gain > 0.0)] = -np.inf
-    matched, best = _forward(gain)
-    matched_back = _forward(gain[::-1, ::-1])[0][::-1, ::-1]
+    matched, at_dwell, up_to = _forward(gain)
+    if not up_to[-1, -1] > 0.0:
+        none = np.full(gain.shape[1], -1, dtype=np.int64)
+        return Match(none, none, np.full(gain.shape[1], np.inf))
+    dwell = _trace(matched, at_dwell, up_to)
     possible = np.isfinite(gain)
+    matched_back = _forward(gain[::-1, ::-1])[0][::-1, ::-1]
     through = np.full(gain.shape, -np.inf)
     through[possible] = matched[possible] + matched_back[possible] - gain[possible]
-    dwell = _trace(gain, matched, best)
-    total = best[-1, -1]
     chosen = np.flatnonzero(dwell >= 0)
     through[dwell[chosen], chosen] = -np.inf
     other = through.argmax(axis=0)
-    margin = total - through[other, np.arange(len(dwell))]
-    possible_other = (dwell >= 0) & np.isfinite(margin)
-    return Match(dwell, np.where(possible_other, other, -1), np.where(possible_other, margin, np.inf))
+    margin = up_to[-1, -1] - through[other, np.arange(len(dwell))]
+    has_other = (dwell >= 0) & np.isfinite(margin)
+    return Match(dwell, np.where(has_other, other, -1), np.where(has_other, margin, np.inf))
 
 
-def _forward(gain: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(S, G) best sum that ends with the pair (i, j), and best sum of dwells up to i and points up to j."""
+def _forward(gain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(S, G) each: best sum that ends with the pair (i, j); with dwell i and any point up to j; with any up to both."""
     dwells, points = gain.shape
-    matched, best = np.full((dwells, points), -np.inf), np.zeros((dwells, points))
-    before = np.zeros(dwells)  # best[:, j - 1]
+    matched, at_dwell, up_to = (np.full((dwells, points), -np.inf) for _ in range(3))
+    before, until = np.full(dwells, -np.inf), np.full(dwells, -np.inf)
     for j in range(points):
-        new = np.concatenate([[0.0], before[:-1]])
-        repeated = matched[:, j - 1] - REPEAT_LOSS if j else np.full(dwells, -np.inf)
-        matched[:, j] = gain[:, j] + np.maximum(new, repeated)
-        before = np.maximum.accumulate(np.maximum(before, matched[:, j]))
-        best[:, j] = before
-    return matched, best
+        path = np.zeros(dwells)
+        path[1:] = np.maximum(np.maximum(path[1:], before[:-1]), until[:-1] - GAP_LOSS)
+        if j:
+            path = np.maximum(path, matched[:, j - 1] - REPEAT_LOSS)
+        matched[:, j] = gain[:, j] + path
+        before = np.maximum(before, matched[:, j])
+        until = np.maximum.accumulate(before)
+        at_dwell[:, j], up_to[:, j] = before, until
+    return matched, at_dwell, up_to
 
 
-def _trace(gain: FloatArray, matched: FloatArray, best: FloatArray) -> IntArray:
+def _trace(matched: FloatArray, at_dwell: FloatArray, up_to: FloatArray) -> IntArray:
     """(G,) the dwell of each point on the best path, -1 for none."""
-    dwells, points = gain.shape
-    dwell = np.full(points, -1, dtype=np.int64)
-    i, j = dwells - 1, points - 1
-    while i >= 0 and j >= 0:
-        if j > 0 and best[i, j] == best[i, j - 1]:
+    dwell = np.full(matched.shape[1], -1, dtype=np.int64)
+    i, j = _best(matched)
+    while True:
+        dwell[j] = i
+        if j == 0:
+            return dwell
+        again = matched[i, j - 1] - REPEAT_LOSS
+        next_to = at_dwell[i - 1, j - 1] if i else -np.inf
+        after_gap = up_to[i - 1, j - 1] - GAP_LOSS if i else -np.inf
+        best = max(again, next_to, after_gap)
+        if best <= 0:
+            return dwell
+        if best == again:
             j -= 1
-        elif i > 0 and best[i, j] == best[i - 1, j]:
-            i -= 1
-        elif not matched[i, j] == best[i, j] > 0:
-            break
+        elif best == next_to:
+            i, j = i - 1, int(matched[i - 1, :j].argmax())
         else:
-            dwell[j] = i
-            new = best[i - 1, j - 1] if i > 0 and j > 0 else 0.0
-            while j > 0 and matched[i, j - 1] - REPEAT_LOSS > new:
-                j -= 1
-                dwell[j] = i
-                new = best[i - 1, j - 1] if i > 0 and j > 0 else 0.0
-            i, j = i - 1, j - 1
-    return dwell
+            i, j = _best(matched[:i, :j])
+
+
+def _best(matched: FloatArray) -> tuple[int, int]:
+    i, j = np.unravel_index(int(matched.argmax()), matched.shape)
+    return int(i), int(j)
