@@ -153,3 +153,29 @@ def test_distances_know_no_frame() -> None:
     assert distances_rms_mm(place_mm, in_own_frame(place_mm)) < 1e-9
     np.testing.assert_allclose(lay_over(in_own_frame(place_mm), place_mm)(in_own_frame(place_mm)), place_mm, atol=1e-9)
     assert not is_spread(place_mm[:2])
+
+
+def test_any_measurement_is_joined_rightly_or_refused() -> None:
+    """Places visited again, repeats, a missing and a strange point, all at random: of 60, most are joined."""
+    joined = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        expected_mm = places(rng, int(rng.integers(6, 60)))
+        if seed % 2:
+            route = rng.integers(0, max(4, len(expected_mm) // 3), len(expected_mm))
+            expected_mm = expected_mm[route[np.insert(np.diff(route) != 0, 0, True)]]
+        count = len(expected_mm)
+        visited = np.arange(rng.integers(0, count // 4 + 1), count - rng.integers(0, count // 4 + 1))
+        visited = np.delete(visited, int(rng.integers(0, len(visited))))
+        wanted = np.repeat(visited, np.where(rng.random(len(visited)) < 0.2, 2, 1))
+        error_mm = rng.normal(0.0, rng.choice([0.001, 0.02, 0.1]), expected_mm.shape)
+        points_mm = in_own_frame((expected_mm + error_mm)[wanted]) + rng.normal(0, NOISE_MM, (len(wanted), 3))
+        if rng.random() < 0.3:
+            strange = int(rng.integers(0, len(wanted)))
+            points_mm = np.insert(points_mm, strange, places(rng, 1), axis=0)
+            wanted = np.insert(wanted, strange, -1)
+        result = assign_by_order(expected_mm, points_mm, np.nan)
+        if isinstance(result, Assignment):
+            joined += 1
+            assert not ((result.dwell != wanted) & (result.dwell >= 0)).any(), seed
+    assert joined > 45
