@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +20,7 @@ from compd.joining.dwells import Dwell, dwell_columns, find_dwells
 from compd.joining.expected_places import expected_places_mm
 from compd.joining.joined_rows import joined_columns, joined_sidecar
 from compd.joining.misplaced_names import lines_text, listed, name_problems
-from compd.joining.plan_points import dwells_of_plan, read_plan_points
+from compd.joining.plan_points import dwell_of_plan_rows, read_plan_points
 from compd.recording.recording import Recording
 from compd.recording.writer import write_recording
 from compd.units import UM_PER_MM
@@ -58,9 +58,10 @@ class RestJoin:
 
 @dataclass(frozen=True)
 class _Assigned:
-    """dwell : (G,) of each point, -1 for none; the rest as in RestJoin."""
+    """dwell : (G,) of each point, -1 for none. visit : (G,) the same for repeats. The rest as in RestJoin."""
 
     dwell: IntArray
+    visit: IntArray
     rms_mm: float
     next_best: tuple[int, float] | None
     left_out: dict[str, str]
@@ -99,8 +100,6 @@ def join_at_rest(
     no_pose = int((~reachable).sum())
     if not reachable.any():
         raise RecordingError(Problem(where=str(recording.path), what="the gauges give a pose in no dwell"))
-    if plan is not None:
-        dwells = dwells_of_plan(dwells, expected_mm, read_plan_points(plan), plan)
     kept = [dwell for dwell, known in zip(dwells, reachable, strict=True) if known]
     places_mm = expected_mm[reachable]
     measured_mm = export.values[:, : places_mm.shape[1]]
@@ -108,9 +107,9 @@ def join_at_rest(
     if by == "order":
         assigned = _by_order(kept, places_mm, export, measured_mm, sigma_mm)
     else:
-        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm)
+        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, instrument.frame == "machine")
     points = np.flatnonzero(assigned.dwell >= 0)
-    columns = joined_columns(recording, kept, assigned.dwell, places_mm, export, instrument.link, plan is not None)
+    columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument.link)
     left_out = dict(assigned.left_out)
     if no_pose:
         left_out["dwells in which the gauges give no pose"] = str(no_pose)
@@ -205,14 +204,27 @@ def _by_order(
     without = np.setdiff1d(np.arange(len(dwells)), result.dwell)
     if len(without):
         left_out["dwells without a point"] = listed([str(dwells[i].number) for i in without])
-    return _Assigned(result.dwell, result.rms_mm, result.next_best, left_out)
+    return _Assigned(result.dwell, result.dwell, result.rms_mm, result.next_best, left_out)
 
 
 def _by_name(
-    dwells: list[Dwell], places_mm: FloatArray, export: InstrumentExport, measured_mm: FloatArray, sigma_mm: float
+    dwells: list[Dwell],
+    places_mm: FloatArray,
+    export: InstrumentExport,
+    measured_mm: FloatArray,
+    sigma_mm: float,
+    plan: Path | None,
+    in_M: bool,
 ) -> _Assigned:
     assert export.name is not None
-    ids = [dwell.point for dwell in dwells]
+    if plan is None:
+        targets = np.arange(len(dwells))
+        ids = [dwell.point for dwell in dwells]
+    else:
+        targets = dwell_of_plan_rows(places_mm, read_plan_points(plan), plan)
+        ids = [str(row) if dwell >= 0 else "" for row, dwell in enumerate(targets.tolist(), start=1)]
+        first_row = {dwell: row for row, dwell in reversed([*enumerate(targets.tolist(), start=1)])}
+        dwells = [replace(dwell, point=str(first_row.get(k, ""))) for k, dwell in enumerate(dwells)]
     if not any(ids):
         raise RecordingError(
             Problem(
@@ -223,8 +235,10 @@ def _by_name(
             )
         )
     order = np.arange(len(export.name)) if export.time_s is None else np.argsort(export.time_s, kind="stable")
-    named = assign_by_name(ids, [len(dwell.rows) for dwell in dwells], [export.name[j] for j in order])
-    dwell_of = named.dwell[np.argsort(order)]
+    sizes = [len(dwells[dwell].rows) if dwell >= 0 else 0 for dwell in targets]
+    named = assign_by_name(ids, sizes, [export.name[j] for j in order])
+    target_of = named.dwell[np.argsort(order)]
+    dwell_of = np.where(target_of >= 0, targets[target_of], -1)
     left_out = {}
     if named.unknown:
         left_out["names that no dwell has"] = listed(named.unknown)
@@ -245,7 +259,7 @@ def _by_name(
                 "with times, or join --by order",
             )
         )
-    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm))
+    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm), in_M)
     if check.why or len(check.wrong) or check.rms_mm > check.allowed_mm:
         raise RecordingError(name_problems(check, dwells, export, dwell_of))
-    return _Assigned(dwell_of, check.rms_mm, None, left_out)
+    return _Assigned(dwell_of, target_of, check.rms_mm, None, left_out)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.joining.distances import distances_rms_mm, is_spread, largest_rms_mm, lay_over
+from compd.joining.distances import LARGEST_RMS_MM, Motion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 _LAST_NUMBER = re.compile(r"(?:.*\D)?0*(\d+)")
 # Robust registration: points far off are left out of it, until the same ones are.
@@ -114,22 +114,25 @@ def _ids_of_names(ids: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def check_names(expected_mm: FloatArray, measured_mm: FloatArray, dwell: IntArray, near_mm: float) -> NameCheck:
+def check_names(
+    expected_mm: FloatArray, measured_mm: FloatArray, dwell: IntArray, near_mm: float, in_M: bool = False
+) -> NameCheck:
     """Whether the points with a dwell have the distances of their dwells, and which of them have not.
 
     expected_mm : (S, d). measured_mm : (G, d). dwell : (G,) -1 for none. near_mm : no point this near is wrong.
+    in_M : the points are measured in {M}: nothing is laid over, and any number of places will do.
     """
     points = np.flatnonzero(dwell >= 0)
     q, p = measured_mm[points], expected_mm[dwell[points]]
-    if not is_spread(p):
+    if not in_M and not is_spread(p):
         return NameCheck(np.nan, np.nan, why="too few different places to check the names by their distances")
-    allowed_mm = largest_rms_mm(p)
-    right = _consistent(p, q, allowed_mm, near_mm)
-    if right.sum() < 3 or not is_spread(p[right]):
+    allowed_mm = LARGEST_RMS_MM if in_M else largest_rms_mm(p)
+    right = _in_place(p, q, allowed_mm, near_mm) if in_M else _consistent(p, q, allowed_mm, near_mm)
+    if not right.any() or not (in_M or is_spread(p[right])):
         return NameCheck(
             distances_rms_mm(p, q), allowed_mm, why="the distances between the points are not their dwells'"
         )
-    motion = lay_over(q[right], p[right])
+    motion = Motion(np.eye(3), np.zeros(3)) if in_M else lay_over(q[right], p[right])
     wrong = np.flatnonzero(~right)
     from_all = np.linalg.norm(expected_mm[None, :, :] - motion(q[wrong])[:, None, :], axis=2)
     limit_mm = _limit_mm(np.linalg.norm(p[right] - motion(q[right]), axis=1), allowed_mm, near_mm)
@@ -142,6 +145,12 @@ def check_names(expected_mm: FloatArray, measured_mm: FloatArray, dwell: IntArra
         np.where(fits, nearest, -1).astype(np.int64),
         np.linalg.norm(p[wrong] - motion(q[wrong]), axis=1),
     )
+
+
+def _in_place(p: FloatArray, q: FloatArray, allowed_mm: float, near_mm: float) -> BoolArray:
+    """(N,) the pairs in one frame that are as near to each other as most are."""
+    residual_mm = np.linalg.norm(p - q, axis=1)
+    return np.asarray(residual_mm <= _limit_mm(residual_mm, allowed_mm, near_mm))
 
 
 def _limit_mm(residual_mm: FloatArray, allowed_mm: float, near_mm: float) -> float:

@@ -27,38 +27,36 @@ def joined_columns(
     recording: Recording,
     dwells: Sequence[Dwell],
     dwell_of: IntArray,
+    visit_of: IntArray,
     places_mm: FloatArray,
     export: InstrumentExport,
     link: int | None,
-    by_plan: bool = False,
 ) -> dict[str, FloatArray]:
     """Name -> (R,) the columns, one row for each point with a dwell, in the order of the dwells.
 
-    dwell_of : (G,) number of each point's dwell from 0, -1 for none. places_mm : (D, d) expected places.
-    by_plan : whether the dwells' points are the rows of a plan.
+    dwell_of : (G,) number of each point's dwell from 0, -1 for none. visit_of : (G,) the same for repeats,
+        rising with the dwell. places_mm : (D, d) expected places.
     A dwell of as many rows as it has points keeps its rows, where the recording says by `point` that they are at rest;
     in any other the readings are averaged, and the times of several points are spread over the dwell.
     """
     order: list[int] = []
-    visits: list[int] = []
+    dwell_numbers: list[int] = []
     rows_of: list[IntArray] = []
     times_s: list[float] = []
     for i in range(len(dwells)):
         points = np.flatnonzero(dwell_of == i)
+        points = points[np.argsort(visit_of[points], kind="stable")]
         rows = dwells[i].rows
         one_by_one = recording.point is not None and len(rows) == len(points)
         order += points.tolist()
-        visits += [i] * len(points)
+        dwell_numbers += [i] * len(points)
         rows_of += [rows[k : k + 1] for k in range(len(rows))] if one_by_one else [rows] * len(points)
         times_s += recording.time_s[rows].tolist() if one_by_one else _times_s(recording, dwells[i], len(points))
     columns = dwell_columns(recording, rows_of)
     columns["time_s"] = np.array(times_s)
-    places = _place_numbers(places_mm, export, dwell_of)
-    if by_plan:
-        places = np.array([int(dwell.point) if dwell.point else np.nan for dwell in dwells])
-    if recording.point is None or by_plan:
-        columns["point"] = np.array([places[i] for i in visits], dtype=np.float64)
-    columns["visit"] = _numbered(np.array(visits, dtype=np.int64))
+    if recording.point is None:
+        columns["point"] = _place_numbers(places_mm, export, dwell_of)[dwell_numbers]
+    columns["visit"] = _numbered(visit_of[order])
     values = export.values[order]
     if export.axes == LENGTH_AXES and link is not None:
         columns[link_reference_column(link)] = values[:, 0]

@@ -31,7 +31,7 @@ def name_problems(
                 allowed=f"{check.allowed_mm:.3g} mm or less"
                 if np.isfinite(check.allowed_mm)
                 else "three places or more",
-                next_step="check names, unit and machine; or join --by order",
+                next_step="check names, unit and machine; join --by order; or measure in {M}, and say --frame machine",
             )
         ]
     problems = []

@@ -1,17 +1,14 @@
-"""Which row of a plan each dwell of a recording is: by where the plan sends the tip, in the plan's order."""
+"""In which dwell each row of a plan was measured: by where the plan sends the tip, in the plan's order."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem, RecordingError
 from compd.joining.distances import LARGEST_RMS_MM
-from compd.joining.dwells import Dwell
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 from compd.recording.csv_table import read_table
 from compd.recording.plan_file import TIP_COLUMNS, WRITTEN_BY
@@ -35,15 +32,14 @@ def read_plan_points(path: Path) -> FloatArray:
     return places_mm
 
 
-def dwells_of_plan(
-    dwells: Sequence[Dwell], expected_mm: FloatArray, plan_mm: FloatArray, path: Path
-) -> tuple[Dwell, ...]:
-    """The dwells, each with the number of its row in the plan (from 1) as its point; other dwells without one.
+def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path) -> IntArray:
+    """(K,) number of the dwell, from 0, in which each row of a plan was measured; -1 where that is not clear.
 
-    expected_mm : (S, 3) places of the dwells in {M}. plan_mm : (K, 3) of the plan's rows, in the order of measuring.
+    expected_mm : (S, 3) places of the dwells in {M}, in the order of time. plan_mm : (K, 3) of the plan's rows, in the
+        order of measuring; rows at one place, such as those with different loads, may share a dwell.
     A dwell may be LARGEST_RMS_MM from the plan's place, no more. Raises RecordingError where none is at any place.
     """
-    residual_mm = np.linalg.norm(plan_mm[:, None, :] - expected_mm[None, :, :], axis=2)
+    residual_mm = np.linalg.norm(expected_mm[:, None, :] - plan_mm[None, :, :], axis=2)
     match = match_in_order(residual_mm, LARGEST_RMS_MM)
     clear = (match.dwell >= 0) & (match.margin >= CLEAR_MARGIN)
     if not clear.any():
@@ -56,7 +52,4 @@ def dwells_of_plan(
                 next_step="give the plan that was measured, or join --by order",
             )
         )
-    rows = np.where(clear, match.dwell + 1, 0)
-    return tuple(
-        replace(dwell, point=str(row) if row else "") for dwell, row in zip(dwells, rows.tolist(), strict=True)
-    )
+    return np.where(clear, match.dwell, -1).astype(np.int64)

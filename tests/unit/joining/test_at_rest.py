@@ -169,11 +169,28 @@ def test_by_name_of_a_plans_rows(tmp_path: Path) -> None:
     assert measured.join(export, "name", plan=plan).joined == 15
     recording = read_recording(tmp_path / "joined.csv")
     assert recording.point is not None
-    assert recording.point.tolist() == sorted(k + 1 for k in order)
+    assert len(set(recording.point.tolist())) == 15
     assert recording.reference_mm == pytest.approx(in_own_frame(measured.tip_mm[1:21][np.sort(order)]), abs=0.005)
     other = plan_file(tmp_path / "other.csv", [{"tip_x_mm": 500.0, "tip_z_mm": 100.0}])
     with pytest.raises(RecordingError, match="dwelled at no place of the plan"):
         measured.join(export, "name", plan=other)
+
+
+def test_a_plans_rows_at_one_place_share_its_dwell_and_are_visits_of_their_own(tmp_path: Path) -> None:
+    """Two loads at one place: nothing moved between them that scales could show."""
+    rng = np.random.default_rng(6)
+    measured = recorded_at_5_hz(tmp_path, rng, 10)
+    twice = np.repeat(np.arange(1, 11), 2)
+    rows = [dict(zip(("tip_x_mm", "tip_y_mm", "tip_z_mm"), tip, strict=True)) for tip in measured.tip_mm[twice]]
+    plan = plan_file(tmp_path / "plan.csv", [{"time_s": 2.0 * k, **row} for k, row in enumerate(rows)])
+    names = [f"P{k:03d}" for k in range(1, 21)]
+    assert measured.join(points(seen(rng, measured.tip_mm[twice]), names), "name", plan=plan).joined == 20
+    recording = read_recording(tmp_path / "joined.csv")
+    assert recording.visit is not None
+    assert recording.point is not None
+    assert recording.visit.tolist() == list(range(1, 21))
+    assert (recording.point[::2] == recording.point[1::2]).all()
+    assert len(set(recording.point.tolist())) == 10
 
 
 def test_times_say_which_visit_a_name_in_a_sorted_list_is_of(tmp_path: Path) -> None:

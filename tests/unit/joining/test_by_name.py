@@ -68,6 +68,18 @@ def test_swapped_names_are_found_by_the_distances() -> None:
     assert (elsewhere.wrong.tolist(), elsewhere.nearest.tolist()) == ([7], [-1])
 
 
+def test_two_places_are_enough_where_points_are_measured_in_the_machines_frame() -> None:
+    place_mm = np.array([[0, 0, 200.0], [0, 0, 200.0], [50, 0, 200.0], [50, 0, 200.0]])
+    points_mm = place_mm + np.array([0.02, -0.01, 0.005])
+    assert check_names(place_mm, points_mm, np.arange(4), 0.05).why
+    right = check_names(place_mm, points_mm, np.arange(4), 0.05, in_M=True)
+    assert (right.why, len(right.wrong)) == ("", 0)
+    dwell = np.array([0, 1, 3, 0])
+    wrong = check_names(place_mm, points_mm, dwell, 0.05, in_M=True)
+    assert wrong.wrong.tolist() == [3]
+    assert wrong.nearest.tolist() == [2]
+
+
 def test_names_in_another_order_altogether_are_refused() -> None:
     rng = np.random.default_rng(2)
     place_mm = rng.uniform(-100, 100, (20, 3))
