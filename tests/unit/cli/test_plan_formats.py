@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from compd.cli.main import app
-from compd.diagnosis.planning.plan_formats import target_name
+from compd.diagnosis.planning.plan_formats import MARKS, target_name
 from compd.errors import CompdError
+from compd.output_file import check_replaceable
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.hidden_effects import record_with_effects
 from tests.support.simulated import tripod
@@ -30,33 +31,35 @@ def planned(recording: Path, out: Path, *options: str) -> Result:
     return CliRunner().invoke(app, [*arguments, "--out", str(out), *options])
 
 
-def rows_of(recording: Path, out: Path) -> list[dict[str, str]]:
-    assert planned(recording, out).exit_code == 0
-    with out.open(newline="") as file:
+@pytest.fixture(scope="module")
+def files(recording: Path) -> dict[str, Path]:
+    """The same plan in every format."""
+    options = {"plan": (), "sa": (), "csv": (), "gcode": ("--feed", "900")}
+    written = {shape: recording.parent / f"next-{shape}" for shape in options}
+    for shape, out in written.items():
+        result = planned(recording, out, "--as", shape, *options[shape])
+        assert result.exit_code == 0, result.output
+    return written
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
 
-def test_targets_are_the_rows_of_the_plan_under_their_names(recording: Path, tmp_path: Path) -> None:
-    rows = rows_of(recording, tmp_path / "next.csv")
-    assert planned(recording, tmp_path / "t.txt", "--as", "sa").exit_code == 0
-    assert planned(recording, tmp_path / "t.csv", "--as", "csv").exit_code == 0
-    points = [line.split(",  ") for line in (tmp_path / "t.txt").read_text().splitlines()[3:]]
-    with (tmp_path / "t.csv").open(newline="") as file:
-        listed = list(csv.DictReader(file))
+def test_targets_are_the_rows_of_the_plan_under_their_names(files: dict[str, Path]) -> None:
+    rows, listed = rows_of(files["plan"]), rows_of(files["csv"])
+    points = [line.split(",  ") for line in files["sa"].read_text().splitlines()[3:]]
     assert len(rows) == len(points) == len(listed)
     for row, point, target in zip(rows, points, listed, strict=True):
-        name = target_name(int(row["row"]))
-        assert point[2] == target["name"] == name
+        assert point[2] == target["name"] == target_name(int(row["row"]))
         places = [[float(row[f"tip_{axis}_mm"]) for axis in "xyz"], [float(target[f"{axis}_mm"]) for axis in "xyz"]]
         assert places[0] == places[1] == [float(cell) for cell in point[3:]]
         assert float(target["force_z_N"]) == float(row["force_z_N"])
 
 
-def test_the_programme_comes_to_every_place_from_the_side_of_the_plan(recording: Path, tmp_path: Path) -> None:
-    rows = rows_of(recording, tmp_path / "next.csv")
-    result = planned(recording, tmp_path / "next.ngc", "--as", "gcode", "--feed", "900")
-    assert result.exit_code == 0, result.output
-    lines = (tmp_path / "next.ngc").read_text().splitlines()
+def test_the_programme_comes_to_every_place_from_the_side_of_the_plan(files: dict[str, Path]) -> None:
+    rows, lines = rows_of(files["plan"]), files["gcode"].read_text().splitlines()
     assert all(line == "" or COMMENT.fullmatch(line) or WORDS.fullmatch(line) for line in lines)
     mechanism = Mechanism(tripod())
     moves = [np.array([float(word[1:]) for word in line.split()[1:4]]) for line in lines if line.startswith("G1 ")]
@@ -74,12 +77,12 @@ def test_a_programme_needs_a_feed(recording: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "next.ngc").exists()
 
 
-def test_one_kind_of_file_is_not_written_over_another(recording: Path, tmp_path: Path) -> None:
-    out = tmp_path / "next"
-    for shape, extra in (("plan", ()), ("sa", ()), ("csv", ()), ("gcode", ("--feed", "900"))):
-        out.unlink(missing_ok=True)
-        assert planned(recording, out, "--as", shape, *extra).exit_code == 0
-        assert planned(recording, out, "--as", shape, *extra).exit_code == 0
-        other = "plan" if shape != "plan" else "sa"
-        assert isinstance(planned(recording, out, "--as", other).exception, CompdError)
-        assert planned(recording, out, "--as", other, "--overwrite").exit_code == 0
+def test_one_kind_of_file_is_not_written_over_another(recording: Path, files: dict[str, Path]) -> None:
+    marks = {"plan": b"purpose,", **MARKS}
+    for shape, path in files.items():
+        check_replaceable(path, (marks[shape],), "a plan")
+        for other in set(marks) - {shape}:
+            with pytest.raises(CompdError, match="is there already"):
+                check_replaceable(path, (marks[other],), "a plan")
+    # the command asks so before it computes anything
+    assert isinstance(planned(recording, files["sa"]).exception, CompdError)
