@@ -160,9 +160,7 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
     return values
 
 
-def _check_size(
-    values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems
-) -> None:
+def _check_size(values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> None:
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     if len(beyond):
         problems.add(int(line[beyond[0]]), f"{what} is larger than anything measured", cells[int(beyond[0])])

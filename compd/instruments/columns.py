@@ -39,9 +39,9 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     time = _time(table, roles, options, problems)
     values = _values(table, roles, axes, options, taken, problems)
     problems.check()
-    complete: BoolArray = ~np.isnan(values).any(axis=1)
+    complete: BoolArray = np.asarray(np.isfinite(values).all(axis=1))
     if time is not None:
-        complete &= ~np.isnan(time.time_s)
+        complete = complete & np.isfinite(time.time_s)
         taken["time"] = f"{taken['time']}, {time.told}" if "time" in taken else time.told
     if not complete.any():
         problems.add(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")

@@ -38,7 +38,8 @@ def is_spatial_analyzer(text: TextFile) -> bool:
 def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
     """The table of such an export; without comments too (`number, x, y, z`). Raises RecordingError."""
     problems = ExportProblems(text.path)
-    told, unit = {}, ""
+    told: dict[str, str] = {}
+    unit = ""
     for i in [i for i, line in enumerate(map(str.lstrip, text.lines)) if line[:2] == "//"]:
         number, line = i + 1, text.lines[i]
         frame, axes = _FRAME.search(line), _AXES.search(line)

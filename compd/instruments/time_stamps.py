@@ -102,7 +102,8 @@ def read_stamps(
 def spread_within(time_s: FloatArray, resolution_s: float, whole: bool = False) -> tuple[FloatArray, float, str]:
     """(times, their standard uncertainty, in words) of stamps that several rows share, spread within the resolution.
 
-    The k-th of n rows with one stamp t gets t + (k + 1/2) / n resolutions. A stamp that is cut off says no more than a
+    The k-th of n rows with one stamp t gets t + (k + 1/2) / n resolutions. Where a measurement begins or ends within a
+    stamp, the rows have the distance of those in the stamp beside it. A stamp that is cut off says no more than a
     rectangular distribution of the width of the resolution does (GUM 4.3.7).
 
     whole : spread also where no two rows share a stamp, as for stamps of whole seconds.
@@ -113,7 +114,13 @@ def spread_within(time_s: FloatArray, resolution_s: float, whole: bool = False) 
     begins = np.flatnonzero(np.concatenate([[True], time_s[1:] != time_s[:-1]]))
     counts = np.diff(np.append(begins, len(time_s)))
     place = np.arange(len(time_s)) - np.repeat(begins, counts)
-    spread_s = time_s + (place + 0.5) / np.repeat(counts, counts) * resolution_s
+    beside = np.abs(np.diff(time_s[begins]) - resolution_s) < 0.01 * resolution_s
+    goes_on, went_on = np.append(beside, False), np.append(False, beside)
+    room = counts.copy()
+    room = np.where(goes_on & ~went_on, np.maximum(counts, np.roll(counts, -1)), room)
+    room = np.where(went_on & ~goes_on, np.maximum(counts, np.roll(counts, 1)), room)
+    late = np.where(goes_on & ~went_on, room - counts, 0)
+    spread_s = time_s + (place + 0.5 + np.repeat(late, counts)) / np.repeat(room, counts) * resolution_s
     most = int(counts.max())
     std_s = float(resolution_s / np.sqrt(12.0))
     words = "whole seconds" if resolution_s == 1.0 else f"stamps of {resolution_s:g} s"

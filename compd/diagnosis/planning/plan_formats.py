@@ -31,9 +31,12 @@ def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] =
     targets = []
     last_s = np.inf
     for k, row in enumerate(rows):
-        tip = np.array([row[name] for name in TIP_COLUMNS]) if TIP_COLUMNS[0] in row else None
-        motion = [name for name in row if name.startswith("approach_") or name == SPEED_COLUMN]
-        settings = {name: row[name] for name in row if name not in (*NOT_SET, *TIP_COLUMNS, *motion)}
+        # of a machine whose kinematics is not known, a column of the same name is one setting among others
+        with_place = all(name in row for name in (*TIP_COLUMNS, SPEED_COLUMN))
+        tip = np.array([row[name] for name in TIP_COLUMNS]) if with_place else None
+        motion = [name for name in row if with_place and (name.startswith("approach_") or name == SPEED_COLUMN)]
+        place = TIP_COLUMNS if with_place else ()
+        settings = {name: row[name] for name in row if name not in (*NOT_SET, *place, *motion)}
         way = ways[k] if ways else None
         wanted = any(row[name] for name in motion)
         targets.append(

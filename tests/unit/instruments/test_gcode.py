@@ -131,6 +131,12 @@ def test_a_plan_without_places_is_a_list_and_nothing_else() -> None:
         assert caught.value.problems[0].value == "elevation_deg"
 
 
+def test_columns_of_an_external_model_with_the_names_of_places_are_settings() -> None:
+    rows = [{"row": 1, "purpose": "at these settings", "time_s": 0.0, "moved_1": -1, "approach_1": 1, "tip_x_mm": 7.5}]
+    lines = target_bytes(rows, "csv").decode().splitlines()
+    assert lines == ["name,moved_1,approach_1,tip_x_mm,purpose", "P001,-1,1,7.5,at these settings"]
+
+
 def test_a_feed_is_asked_for() -> None:
     with pytest.raises(CompdError, match="needs a feed"):
         target_bytes([row(1, 0.0)], "gcode")
