@@ -99,4 +99,4 @@ def echo_taken(path: Path, shape: str, taken: Mapping[str, str], left_out: Mappi
     for role, text in taken.items():
         typer.echo(f"    {role:<{width}}  {text}")
     for reason, count in left_out.items():
-        typer.echo(f"    {count} rows not used: {reason}")
+        typer.echo(f"    {count} row{'s' * (count != 1)} not used: {reason}")

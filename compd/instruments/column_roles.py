@@ -218,7 +218,7 @@ def _readings(
         whole, rising = bool(np.all(filled == np.floor(filled))), bool(np.all(np.diff(filled) > 0))
         number, time = {"name": numeric[0], **positions}, {"time": numeric[0], **positions}
         # three rows that rise are few: numbers of points as well as seconds
-        readings = [number] if whole and not named else []
+        readings = [] if not whole else [positions if named else number]
         if not timed and (not whole or (rising and table.shape != "sa")) and bool(np.all(np.diff(filled) >= 0)):
             readings.append(time)
         return readings

@@ -33,6 +33,9 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     roles = find_roles(table, options, problems)
     problems.check()
     taken = {role: f"{column_text(table, k)}, {roles.why[role]}" for role, k in roles.column.items()}
+    unused = [k for k in range(len(table.columns)) if k not in roles.column.values()]
+    if unused:
+        taken["not used"] = ", ".join(column_text(table, k) for k in unused)
     table = _of_group(table, roles, options, taken, problems)
     problems.check()
     axes = tuple(axis for axis in AXES if axis in roles.column)

@@ -32,7 +32,9 @@ def test_roles_by_the_header(tmp_path: Path, header: str, roles: str) -> None:
     assert (export.time_s is not None) == ("time" in found)
     assert (export.name is not None) == ("name" in found)
     for k, role in enumerate(roles.split()):
-        if role != "-":
+        if role == "-":
+            assert f"column {k + 1} {header.split(',')[k]!r}" in export.taken["not used"]
+        else:
             assert export.taken[role].startswith(f"column {k + 1} {header.split(',')[k]!r}, by its name")
 
 
@@ -92,6 +94,7 @@ def test_roles_by_the_numbers(tmp_path: Path, rows: str, said: dict[str, Any], r
     ("rows", "answers"),
     [
         ("0 1.5 2.5 3.5\n1 1.5 2.5 3.5\n2 1.5 2.5 3.5\n", ["--columns name,x,y,z or --columns time,x,y,z"]),
+        ("P 1 1.5 2.5 3.5\nP 2 1.5 2.5 3.5\n", ["--columns name,-,x,y,z or --columns name,time,x,y,z"]),
         ("0.5 1.5\n1.5 1.6\n", ["--columns time,length or --columns time,x"]),
         ("1.5 2.5 3.5 1.0 2.0 3.0\n", ["--columns with 6 of time"]),
         ("A P1 1.5 2.5 3.5\nA P2 1.5 2.5 3.5\n", ["--columns with 5 of time", "name,name,x,y,z"]),
