@@ -44,6 +44,7 @@ class NoiseFloor:
     by_axis_um : (m,) per coordinate.  source : where it is from.  how : the same in a sentence.
     dof : degrees of freedom, over all coordinates; inf for a declaration that nothing tests.
     contradiction : a remark where repeats and the declaration are far apart; "" where they are not.
+    angles : how many of the coordinates, the last ones, are an attitude's, in urad.
     """
 
     by_axis_um: FloatArray
@@ -51,11 +52,12 @@ class NoiseFloor:
     how: str
     dof: float
     contradiction: str = ""
+    angles: int = 0
 
     @property
     def um(self) -> float:
-        """Root mean square over the coordinates."""
-        return rms(self.by_axis_um)
+        """Root mean square over the coordinates that are lengths."""
+        return rms(self.by_axis_um[: len(self.by_axis_um) - self.angles])
 
     @property
     def known(self) -> bool:

@@ -29,6 +29,9 @@ def candidate_results(
     why = "acts in one session or sector only: what it does there predicts no other"
     results += [CandidateResult(name, "not_testable", why) for name in names if name not in losses.best_variants]
     why = "makes nothing on these rows but a constant, which is fitted along"
+    if (ends := problem.aligned.ends) is not None:
+        fixed = "fixed ends" if ends.of_lengths else "pins"
+        why = f"makes nothing on these rows but a shift of the {fixed}, which is fitted along: not to be seen here"
     results += [CandidateResult(candidate.name, "not_testable", why) for candidate in problem.same_as_nuisance]
     results += [CandidateResult(name, "not_testable", reason) for name, reason in problem.pool.untestable.items()]
     return tuple(results)
