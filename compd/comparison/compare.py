@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -62,8 +61,8 @@ def compare(
         _orders(aligned),
         criteria,
         aligned.unit,
+        angles=3 if aligned.with_attitude else 0,
     )
-    floor = replace(floor, angles=3 if aligned.with_attitude else 0)
     links_um = None
     if aligned.model is not None and aligned.shows_tip:
         links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um[:, :3]))
