@@ -146,7 +146,8 @@ def _uncertainty(
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
         return None, first_order_uncertainty(aligned, None, fitted, covariance)
-    gauges = gauge_noise(aligned)
+    # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
+    gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
     if repeats is not None:
