@@ -172,9 +172,8 @@ class TimeLapse:
             self.result.hours = (self._clock.now_s - start_s) / 3600
             if time.monotonic() > told_s + 60:
                 told_s = time.monotonic()
-                say(
-                    f"{self.result.hours:.2f} simulated hours, {self.result.alarms.total()} alarms {dict(self.result.alarms)}"
-                )
+                alarms = dict(self.result.alarms) or "no alarms"
+                say(f"{self.result.hours:.2f} simulated hours, {alarms}")
         return self.result
 
     def _drivers(self, configuration: Configuration) -> dict[str, Gauge[Any]]:
