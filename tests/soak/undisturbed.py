@@ -161,7 +161,8 @@ class TimeLapse:
         resting = False
         while self._clock.now_s < start_s + 3600 * hours:
             part = (self._clock.now_s - start_s) % (TOUR_S + REST_S)
-            if (part > TOUR_S) != resting:
+            # it brakes before it rests
+            if (part > TOUR_S) != resting and self._world.phase == "dwelling":
                 resting = not resting
                 self._catch_up()  # or the time that is left over would be spent in motion, at once
                 self._world.command(self._world.scale_mm.tolist()) if resting else self._world.start_tour()

@@ -9,9 +9,6 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.live.acquisition.votes.machine_view import Contradiction, MachineView
 
-# A scale that was not read for longer, s, does not stand: nobody knows.
-_FRESH_S = 0.3
-
 
 class StandingScale:
     """Remembers, for each scale, what all showed when it began to stand."""
@@ -24,6 +21,7 @@ class StandingScale:
         """
         self._moved_mm = moved_mm
         self._since: dict[int, FloatArray] = {}
+        self._moved_s: dict[int, float] = {}  # when all others were seen to have moved so far
 
     def look(self, view: MachineView) -> Iterator[Contradiction]:
         scales = view.of_kind("scale")
@@ -31,11 +29,14 @@ class StandingScale:
             since = self._since.get(i)
             if since is None or not view.believed[i] or abs(view.value[i] - since[i]) > view.memory.tolerance_mm[i]:
                 self._since[i] = view.value.copy()
-                continue
-            if view.now_s - view.memory.time_s[i] > _FRESH_S:
+                self._moved_s.pop(i, None)
                 continue
             others = [j for j in scales if j != i]
             moved_mm = np.abs(view.value[others] - since[others])
-            if others and view.believed[others].all() and moved_mm.min() > self._moved_mm:
+            if not (others and view.believed[others].all() and moved_mm.min() > self._moved_mm):
+                self._moved_s.pop(i, None)
+                continue
+            # a scale that has not been read since then does not stand: nobody knows
+            if view.memory.time_s[i] > self._moved_s.setdefault(i, view.now_s):
                 del self._since[i]
                 yield Contradiction(i, f"stands while all others have moved by {moved_mm.min():.1f} mm or more")
