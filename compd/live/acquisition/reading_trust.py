@@ -159,6 +159,8 @@ class ReadingTrust:
         self._before_silence = None
         self._history.append(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
+        if self._memory.suspected[self._i]:
+            return bad(reading.time_s, Quality.STALE, "stands while all others move")
         return reading
 
     def _refused(self, reading: Reading) -> Reading:

@@ -143,6 +143,43 @@ def test_a_scale_that_stands_while_all_others_move_is_not_believed():
     assert "stands while all others have moved by 2." in machine.why("scale_1.position")
 
 
+def test_a_link_that_arrives_before_the_others_is_not_stuck():
+    machine = Machine()
+    machine.run(1.0)
+    departs_s = machine.now_s
+    for channel, way_mm in zip(SCALES, (3.0, 20.0, -15.0), strict=True):
+        machine.true_mm[channel] = lambda time_s, way_mm=way_mm: math.copysign(
+            min(30.0 * (time_s - departs_s), abs(way_mm)), way_mm
+        )
+    assert machine.run(5.0) == []
+
+
+def test_a_scale_that_sticks_just_after_its_departure_has_no_value_and_is_not_believed_after_some_readings():
+    machine = Machine()
+    machine.run(2.0)
+    departs_s = machine.now_s
+    for channel in SCALES[1:]:
+        machine.true_mm[channel] = driving(20.0, departs_s)
+    machine.frozen["scale_1.position"] = 0.05
+    assert machine.run(0.5) == ["scale_1.position"]
+    assert "stands while all others have moved by" in machine.why("scale_1.position")
+
+
+def test_a_link_with_hardly_any_way_to_go_has_a_value_again_when_its_digits_change():
+    machine = Machine()
+    machine.run(2.0)
+    departs_s = machine.now_s
+    for channel in SCALES[1:]:
+        machine.true_mm[channel] = driving(20.0, departs_s)
+    machine.true_mm["scale_1.position"] = lambda _: 0.05
+    suspected = []
+    for _ in range(20):
+        assert machine.run(0.05) == []
+        suspected.append(bool(machine.memory.suspected[machine.memory.index["scale_1.position"]]))
+    assert any(suspected)
+    assert not any(suspected[-10:])
+
+
 def test_a_scale_that_is_not_read_for_a_while_does_not_stand():
     machine = Machine()
     machine.run(1.0)
