@@ -135,7 +135,7 @@ class VoteSettings(Section):
     )
     standing_scale_mm: Positive | None = Field(
         default=2.0,
-        description="a scale that stands while all others move by this much is stuck; null: not looked at",
+        description="a scale that stands while all others depart from rest by this much is stuck; null: not looked at",
     )
     following_mm: Positive | None = Field(
         default=None,

@@ -161,8 +161,10 @@ class TimeLapse:
         resting = False
         while self._clock.now_s < start_s + 3600 * hours:
             part = (self._clock.now_s - start_s) % (TOUR_S + REST_S)
-            if (part > TOUR_S) != resting:
+            # it brakes before it rests
+            if (part > TOUR_S) != resting and self._world.phase == "dwelling":
                 resting = not resting
+                self._catch_up()  # or the time that is left over would be spent in motion, at once
                 self._world.command(self._world.scale_mm.tolist()) if resting else self._world.start_tour()
             self._advance()
             self._poll()
@@ -171,7 +173,8 @@ class TimeLapse:
             self.result.hours = (self._clock.now_s - start_s) / 3600
             if time.monotonic() > told_s + 60:
                 told_s = time.monotonic()
-                say(f"{self.result.hours:.2f} simulated hours, {self.result.alarms.total()} alarms")
+                alarms = dict(self.result.alarms) or "no alarms"
+                say(f"{self.result.hours:.2f} simulated hours, {alarms}")
         return self.result
 
     def _drivers(self, configuration: Configuration) -> dict[str, Gauge[Any]]:
@@ -190,10 +193,13 @@ class TimeLapse:
         # at rest its parts move with the temperature alone; on a tour it departs at any time
         rests = self._world.mode == "commanded" and self._world.phase == "dwelling"
         if self._unsolved_s >= (THERMAL_STEP_S if rests else 0.0):
-            self._world.advance(self._unsolved_s)
-            self._unsolved_s = 0.0
+            self._catch_up()
         else:
             self._world.advance(0.0)  # the gauges are read again, with other noise
+
+    def _catch_up(self) -> None:
+        self._world.advance(self._unsolved_s)
+        self._unsolved_s = 0.0
 
     def _poll(self) -> None:
         """Every gauge once; a second answer where one is asked for comes after a poll's time."""

@@ -70,15 +70,9 @@ class TrustSettings:
 
 
 class ReadingTrust:
-    """Judges the readings of one channel; used by its line's thread.
-
-    Attributes
-    ----------
-    damaged : how many readings a second answer has shown to be damaged.
-    """
+    """Judges the readings of one channel; used by its line's thread."""
 
     def __init__(self, memory: TrustMemory, channel: str, settings: TrustSettings) -> None:
-        self.damaged = 0
         self._memory = memory
         self._i = memory.index[channel]
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
@@ -165,6 +159,8 @@ class ReadingTrust:
         self._before_silence = None
         self._history.append(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
+        if self._memory.suspected[self._i]:
+            return bad(reading.time_s, Quality.STALE, "stands while all others move")
         return reading
 
     def _refused(self, reading: Reading) -> Reading:
@@ -199,7 +195,6 @@ class ReadingTrust:
         """A reading that follows others, of a gauge that was never away."""
         earlier = None if first is None else Sample(first.value, first.time_s, sample.window_s)
         if self._is_expected(sample):
-            self.damaged += earlier is not None and not self._is_expected(earlier)
             return self._believed(reading, sample)
         if first is None or earlier is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")

@@ -39,7 +39,7 @@ class Doubt(IntEnum):
 
 class TrustMemory:
     """Shared by the processes that are forked from now on. A channel's numbers have one writer, its line's thread, but
-    for `accepted`, which the service writes, and `voted`, which the votes write.
+    for `accepted`, which the service writes, and `voted` and `suspected`, which the votes write.
 
     Attributes
     ----------
@@ -55,6 +55,7 @@ class TrustMemory:
     step_mm : the smallest change seen; inf before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
     voted, heard : how often a vote has named the channel, and how often its thread has followed.
+    suspected : 1 while a vote waits for more evidence against the channel: it has no value meanwhile.
     evidence : of the votes, by channel.
     """
 
@@ -72,6 +73,7 @@ class TrustMemory:
         self.first_change_s, self.last_change_s = (shared_floats(max(n, 1)) for _ in range(2))
         self.step_mm[:] = math.inf
         self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
+        self.suspected = shared_counters(max(n, 1))
         self.evidence = SharedMessage()
 
     def lose(self, i: int, now_s: float) -> None:

@@ -67,10 +67,13 @@ def daemon_at(directory):
     sockets = SocketSettings(tcp={"port": 0}, unix={"path": str(directory / "s")}, valid_for_s=0.1)
     loop = loaded.loop.model_copy(update={"stale_after_s": NEVER_STALE_S, "lock_memory": False, "rate_hz": 100})
     configuration = replace(loaded, loop=loop, sockets=sockets, state=StateSettings(directory=str(directory / "state")))
-    with supervised(configuration) as daemon, connect(directory / "s", TIMEOUT_S) as client:
-        next(setpoint for setpoint in client.watch() if setpoint["state"] == "no_zero")
-        client.zero()
-        yield configuration, daemon, client
+    with supervised(configuration) as daemon:
+        with connect(directory / "s", TIMEOUT_S) as watching:
+            next(setpoint for setpoint in watching.watch() if setpoint["state"] == "no_zero")
+            watching.zero()
+        # another one: who watches and does not read while a command starts is dropped
+        with connect(directory / "s", TIMEOUT_S) as client:
+            yield configuration, daemon, client
 
 
 @pytest.fixture

@@ -39,6 +39,7 @@ class Machine:
         self.now_s = 1000.0
         self.true_mm: dict[str, Callable[[float], float]] = {channel: lambda _: 0.0 for channel in CHANNELS}
         self.frozen: dict[str, float] = {}
+        self.unread: set[str] = set()
         self.temperature_degC = 20.0
         self.setpoint: dict[str, object] | None = None
         self.memory = TrustMemory(CHANNELS, [tolerance_mm(NOISE_UM)] * len(CHANNELS))
@@ -64,7 +65,8 @@ class Machine:
             self.now_s += POLL_S
             self.latest.put(0, good(self.temperature_degC, self.now_s))
             for channel in CHANNELS:
-                self.poll(channel)
+                if channel not in self.unread:
+                    self.poll(channel)
             if k % polls == 0:
                 self.votes.look(self.now_s)
         return [c for c in CHANNELS if self.memory.explanation(self.memory.index[c])]
@@ -141,6 +143,55 @@ def test_a_scale_that_stands_while_all_others_move_is_not_believed():
     assert "stands while all others have moved by 2." in machine.why("scale_1.position")
 
 
+def test_a_link_that_arrives_before_the_others_is_not_stuck():
+    machine = Machine()
+    machine.run(1.0)
+    departs_s = machine.now_s
+    for channel, way_mm in zip(SCALES, (3.0, 20.0, -15.0), strict=True):
+        machine.true_mm[channel] = lambda time_s, way_mm=way_mm: math.copysign(
+            min(30.0 * (time_s - departs_s), abs(way_mm)), way_mm
+        )
+    assert machine.run(5.0) == []
+
+
+def test_a_scale_that_sticks_just_after_its_departure_has_no_value_and_is_not_believed_after_some_readings():
+    machine = Machine()
+    machine.run(2.0)
+    departs_s = machine.now_s
+    for channel in SCALES[1:]:
+        machine.true_mm[channel] = driving(20.0, departs_s)
+    machine.frozen["scale_1.position"] = 0.05
+    assert machine.run(0.5) == ["scale_1.position"]
+    assert "stands while all others have moved by" in machine.why("scale_1.position")
+
+
+def test_a_link_with_hardly_any_way_to_go_has_a_value_again_when_its_digits_change():
+    machine = Machine()
+    machine.run(2.0)
+    departs_s = machine.now_s
+    for channel in SCALES[1:]:
+        machine.true_mm[channel] = driving(20.0, departs_s)
+    machine.true_mm["scale_1.position"] = lambda _: 0.05
+    suspected = []
+    for _ in range(20):
+        assert machine.run(0.05) == []
+        suspected.append(bool(machine.memory.suspected[machine.memory.index["scale_1.position"]]))
+    assert any(suspected)
+    assert not any(suspected[-10:])
+
+
+def test_a_scale_that_is_not_read_for_a_while_does_not_stand():
+    machine = Machine()
+    machine.run(1.0)
+    for channel in SCALES:
+        machine.true_mm[channel] = driving(50.0, machine.now_s)
+    for _ in range(10):
+        machine.unread = {"scale_1.position"}
+        assert machine.run(0.25) == []
+        machine.unread = set()
+        assert machine.run(0.15) == []
+
+
 def test_one_link_that_moves_alone_accuses_nobody():
     machine = Machine()
     machine.true_mm["scale_2.position"] = driving(5.0, machine.now_s)
@@ -184,3 +235,22 @@ def test_a_frame_that_grows_as_its_temperature_says_is_believed_and_a_comparator
     machine.true_mm["cabinet.t1"] = driving(0.01, machine.now_s - 2.2)
     assert machine.run(1.5) == ["cabinet.t1"]
     assert "temperature_frame_degC explains +22.0 um" in machine.why("cabinet.t1")
+
+
+def test_a_tip_that_catches_up_after_a_scale_was_not_read_is_not_too_fast():
+    machine = Machine(VoteSettings(tip_mm_per_s=60.0))
+
+    def tip_is_at(x_mm: float) -> None:
+        machine.setpoint = {"mode": "cmm", "valid": True, "time_s": machine.now_s, "tip_M_mm": [x_mm, 0.0, 0.0]}
+
+    tip_is_at(0.0)
+    assert machine.run(0.1) == []
+    machine.unread = {"scale_3.position"}
+    for _ in range(3):
+        tip_is_at(0.0)
+        assert machine.run(0.1) == []
+    machine.unread = set()
+    tip_is_at(15.0)
+    assert machine.run(0.1) == []
+    tip_is_at(30.0)
+    assert machine.run(0.1) != []
