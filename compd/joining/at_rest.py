@@ -155,6 +155,14 @@ def _problems(
     if instrument.sigma_um is not None and not 0 < instrument.sigma_um < np.inf:
         what, next_step = "no standard uncertainty", "leave --sigma-um out where it is not known"
         add(export.path, what, str(instrument.sigma_um), "more than 0 um", next_step)
+    if instrument.ball is not None or instrument.sigma_urad is not None:
+        add(
+            export.path,
+            "distances and attitudes are joined by time",
+            "",
+            "--by time",
+            "leave --ball and --sigma-urad out",
+        )
     links = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
     if export.axes == LENGTH_AXES:
         if instrument.link is None or not 1 <= instrument.link <= links:

@@ -14,7 +14,7 @@ from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.instruments.track import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
-from compd.recording.columns import ATTITUDE_COLUMNS, link_reference_column
+from compd.recording.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 from compd.recording.recording import Recording
 from compd.recording.reference import Frame
 from compd.recording.sidecar import sidecar_contents
@@ -56,12 +56,16 @@ class Instrument:
     Attributes
     ----------
     frame : of its x, y, z. sigma_um : standard uncertainty per axis; None where it is not known.
-    link : for a length, the link that it measures (1-based).
+    sigma_urad : standard uncertainty of an attitude about each axis; None where it is not known.
+    link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
+        another fixed end, from which it is measured to the tip.
     """
 
     frame: Frame = "instrument"
     sigma_um: float | None = None
     link: int | None = None
+    sigma_urad: float | None = None
+    ball: int | None = None
 
 
 def join_reference(
@@ -106,14 +110,21 @@ def join_reference(
                 next_step="check the offset; rows in motion are taken with --moving",
             )
         )
-    names = [
-        f"reference_{axis}_mm" if instrument.link is None else link_reference_column(instrument.link)
-        for axis in track.axes
-    ]
-    names += ATTITUDE_COLUMNS if track.rotation_rad is not None else ()
-    columns = {**recording.columns, **dict(zip(names, reference.T, strict=True))}
+    columns = {**recording.columns, **dict(zip(_column_names(track, instrument), reference.T, strict=True))}
+    if instrument.ball is not None:
+        columns["ball"] = np.where(np.isfinite(reference[:, 0]), float(instrument.ball), np.nan)
     write_recording(out, columns, _sidecar(recording, track, instrument, offset, matched))
     return JoinResult(out, offset, matched, left_out, still_mm)
+
+
+def _column_names(track: Track, instrument: Instrument) -> list[str]:
+    if instrument.ball is not None:
+        return [DISTANCE_COLUMN]
+    if instrument.link is not None:
+        return [link_reference_column(instrument.link)]
+    return [f"reference_{axis}_mm" for axis in track.axes] + list(
+        ATTITUDE_COLUMNS if track.rotation_rad is not None else ()
+    )
 
 
 def _problems(recording: Recording, track: Track, instrument: Instrument, moving: bool) -> list[Problem]:
@@ -137,14 +148,21 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
                 next_step="join to a recording of gauges alone",
             )
         )
-    if instrument.sigma_um is not None and not 0 < instrument.sigma_um < np.inf:
+    problems += [
+        Problem(
+            where=str(track.path),
+            what="no standard uncertainty",
+            value=str(sigma),
+            allowed=f"more than 0 {unit}",
+            next_step=f"leave --sigma-{unit} out where it is not known",
+        )
+        for unit, sigma in (("um", instrument.sigma_um), ("urad", instrument.sigma_urad))
+        if sigma is not None and not 0 < sigma < np.inf
+    ]
+    if instrument.sigma_urad is not None and track.rotation_rad is None:
         problems.append(
             Problem(
-                where=str(track.path),
-                what="no standard uncertainty",
-                value=str(instrument.sigma_um),
-                allowed="more than 0 um",
-                next_step="leave --sigma-um out where it is not known",
+                where=str(track.path), what="has no attitude", next_step="leave --sigma-urad out, or export rx, ry, rz"
             )
         )
     if recording.scale_mm is None:
@@ -153,23 +171,32 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
         )
     length = track.axes == (LENGTH,)
     links = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
-    if length and (instrument.link is None or not 1 <= instrument.link <= links):
+    if length and (instrument.link is None) == (instrument.ball is None):
+        problems.append(
+            Problem(
+                where=str(track.path),
+                what="is a length; of what is not said" if instrument.link is None else "is one length",
+                allowed="--link or --ball",
+                next_step="say which link it measures with --link, or with --ball from which fixed ball to the tip",
+            )
+        )
+    if length and instrument.link is not None and not 1 <= instrument.link <= links:
         problems.append(
             Problem(
                 where=str(track.path),
                 what="is a length, of no link of this machine",
-                value=str(instrument.link or ""),
+                value=str(instrument.link),
                 allowed=f"1 to {links}",
                 next_step="say which link it measures with --link",
             )
         )
-    if not length and instrument.link is not None:
+    if not length and (instrument.link is not None or instrument.ball is not None):
         problems.append(
             Problem(
                 where=str(track.path),
-                what="is a position, not a link's length",
+                what="is a position, not a length",
                 value=", ".join(track.axes),
-                next_step="leave --link out",
+                next_step="leave --link and --ball out",
             )
         )
     return problems
@@ -212,12 +239,17 @@ def _sidecar(
     recording: Recording, track: Track, instrument: Instrument, offset: ClockOffset, matched: int
 ) -> dict[str, Any]:
     """The joined recording's sidecar; rows are numbered anew where some were left out."""
-    tool = "tool_position" if track.rotation_rad is None else "tool_pose"
-    reference: dict[str, Any] = {"quantity": "link_length" if instrument.link else tool}
-    if not instrument.link:
-        reference["frame"] = instrument.frame
+    if instrument.ball is not None:
+        reference: dict[str, Any] = {"quantity": "distance"}
+    elif instrument.link is not None:
+        reference = {"quantity": "link_length"}
+    else:
+        tool = "tool_position" if track.rotation_rad is None else "tool_pose"
+        reference = {"quantity": tool, "frame": instrument.frame}
     if instrument.sigma_um is not None:
         reference["sigma_um"] = instrument.sigma_um
+    if instrument.sigma_urad is not None:
+        reference["sigma_urad"] = instrument.sigma_urad
     joined: dict[str, Any] = {
         "gauges": recording.path.name,
         "gauges_sha256": recording.sha256,

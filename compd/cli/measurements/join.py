@@ -41,6 +41,12 @@ def join(
     z: Annotated[str | None, typer.Option(help="The export's column of z; guessed from its name.")] = None,
     length: Annotated[str | None, typer.Option(help="The export's column of a length; guessed from its name.")] = None,
     link: Annotated[int | None, typer.Option(help="For a length: the link that it measures, 1 to 6.")] = None,
+    ball: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="For a length, of a ballbar or a tracer: the fixed ball from which it goes to the tip."
+        ),
+    ] = None,
     shape: ShapeOption = None,
     columns: ColumnsOption = None,
     unit: UnitOption = None,
@@ -58,6 +64,12 @@ def join(
         FrameChoice, typer.Option(help="Frame of the coordinates: {M}, or the instrument's own, which is then fitted.")
     ] = FrameChoice.INSTRUMENT,
     sigma_um: Annotated[float | None, typer.Option(help="Standard uncertainty of the instrument per axis, um.")] = None,
+    sigma_urad: Annotated[
+        float | None,
+        typer.Option(
+            help="Standard uncertainty of an attitude about each axis, urad; without it, it is only compared."
+        ),
+    ] = None,
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
     by: Annotated[
         ByChoice | None,
@@ -80,7 +92,7 @@ def join(
     options = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
     exported = read_export(export, options)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
-    instrument = Instrument(frame.value, sigma_um, link)
+    instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball)
     chosen = choose_by(by, exported)
     check_options(chosen, offset, moving, plan)
     if chosen != ByChoice.TIME:

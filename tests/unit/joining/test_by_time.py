@@ -269,6 +269,38 @@ def test_length_needs_its_link(tmp_path: Path) -> None:
     assert joined.reference.quantity == "link_length"
 
 
+def test_a_length_from_a_fixed_ball_is_a_distance(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    motion = random_path(rng, 40, (1.0, 3.0))
+    path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, motion.end_s - 5.0, 0.1), rng)
+    recording = read_recording(path, needs_reference=False)
+    seen_s = np.arange(0.0, motion.end_s, 0.05)
+    length_mm = np.linalg.norm(motion.tip(seen_s) - [0.0, 0.0, -150.0], axis=1)[:, None]
+    track = Track(tmp_path / "bar.csv", seen_s - 12.0, length_mm, ("length",))
+    with pytest.raises(RecordingError, match="--ball"):
+        join_reference(recording, track, tmp_path / "out.csv", Instrument(link=1, ball=1))
+    join_reference(recording, track, tmp_path / "out.csv", Instrument(sigma_um=0.5, ball=7))
+    joined = read_recording(tmp_path / "out.csv")
+    assert joined.reference is not None
+    assert joined.reference.quantity == "distance"
+    assert joined.reference_distance_mm is not None
+    measured = np.isfinite(joined.reference_distance_mm)
+    assert measured.sum() > 100
+    expected_mm = np.linalg.norm(motion.tip(joined.time_s) - [0.0, 0.0, -150.0], axis=1)
+    np.testing.assert_allclose(joined.reference_distance_mm[measured], expected_mm[measured], atol=2e-3)
+    assert set(joined.columns["ball"][measured]) == {7.0}
+
+
+def test_how_well_an_attitude_is_known_needs_an_attitude(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    motion = random_path(rng, 20, (1.0, 3.0))
+    path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, motion.end_s - 5.0, 0.1), rng)
+    track, _ = track_of(motion, rng, 0.0, 0.1, TRACKER_NOISE_MM)
+    recording = read_recording(path, needs_reference=False)
+    with pytest.raises(RecordingError, match="sigma-urad"):
+        join_reference(recording, track, tmp_path / "out.csv", Instrument(sigma_urad=5.0), 0.0)
+
+
 def test_an_attitude_is_joined_and_a_turn_on_the_spot_is_motion(tmp_path: Path) -> None:
     """The platform turns by 0.1 rad about the target between 20 s and 25 s, while the target itself stands still."""
     rng = np.random.default_rng(5)
