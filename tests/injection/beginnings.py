@@ -67,6 +67,17 @@ def while_driving(begin: Begin) -> Begin:
     return both
 
 
+def before_driving(begin: Begin) -> Begin:
+    """At rest, for longer than a poll takes; then the machine drives."""
+
+    def both(machine: InjectedMachine) -> None:
+        begin(machine)
+        machine.truth.rest_for(0.3)
+        machine.truth.drive(AWAY_MM)
+
+    return both
+
+
 def mute(*lines: str) -> Begin:
     """No reply at all."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from compd.live.loop.states import State
 from tests.injection import faults
 from tests.injection.beginnings import (
+    before_driving,
     drifting,
     exchanged,
     on,
@@ -66,9 +67,9 @@ NUMBERS: tuple[Case, ...] = (
     Case(
         "scale-stuck-driving",
         STUCK,
-        "a scale stands while the machine drives",
+        "a scale is stuck before the machine drives",
         "scale 1 repeats; all links drive 7 mm",
-        while_driving(on("scale_1", faults.Stuck)),
+        before_driving(on("scale_1", faults.Stuck)),
         Way.ACCEPTED,
         INVALID,
         "scale 1",

@@ -86,7 +86,8 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
         summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
     fault = summary.add(cases, verdict)
     fault.accepted += accepted
-    if doubts and all(case.way in (Way.UNDISTURBED, Way.UNSEEN) for case in cases):
+    # what is usually not seen may well be, one that is stronger or on the move
+    if doubts and all(case.way is Way.UNDISTURBED for case in cases):
         summary.false_alarms.append(f"{[case.id for case in cases]}: {doubts}")
     fault.restarted += restarted
     if ended and not any(case.lost for case in cases):

@@ -154,6 +154,21 @@ def test_a_link_that_arrives_before_the_others_is_not_stuck():
     assert machine.run(5.0) == []
 
 
+def test_scales_that_were_not_read_while_they_move_are_not_at_rest():
+    machine = Machine()
+    machine.run(1.0)
+    departs_s = machine.now_s
+    for channel, way_mm in zip(SCALES, (5.0, 60.0, -60.0), strict=True):
+        machine.true_mm[channel] = lambda time_s, way_mm=way_mm: math.copysign(
+            min(30.0 * (time_s - departs_s), abs(way_mm)), way_mm
+        )
+    assert machine.run(0.5) == []  # the first has arrived
+    machine.unread = set(SCALES)
+    assert machine.run(0.25) == []
+    machine.unread = set()
+    assert machine.run(2.0) == []
+
+
 def test_a_scale_that_sticks_just_after_its_departure_has_no_value_and_is_not_believed_after_some_readings():
     machine = Machine()
     machine.run(2.0)

@@ -33,7 +33,7 @@ class StandingScale:
         l = 500 mm, more than a scale's noise.
         """
         self._moved_mm = moved_mm
-        self._last: FloatArray | None = None  # what all showed at the last look
+        self._last: tuple[FloatArray, FloatArray] | None = None  # what all showed at the last look, and when read
         self._at_rest: FloatArray | None = None  # and when all of them last stood
         self._standing: set[int] = set()
         self._moved_s: dict[int, float] = {}  # when all others were seen to have moved so far
@@ -42,12 +42,15 @@ class StandingScale:
     def look(self, view: MachineView) -> Iterator[Contradiction]:
         yield from self._look_at_suspects(view)
         scales = view.of_kind("scale")
-        last, self._last = self._last, view.value.copy()
+        n = len(view.wired)
+        last, self._last = self._last, (view.value.copy(), view.memory.time_s[:n].copy())
         if last is None or not view.believed[scales].all():
             self._at_rest = None
             return
-        tolerance_mm = view.memory.tolerance_mm[: len(view.wired)]
-        if (np.abs(view.value - last) <= tolerance_mm)[scales].all():
+        tolerance_mm = view.memory.tolerance_mm[:n]
+        # one that has not been read since may have moved
+        stands = (np.abs(view.value - last[0]) <= tolerance_mm) & (view.memory.time_s[:n] > last[1])
+        if stands[scales].all():
             self._at_rest, self._standing = view.value.copy(), set(scales)
             self._moved_s.clear()
         if self._at_rest is None:
