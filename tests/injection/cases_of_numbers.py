@@ -117,6 +117,7 @@ NUMBERS: tuple[Case, ...] = (
         "joints repeats; all links drive 7 mm",
         while_driving(on("joints", faults.Stuck)),
         Way.UNSEEN,
+        names="joint",
         bound_um=10.0,
     ),
     Case(
@@ -126,6 +127,7 @@ NUMBERS: tuple[Case, ...] = (
         "cabinet one reply behind, transaction right",
         on("cabinet", lambda: faults.OneReplyLate(reframed=True)),
         Way.UNSEEN,
+        names="frame",
     ),
     # --- exchanged
     Case(
@@ -156,6 +158,7 @@ NUMBERS: tuple[Case, ...] = (
         "heads 1 and 4 exchanged",
         on("joints", lambda: faults.Exchanged("1", "4")),
         Way.UNSEEN,
+        names="joint",
         bound_um=5.0,
     ),
     # --- drift
@@ -166,6 +169,7 @@ NUMBERS: tuple[Case, ...] = (
         "scale 1 drifts 10 um/s for 3 s",
         drifting("scale_1", "position", 0.01),
         Way.UNSEEN,
+        names="scale 1",
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,
@@ -177,6 +181,7 @@ NUMBERS: tuple[Case, ...] = (
         "head 1 drifts 10 um/s for 3 s",
         drifting("joints", "1", 0.01),
         Way.UNSEEN,
+        names="joint",
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,

@@ -86,8 +86,7 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
         summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
     fault = summary.add(cases, verdict)
     fault.accepted += accepted
-    # what is usually not seen may well be, one that is stronger or on the move
-    if doubts and all(case.way is Way.UNDISTURBED for case in cases):
+    if doubts and not any(_explains(case, doubts) for case in cases):
         summary.false_alarms.append(f"{[case.id for case in cases]}: {doubts}")
     fault.restarted += restarted
     if ended and not any(case.lost for case in cases):
@@ -101,6 +100,11 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
     if restarted or ended:
         with machine.watched() as again:
             assert machine.until_ok(again), again.seen[-1].setpoint
+
+
+def _explains(case: Case, doubts: str) -> bool:
+    """Whether the fault is one that a person has to end, or the gauge is named that it is at."""
+    return case.way is not Way.UNDISTURBED and (case.way is not Way.UNSEEN or case.names in doubts)
 
 
 def _settles(machine: InjectedMachine, watcher: Watcher, patience_s: float) -> bool:
