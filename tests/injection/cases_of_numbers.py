@@ -111,6 +111,17 @@ NUMBERS: tuple[Case, ...] = (
         watched_s=12.0,
     ),
     Case(
+        "scale-sticks-departing",
+        STUCK,
+        "a scale gets stuck just after the machine has departed",
+        "scale 1 stays after 50 um; all links drive 7 mm",
+        before_driving(on("scale_1", lambda: faults.Sticks("position", 0.05))),
+        Way.UNSEEN,
+        names="scale 1",
+        bound_um=12_000.0,
+        at_least_um=5_000.0,
+    ),
+    Case(
         "joints-stuck-driving",
         STUCK,
         "the joints' unit repeats one reply while the machine drives",
