@@ -32,11 +32,12 @@ class Way(Enum):
 class Case:
     """One row of the matrix.
 
-    group : heading on the page. fault : what fails, in a user's words. injected : what the injector does.
-    begin : does it. must : what must happen. states : one of these must be seen. names : part of a reason that is then
-    given. bound_um : of the error of any valid setpoint, from the beginning until the state is ok again.
-    way : out of it. at_least_um : of what nothing shows, the error that it makes. watched_s : how long the fault lasts.
-    lost : whether the daemon itself ends and the service manager starts it again. sample : runs in `make test`.
+    group : heading on the page. fault : what fails, in a user's words. injected : what the injector does. begin :
+    does it. must : what must happen. states : one of these must be seen. names : part of a reason that is then
+    given, or may be where nothing must show. bound_um : of the error of any valid setpoint, from the beginning
+    until the state is ok again. way : out of it. at_least_um : of what nothing shows, the error that it makes.
+    watched_s : how long the fault lasts. lost : whether the daemon itself ends and the service manager starts it
+    again. sample : runs in `make test`.
     """
 
     id: str

@@ -111,12 +111,24 @@ NUMBERS: tuple[Case, ...] = (
         watched_s=12.0,
     ),
     Case(
+        "scale-sticks-departing",
+        STUCK,
+        "a scale gets stuck just after the machine has departed",
+        "scale 1 stays after 50 um; all links drive 7 mm",
+        before_driving(on("scale_1", lambda: faults.Sticks("position", 0.05))),
+        Way.UNSEEN,
+        names="scale 1",
+        bound_um=12_000.0,
+        at_least_um=5_000.0,
+    ),
+    Case(
         "joints-stuck-driving",
         STUCK,
         "the joints' unit repeats one reply while the machine drives",
         "joints repeats; all links drive 7 mm",
         while_driving(on("joints", faults.Stuck)),
         Way.UNSEEN,
+        names="joint",
         bound_um=10.0,
     ),
     Case(
@@ -126,6 +138,7 @@ NUMBERS: tuple[Case, ...] = (
         "cabinet one reply behind, transaction right",
         on("cabinet", lambda: faults.OneReplyLate(reframed=True)),
         Way.UNSEEN,
+        names="frame",
     ),
     # --- exchanged
     Case(
@@ -156,6 +169,7 @@ NUMBERS: tuple[Case, ...] = (
         "heads 1 and 4 exchanged",
         on("joints", lambda: faults.Exchanged("1", "4")),
         Way.UNSEEN,
+        names="joint",
         bound_um=5.0,
     ),
     # --- drift
@@ -166,6 +180,7 @@ NUMBERS: tuple[Case, ...] = (
         "scale 1 drifts 10 um/s for 3 s",
         drifting("scale_1", "position", 0.01),
         Way.UNSEEN,
+        names="scale 1",
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,
@@ -177,6 +192,7 @@ NUMBERS: tuple[Case, ...] = (
         "head 1 drifts 10 um/s for 3 s",
         drifting("joints", "1", 0.01),
         Way.UNSEEN,
+        names="joint",
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,

@@ -235,6 +235,23 @@ class Stuck(NumbersFault):
 
 
 @dataclass
+class Sticks(NumbersFault):
+    """A channel that follows for `way_mm` and stays there."""
+
+    channel: str
+    way_mm: float
+    _first_mm: float | None = field(default=None, init=False)
+
+    def numbers(self, values: Values, exchange: Exchange) -> Mapping[str, float]:
+        if self.channel not in values:
+            return {}
+        if self._first_mm is None:
+            self._first_mm = values[self.channel]
+        way_mm = values[self.channel] - self._first_mm
+        return {self.channel: self._first_mm + max(-self.way_mm, min(way_mm, self.way_mm))}
+
+
+@dataclass
 class Exchanged(NumbersFault):
     """Two channels of one unit that show each other's number."""
 

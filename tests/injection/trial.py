@@ -154,7 +154,9 @@ def _leave(machine: InjectedMachine, case: Case, outcome: Outcome, watcher: Watc
         except DaemonError as error:
             outcome.problems.append(f"`compd accept` is refused: {error}")
         end_s = time.monotonic()
-    if case.way is Way.EITHER and not machine.until_ok(watcher, SETTLED_WITHIN_S):
+    if case.way is Way.UNSEEN:
+        machine.truth.rest_for(WATCHED_AFTER_S)  # what nothing has shown may show when it ends
+    if case.way in (Way.EITHER, Way.UNSEEN) and not machine.until_ok(watcher, SETTLED_WITHIN_S):
         accept(machine)
         end_s = time.monotonic()
     if machine.until_ok(watcher, BACK_WITHIN_S):

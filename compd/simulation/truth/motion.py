@@ -15,8 +15,6 @@ Phase = Literal["moving", "dwelling"]
 # Drives of a measuring machine.
 SPEED_MM_PER_S = 50.0
 ACCELERATION_MM_PER_S2 = 250.0
-# Longest step in which a controller's setpoints are followed.
-FOLLOWING_STEP_S = 0.004
 
 
 @dataclass(frozen=True)
@@ -56,19 +54,85 @@ class Move:
             way = ACCELERATION_MM_PER_S2 * ramp_s * (time_s - ramp_s / 2)
         return self.start_mm + (way / self._way_mm) * (self.end_mm - self.start_mm)
 
+    def speeds_mm_per_s(self, time_s: float) -> FloatArray:
+        """(n,) speeds `time_s` after the start."""
+        ramp_s = max(0.0, min(self._ramp_s, time_s, self.duration_s - time_s))
+        if ramp_s == 0:
+            return np.zeros_like(self.start_mm)
+        return (ACCELERATION_MM_PER_S2 * ramp_s / self._way_mm) * (self.end_mm - self.start_mm)
+
+
+class Approach:
+    """Motion of each link by itself from any speed to rest at its end, as soon as speed and acceleration allow.
+
+    A link that cannot stop at its end any more comes back to it.
+    """
+
+    def __init__(self, start_mm: FloatArray, start_mm_per_s: FloatArray, end_mm: FloatArray) -> None:
+        """`start_mm`, `end_mm`: (n,). `start_mm_per_s`: (n,), at most SPEED_MM_PER_S."""
+        self.end_mm = end_mm
+        self._start_mm, self._start_mm_per_s = start_mm, start_mm_per_s
+        acceleration = ACCELERATION_MM_PER_S2
+        self._sign = np.where(end_mm >= stopping_place_mm(start_mm, start_mm_per_s), 1.0, -1.0)
+        way_mm, speed = self._sign * (end_mm - start_mm), self._sign * start_mm_per_s
+        peak = np.minimum(np.sqrt(np.maximum(acceleration * way_mm + speed**2 / 2, 0.0)), SPEED_MM_PER_S)
+        even_mm = np.maximum(way_mm - (2 * peak**2 - speed**2) / (2 * acceleration), 0.0)
+        self._peak_mm_per_s = peak
+        # ends of speeding up, of even speed and of braking, s
+        self._faster_s = np.maximum(peak - speed, 0.0) / acceleration
+        self._even_s = self._faster_s + even_mm / SPEED_MM_PER_S
+        self._ends_s = self._even_s + peak / acceleration
+
+    @property
+    def duration_s(self) -> float:
+        return float(self._ends_s.max())
+
+    def position_mm(self, time_s: float) -> FloatArray:
+        """(n,) scale positions `time_s` after the start; `end_mm` after the end."""
+        half = 0.5 * ACCELERATION_MM_PER_S2 * self._sign
+        faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
+        before_mm = self._start_mm + self._start_mm_per_s * faster_s + half * faster_s**2
+        before_mm = before_mm + self._sign * self._peak_mm_per_s * np.maximum(time_s - self._faster_s, 0.0)
+        position_mm: FloatArray = np.where(time_s < self._even_s, before_mm, self.end_mm - half * left_s**2)
+        return position_mm
+
+    def speeds_mm_per_s(self, time_s: float) -> FloatArray:
+        """(n,) speeds `time_s` after the start."""
+        acceleration = ACCELERATION_MM_PER_S2 * self._sign
+        faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
+        before = self._start_mm_per_s + acceleration * faster_s
+        speeds: FloatArray = np.where(time_s < self._even_s, before, acceleration * left_s)
+        return speeds
+
+
+def stopping_place_mm(start_mm: FloatArray, start_mm_per_s: FloatArray) -> FloatArray:
+    """(n,) where links stand that brake from now on."""
+    return start_mm + start_mm_per_s * np.abs(start_mm_per_s) / (2 * ACCELERATION_MM_PER_S2)
+
+
+def braking(start_mm: FloatArray, start_mm_per_s: FloatArray) -> Approach:
+    """Motion of links that come to rest."""
+    return Approach(start_mm, start_mm_per_s, stopping_place_mm(start_mm, start_mm_per_s))
+
+
+def standing(here_mm: FloatArray) -> Approach:
+    """No motion: the links stand at `here_mm`, (n,)."""
+    return Approach(here_mm, np.zeros_like(here_mm), here_mm)
+
 
 class TourMotion:
     """Endless tour of points in random order, with a dwell at each."""
 
-    def __init__(self, start_mm: FloatArray, points_mm: FloatArray, dwell_s: float, rng: np.random.Generator) -> None:
-        """start_mm : (n,). points_mm : (points, n) scale values."""
+    def __init__(self, start: Approach, points_mm: FloatArray, dwell_s: float, rng: np.random.Generator) -> None:
+        """start : how the links come to rest first, (n,) of them. points_mm : (points, n) scale values."""
         self._points_mm = points_mm
         self._dwell_s = dwell_s
         self._rng = rng
         self.point = 0
         self._since_s = 0.0
-        self._move = Move(start_mm, start_mm)
-        self._depart(start_mm)
+        self._move: Move | Approach = start
+        if start.duration_s == 0:
+            self._depart(start.end_mm)
 
     @property
     def phase(self) -> Phase:
@@ -77,6 +141,10 @@ class TourMotion:
     @property
     def position_mm(self) -> FloatArray:
         return self._move.position_mm(self._since_s)
+
+    @property
+    def speeds_mm_per_s(self) -> FloatArray:
+        return self._move.speeds_mm_per_s(self._since_s)
 
     def advance(self, time_s: float) -> float:
         """Advance by `time_s`; returns how many seconds of it the links moved."""
@@ -99,38 +167,39 @@ class TourMotion:
 
 
 class SetpointMotion:
-    """Motion of each link to its own setpoint within limits of speed and acceleration, without overshoot."""
+    """Motion of each link to its own setpoint within limits of speed and acceleration."""
 
     point = None
 
-    def __init__(self, start_mm: FloatArray) -> None:
-        self.position_mm = start_mm
-        self.setpoint_mm = start_mm
-        self._speed_mm_per_s = np.zeros_like(start_mm)
+    def __init__(self, start: Approach) -> None:
+        """start : motion of the (n,) links until the first setpoint is given."""
+        self._approach = start
+        self._since_s = 0.0
+
+    @property
+    def setpoint_mm(self) -> FloatArray:
+        """(n,) where the links drive to."""
+        return self._approach.end_mm
+
+    @setpoint_mm.setter
+    def setpoint_mm(self, setpoint_mm: FloatArray) -> None:
+        self._approach = Approach(self.position_mm, self.speeds_mm_per_s, setpoint_mm)
+        self._since_s = 0.0
+
+    @property
+    def position_mm(self) -> FloatArray:
+        return self._approach.position_mm(self._since_s)
+
+    @property
+    def speeds_mm_per_s(self) -> FloatArray:
+        return self._approach.speeds_mm_per_s(self._since_s)
 
     @property
     def phase(self) -> Phase:
-        return "dwelling" if np.array_equal(self.position_mm, self.setpoint_mm) else "moving"
+        return "moving" if self._since_s < self._approach.duration_s else "dwelling"
 
     def advance(self, time_s: float) -> float:
         """Advance by `time_s`; returns how many seconds of it the links moved."""
-        moved_s = 0.0
-        while time_s - moved_s > 1e-12 and self.phase == "moving":
-            step_s = min(FOLLOWING_STEP_S, time_s - moved_s)
-            self._step(step_s)
-            moved_s += step_s
+        moved_s = min(time_s, max(0.0, self._approach.duration_s - self._since_s))
+        self._since_s += time_s
         return moved_s
-
-    def _step(self, step_s: float) -> None:
-        left_mm = self.setpoint_mm - self.position_mm
-        gain = ACCELERATION_MM_PER_S2 * step_s
-        # highest speed from which the link can still brake within `left_mm`, after one more step of travel
-        braking = np.sqrt(gain**2 / 4 + 2 * ACCELERATION_MM_PER_S2 * np.abs(left_mm)) - gain / 2
-        wanted = np.sign(left_mm) * np.minimum(braking, SPEED_MM_PER_S)
-        self._speed_mm_per_s = self._speed_mm_per_s + np.clip(wanted - self._speed_mm_per_s, -gain, gain)
-        travel_mm = self._speed_mm_per_s * step_s
-        # after a short step the next one may have more speed to take off than it can: stop at the setpoint
-        slow = np.abs(self._speed_mm_per_s) <= 2 * ACCELERATION_MM_PER_S2 * FOLLOWING_STEP_S
-        arrived = (np.abs(left_mm) <= np.abs(travel_mm) + 1e-9) & slow
-        self.position_mm = np.where(arrived, self.setpoint_mm, self.position_mm + travel_mm)
-        self._speed_mm_per_s = np.where(arrived, 0.0, self._speed_mm_per_s)

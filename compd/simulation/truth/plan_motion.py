@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
 from compd.simulation.truth.heat import HELD_TIME_CONSTANT_S
-from compd.simulation.truth.motion import Move
+from compd.simulation.truth.motion import Approach, Move
 from compd.simulation.truth.planned_row import PlannedRow
 
 # Time after which a part that was 10 K away from its held temperature is within 0.01 K of it.
@@ -33,7 +34,7 @@ class Stage(NamedTuple):
 
     row: PlannedRow
     purpose: Purpose
-    move: Move
+    move: Move | Approach
     duration_s: float
 
 
@@ -91,22 +92,27 @@ class PlanMotion:
     def __init__(
         self,
         rows: Sequence[PlannedRow],
-        start_mm: FloatArray,
+        start: Approach,
         hold: Hold,
         speedup: float,
         walk_mm: Sequence[FloatArray],
     ) -> None:
-        """As for `plan_stages`."""
-        self._stages = plan_stages(rows, start_mm, hold, speedup, walk_mm)
+        """start : how the links come to rest first. Else as for `plan_stages`."""
+        stages = plan_stages(rows, start.end_mm, hold, speedup, walk_mm)
+        self._stages = chain([Stage(rows[0], "walk", start, start.duration_s)], stages)
         self._stage: Stage | None = next(self._stages, None)
         self._since_s = 0.0
         self._rows = len(rows)
         self._row = rows[0]
-        self.position_mm = start_mm
+        self.position_mm = start.position_mm(0.0)
 
     @property
     def done(self) -> bool:
         return self._stage is None
+
+    @property
+    def speeds_mm_per_s(self) -> FloatArray:
+        return self._stage.move.speeds_mm_per_s(self._since_s) if self._stage else np.zeros_like(self.position_mm)
 
     @property
     def phase(self) -> Literal["moving", "dwelling"]:

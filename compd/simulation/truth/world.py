@@ -17,7 +17,7 @@ from compd.simulation.truth.equilibrium import Equilibrium, EquilibriumState
 from compd.simulation.truth.frame import Frame
 from compd.simulation.truth.joints import Joints
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.motion import Phase, SetpointMotion, TourMotion
+from compd.simulation.truth.motion import Approach, Phase, SetpointMotion, TourMotion, braking, standing
 from compd.simulation.truth.plan_motion import DWELL_S, PlanMotion
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.sensors import Sensors
@@ -70,7 +70,9 @@ class World:
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
         self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
-        self._motion: TourMotion | SetpointMotion | PlanMotion = SetpointMotion(np.zeros(self._mechanism.links))
+        self._motion: TourMotion | SetpointMotion | PlanMotion = SetpointMotion(
+            standing(np.zeros(self._mechanism.links))
+        )
         self._rows = rows
         self._unsolved_s = 0.0, 0.0  # since the last `advance`, and how much of it the links moved
         self.time_s = 0.0
@@ -93,7 +95,7 @@ class World:
             try:
                 self._advance_state(self._motion.position_mm, self._state.posture, passed_s, moved_s)
             except KinematicsError:
-                self._motion = SetpointMotion(self._state.scale_mm)
+                self._motion = SetpointMotion(standing(self._state.scale_mm))
                 self.mode = "blocked"
         self._readings = self._read_gauges()
 
@@ -118,14 +120,14 @@ class World:
         """
         self.time_s += time_s
         self._advance_state(scale_mm, guess, time_s, travel_s)
-        self._motion = SetpointMotion(scale_mm)
+        self._motion = SetpointMotion(standing(scale_mm))
         self.mode, self.zero_hold_s = "commanded", 0.0
         self._readings = self._read_gauges()
 
     def start_tour(self) -> None:
         """Visit random points of the workspace from now on, dwelling at each, as a measuring machine does."""
         self._leave_plan()
-        self._motion = TourMotion(self._state.scale_mm, self._points_mm, DWELL_S, self._tour_rng)
+        self._motion = TourMotion(self._braking(), self._points_mm, DWELL_S, self._tour_rng)
         self.mode, self.zero_hold_s = "tour", 0.0
 
     def start_plan(self) -> None:
@@ -138,7 +140,7 @@ class World:
             raise CompdError(
                 Problem(where="simulated machine", what="nothing is planned", next_step="start it with --plan")
             )
-        self._motion = PlanMotion(self._rows, self._state.scale_mm, self.hold, self._speedup, [*self._points_mm])
+        self._motion = PlanMotion(self._rows, self._braking(), self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
 
     def hold(self, quantities: Mapping[str, float]) -> None:
@@ -161,7 +163,7 @@ class World:
         self._solve(setpoint_mm, self._state.posture)
         self._leave_plan()
         if not isinstance(self._motion, SetpointMotion):
-            self._motion = SetpointMotion(self._state.scale_mm)
+            self._motion = SetpointMotion(self._braking())
         self._motion.setpoint_mm = setpoint_mm
         self.mode, self.zero_hold_s = "commanded", 0.0
 
@@ -287,6 +289,10 @@ class World:
         for cause in self._causes:
             cause.pass_time(interval, self._warm)
         self._state = self._solve(scale_mm, guess)
+
+    def _braking(self) -> Approach:
+        """How the links come to rest from now on."""
+        return braking(self._motion.position_mm, self._motion.speeds_mm_per_s)
 
     def _leave_plan(self) -> None:
         """Release what the plan holds, except for a load."""

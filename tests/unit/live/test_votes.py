@@ -48,8 +48,13 @@ class Machine:
         self.latest = Latest(["cabinet.frame"])
         self._noise_mm = noise_um * 1e-3
         self._random = np.random.default_rng(3)
+        self._settings = settings or VoteSettings()
+        self.start_votes()
+
+    def start_votes(self) -> None:
+        """As a new process would."""
         self.votes = Votes(
-            settings or VoteSettings(),
+            self._settings,
             self.memory,
             WIRED,
             {"temperature_frame_degC": ("cabinet.frame", 0.5)},
@@ -178,6 +183,13 @@ def test_a_scale_that_sticks_just_after_its_departure_has_no_value_and_is_not_be
     machine.frozen["scale_1.position"] = 0.05
     assert machine.run(0.5) == ["scale_1.position"]
     assert "stands while all others have moved by" in machine.why("scale_1.position")
+
+
+def test_a_suspicion_does_not_outlive_the_acquisition_that_had_it():
+    machine = Machine()
+    machine.memory.suspected[0] = True
+    machine.start_votes()
+    assert not machine.memory.suspected[0]
 
 
 def test_a_link_with_hardly_any_way_to_go_has_a_value_again_when_its_digits_change():

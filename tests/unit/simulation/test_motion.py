@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, SPEED_MM_PER_S, Move, SetpointMotion, TourMotion
+from compd.simulation.truth.motion import (
+    ACCELERATION_MM_PER_S2,
+    SPEED_MM_PER_S,
+    Move,
+    SetpointMotion,
+    TourMotion,
+    braking,
+    standing,
+)
 
 
 @pytest.mark.parametrize("way_mm", [0.001, 3.0, 150.0])
@@ -30,7 +38,7 @@ def test_a_move_to_where_it_is_takes_no_time() -> None:
 
 def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
     points_mm = np.array([[5.0, 0.0], [0.0, 9.0], [-4.0, -4.0]])
-    tour = TourMotion(np.zeros(2), points_mm, 1.0, np.random.default_rng(1))
+    tour = TourMotion(standing(np.zeros(2)), points_mm, 1.0, np.random.default_rng(1))
     visited: list[int] = []
     moved_s = 0.0
     for _ in range(3000):
@@ -46,8 +54,8 @@ def test_a_tour_dwells_at_its_points_and_counts_the_time_it_moved() -> None:
 
 def test_a_tour_does_not_depend_on_the_step() -> None:
     points_mm = np.random.default_rng(4).uniform(-20, 20, (5, 3))
-    once = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
-    many = TourMotion(np.zeros(3), points_mm, 0.5, np.random.default_rng(1))
+    once = TourMotion(standing(np.zeros(3)), points_mm, 0.5, np.random.default_rng(1))
+    many = TourMotion(standing(np.zeros(3)), points_mm, 0.5, np.random.default_rng(1))
     moved_s = once.advance(40.0)
     assert sum(many.advance(0.008) for _ in range(5000)) == pytest.approx(moved_s, abs=1e-6)
     assert once.point == many.point
@@ -56,7 +64,7 @@ def test_a_tour_does_not_depend_on_the_step() -> None:
 
 @pytest.mark.parametrize("step_s", [0.001, 0.02, 0.5])
 def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
-    drives = SetpointMotion(np.zeros(3))
+    drives = SetpointMotion(standing(np.zeros(3)))
     drives.setpoint_mm = np.array([40.0, -0.002, 0.0])
     positions = [drives.position_mm]
     while drives.phase == "moving":
@@ -72,7 +80,7 @@ def test_follower_arrives_exactly_and_keeps_its_speed(step_s: float) -> None:
 def test_follower_comes_from_one_side_whatever_the_steps() -> None:
     """A play of a micrometre would show a turn at the end."""
     rng = np.random.default_rng(1)
-    drives = SetpointMotion(np.zeros(3))
+    drives = SetpointMotion(standing(np.zeros(3)))
     for _ in range(100):
         start_mm = drives.position_mm
         drives.setpoint_mm = rng.uniform(-60.0, 60.0, 3)
@@ -83,10 +91,38 @@ def test_follower_comes_from_one_side_whatever_the_steps() -> None:
 
 
 def test_follower_takes_new_setpoints_on_the_way() -> None:
-    drives = SetpointMotion(np.zeros(1))
+    drives = SetpointMotion(standing(np.zeros(1)))
     drives.setpoint_mm = np.array([40.0])
     drives.advance(0.3)
     drives.setpoint_mm = np.array([-1.0])
     drives.advance(10.0)
     np.testing.assert_array_equal(drives.position_mm, [-1.0])
     assert drives.advance(1.0) == 0.0
+
+
+def test_any_motion_goes_on_as_fast_as_it_was() -> None:
+    """Second differences of the path, whatever is ordered in the middle of a move or of braking."""
+    rng = np.random.default_rng(2)
+    step_s, path_mm, most = 0.002, [], 0.0
+    drives = SetpointMotion(standing(np.zeros(3)))
+    move = Move(np.zeros(3), np.array([30.0, -10.0, 0.0]))
+    for _ in range(200):
+        if rng.random() < 0.2:
+            time_s = rng.uniform(0.0, move.duration_s)
+            before_mm, speeds = move.position_mm(time_s - 1e-4), move.speeds_mm_per_s(time_s)
+            assert (move.position_mm(time_s) - before_mm) / 1e-4 == pytest.approx(speeds, abs=0.03)
+        drives.setpoint_mm = rng.uniform(-20.0, 20.0, 3) if rng.random() < 0.8 else drives.setpoint_mm
+        for _ in range(int(rng.integers(1, 300))):
+            drives.advance(step_s)
+            path_mm.append(drives.position_mm)
+            most = max(most, float(np.abs(drives.speeds_mm_per_s).max()))
+    assert np.abs(np.diff(np.array(path_mm), 2, axis=0)).max() <= ACCELERATION_MM_PER_S2 * step_s**2 * (1 + 1e-6)
+    assert 0.9 * SPEED_MM_PER_S < most <= SPEED_MM_PER_S * (1 + 1e-9)
+
+
+def test_braking_ends_where_the_speed_ends() -> None:
+    start = braking(np.array([1.0, 2.0, 3.0]), np.array([50.0, -25.0, 0.0]))
+    assert start.duration_s == pytest.approx(0.2)
+    np.testing.assert_allclose(start.end_mm, [6.0, 0.75, 3.0])
+    np.testing.assert_allclose(start.position_mm(0.1), [4.75, 0.75, 3.0])
+    np.testing.assert_allclose(start.speeds_mm_per_s(0.05), [37.5, -12.5, 0.0])

@@ -15,7 +15,7 @@ from compd.simulation.campaign.plan_reader import holdable_quantities, read_plan
 from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
 from compd.simulation.causes.hidden_cause import HiddenCause
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.motion import SPEED_MM_PER_S
+from compd.simulation.truth.motion import SPEED_MM_PER_S, standing
 from compd.simulation.truth.plan_motion import DWELL_S, SETTLED_S, PlanMotion, Stage, plan_stages
 from compd.simulation.truth.planned_row import TURN_MM, PlannedRow
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
@@ -227,7 +227,7 @@ def test_a_row_on_the_move_is_passed_at_its_speed(tmp_path: Path) -> None:
 def test_the_drives_follow_the_stages_in_any_steps(tmp_path: Path) -> None:
     rows = read(plan_file(tmp_path / "next.csv", [{"tip_x_mm": 20.0}, {"tip_x_mm": -20.0, "time_s": 30.0}]))
     held: list[object] = []
-    motions = [PlanMotion(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
+    motions = [PlanMotion(rows, standing(np.zeros(3)), held.append, 1.0, [np.full(3, 5.0)]) for _ in range(2)]
     whole_s = sum(stage.duration_s for stage in plan_stages(rows, np.zeros(3), held.append, 1.0, [np.full(3, 5.0)]))
     assert motions[0].progress() == {"row": 1, "rows": 2, "purpose": "a test", "doing": "walk", "done": False}
     moved_s = [

@@ -16,6 +16,7 @@ from compd.errors import CompdError
 from compd.simulation.truth.closure import homogeneous
 from compd.simulation.truth.frame import DISTANCES, distances_mm
 from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, SPEED_MM_PER_S
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from compd.simulation.truth.world import World
 from tests.support.simulated import HEXAPOD, hexapod, tripod, tripod_with_tool_on_plate, wiring
@@ -166,6 +167,25 @@ def test_commanded_machine_drives_there_and_no_further() -> None:
     world.start_tour()
     run(world, 10.0)
     assert world.point is not None
+
+
+def test_an_order_on_the_way_makes_no_jump() -> None:
+    """Whatever is ordered while the machine drives, its links go on from where they are, as fast as they are."""
+    world = World(tripod(), wiring(), seed=3, strengths=FULLY_MEASURED_WITHOUT_NOISE)
+    step_s, path_mm = 0.01, []
+    world.start_tour()
+    for number in range(3000):
+        if number % 330 == 0:
+            world.command([20.0 - number / 100, -10.0, 5.0])
+        elif number % 37 == 0 and number % 3 == 0:
+            world.start_tour()
+        world.move(step_s)
+        path_mm.append([world.sense_scale(f"scale_{link}") for link in (1, 2, 3)])
+        if number % 7 == 0:
+            world.advance(0.0)  # what bends lags behind, as it does beside a busy processor
+    accelerations = np.diff(np.array(path_mm), 2, axis=0) / step_s**2
+    assert np.abs(accelerations).max() <= 1.2 * ACCELERATION_MM_PER_S2
+    assert np.abs(np.diff(np.array(path_mm), axis=0)).max() > 0.9 * SPEED_MM_PER_S * step_s
 
 
 @pytest.mark.parametrize("scales", [[1.0, 2.0], [500.0, 0.0, 0.0], [float("nan"), 0.0, 0.0]])

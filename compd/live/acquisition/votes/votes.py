@@ -50,6 +50,8 @@ class Votes:
         self._zero_mm = zero_mm
         self._setpoint_line = setpoint_line
         self._votes = _votes(settings)
+        for i in range(len(self._wired)):
+            memory.suspected[i] = False  # of an acquisition that has ended: its evidence went with it
         # the messages are parsed only for votes that look at them
         self._needs_setpoint = settings.following_mm is not None or settings.tip_mm_per_s is not None
 
