@@ -1,16 +1,16 @@
-"""What `compd join` does with points at rest: by their order or their names, and what it says of it."""
+"""What `compd join` does with points at rest: by order, name or distance, and what it says of it."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import typer
 
 if TYPE_CHECKING:
     from compd.instruments.export import InstrumentExport
-    from compd.joining.at_rest import RestJoin
+    from compd.joining.at_rest import By, RestJoin
     from compd.joining.by_time import Instrument
 
 # Samples further apart in time and place are points, each of its own, and no track of a target.
@@ -23,6 +23,7 @@ class ByChoice(StrEnum):
     TIME = "time"
     ORDER = "order"
     NAME = "name"
+    DISTANCE = "distance"
 
 
 def choose_by(by: ByChoice | None, export: InstrumentExport) -> ByChoice:
@@ -33,12 +34,15 @@ def choose_by(by: ByChoice | None, export: InstrumentExport) -> ByChoice:
     import numpy as np
 
     from compd.errors import Problem, RecordingError
-    from compd.joining.by_order import REPEAT_MM
+    from compd.joining.assignment import REPEAT_MM
 
     if by is not None:
         return by
     names = "" if export.name is None else ", or --by name: the points' names are those of the recording or of a plan"
-    next_step = f"say --by order: the points were measured in the order of the dwells{names}"
+    next_step = (
+        f"say --by order: the points were measured in the order of the dwells{names}"
+        "; or --by distance: in any order, each place once"
+    )
     if export.time_s is None:
         raise RecordingError(
             Problem(where=str(export.path), what="has no times, so it cannot be joined by time", next_step=next_step)
@@ -69,11 +73,11 @@ def join_points(
     export: InstrumentExport,
     out: Path,
     instrument: Instrument,
-    by: Literal["order", "name"],
+    by: By,
     machine: Path | None,
     plan: Path | None,
 ) -> RestJoin:
-    """Join the recording `gauges` with the points by order or name, and print what was joined."""
+    """Join the recording `gauges` with the points, and print what was joined."""
     from compd.comparison.open import read_with_machine
     from compd.joining.at_rest import join_at_rest
 

@@ -1,1 +1,1 @@
-"""Putting a recording of gauges and an instrument's export together, by time, by order or by name."""
+"""Putting a recording of gauges and an instrument's export together, by time, order, name or distance."""

@@ -1,4 +1,4 @@
-"""Joining a recording of gauges with points that an instrument measured at rest, by their order or by their names."""
+"""Joining a recording of gauges with points that an instrument measured at rest, by order, name or distance."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from compd.arrays import FloatArray, IntArray
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.instruments.export import LENGTH_AXES, POSITION_AXES, InstrumentExport
+from compd.joining.assignment import Assignment, NoAssignment, repeat_distance_mm
+from compd.joining.by_distance import assign_by_distance
 from compd.joining.by_name import assign_by_name, check_names
-from compd.joining.by_order import NoAssignment, assign_by_order, repeat_distance_mm
+from compd.joining.by_order import assign_by_order
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns, find_dwells
 from compd.joining.expected_places import expected_places_mm
@@ -25,7 +27,7 @@ from compd.recording.recording import Recording
 from compd.recording.writer import write_recording
 from compd.units import UM_PER_MM
 
-By = Literal["order", "name"]
+By = Literal["order", "name", "distance"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class RestJoin:
 
     Attributes
     ----------
-    path : the CSV file. by : "order" or "name".
+    path : the CSV file. by : "order", "name" or "distance".
     dwells : of the recording. points : of the export. joined : rows written, one for each point with a dwell.
     first, last : (line of the export, dwell) of the first and the last pair.
     rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
@@ -83,7 +85,7 @@ def join_at_rest(
     recording : of gauges alone. configuration : of its machine; None is refused.
     export : x, y, z of points, or lengths along `instrument.link`; times are not used.
     by : "order": the points were measured in the order of the dwells. "name": names are ids in `point`, or with `plan`
-        the numbers of the plan's rows.
+        the numbers of the plan's rows. "distance": neither is known, each place was visited once.
     plan : the plan that the machine has measured.
 
     Raises
@@ -104,10 +106,13 @@ def join_at_rest(
     places_mm = expected_mm[reachable]
     measured_mm = export.values[:, : places_mm.shape[1]]
     sigma_mm = np.nan if instrument.sigma_um is None else instrument.sigma_um / UM_PER_MM
-    if by == "order":
-        assigned = _by_order(kept, places_mm, export, measured_mm, sigma_mm)
+    in_M = instrument.frame == "machine"
+    if by == "name":
+        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, in_M)
+    elif by == "order":
+        assigned = _by_places(assign_by_order(places_mm, measured_mm, sigma_mm), kept, export)
     else:
-        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, instrument.frame == "machine")
+        assigned = _by_places(assign_by_distance(places_mm, measured_mm, sigma_mm, in_M), kept, export)
     points = np.flatnonzero(assigned.dwell >= 0)
     columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument.link)
     left_out = dict(assigned.left_out)
@@ -168,8 +173,8 @@ def _problems(
         if instrument.link is None or not 1 <= instrument.link <= links:
             what, next_step = "is a length, of no link of this machine", "say which link it measures with --link"
             add(export.path, what, str(instrument.link or ""), f"1 to {links}", next_step)
-        if by == "name":
-            add(export.path, "lengths are joined by time or by order", "--by name", "--by order, --by time")
+        if by != "order":
+            add(export.path, "lengths are joined by time or by order", f"--by {by}", "--by order, --by time")
     elif instrument.link is not None:
         add(export.path, "is a position, not a link's length", ", ".join(export.axes), "", "leave --link out")
     elif export.axes[:3] != POSITION_AXES:
@@ -184,10 +189,8 @@ def _problems(
     return problems
 
 
-def _by_order(
-    dwells: list[Dwell], places_mm: FloatArray, export: InstrumentExport, measured_mm: FloatArray, sigma_mm: float
-) -> _Assigned:
-    result = assign_by_order(places_mm, measured_mm, sigma_mm)
+def _by_places(result: Assignment | NoAssignment, dwells: list[Dwell], export: InstrumentExport) -> _Assigned:
+    """What the places tell. Raises RecordingError where they do not."""
     if isinstance(result, NoAssignment):
         where = str(export.path)
         if result.point is not None and result.dwell is not None:

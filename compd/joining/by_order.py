@@ -11,75 +11,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray
+from compd.joining.assignment import (
+    CLEARLY_WORSE,
+    LIMIT_SIGMAS,
+    MOST_WITHOUT,
+    OTHER_SHARE,
+    Assignment,
+    NoAssignment,
+    repeat_distance_mm,
+    unit_hint,
+)
 from compd.joining.distances import distances_rms_mm, is_spread, largest_rms_mm, lay_over, separation_mm
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 
-# Points nearer than this are repeats at one place, where the uncertainty is not larger: six standard deviations of a
-# laser tracker's 8 um at a few metres. Also the least distance at which a point no longer belongs to a dwell.
-REPEAT_MM = 0.05
 # Points of one window: 28, 10 or 6 distances. Shorter ones are tried where gaps leave no longer part without one.
 _WINDOWS = (8, 5, 4)
 # Starts that are followed; repeats of one motion make as many equally good ones as there are cycles.
 _STARTS = 12
 _ROUNDS = 6
-# A point farther from its dwell than so many times the rms of the others does not belong to it.
-_LIMIT_SIGMAS = 6.0
-# Another assignment competes if it lacks no more dwells of points than are allowed, and if fewer than this share of its
-# pairs are the same; it must then be worse by the factor CLEARLY_WORSE, as clock offsets must.
-_OTHER = 0.9
-CLEARLY_WORSE = 2.0
 # Share of the points that a shift must leave a dwell to be compared.
 _MOST = 0.75
-# Share of the points, or one, that may be without a dwell.
-_MOST_WITHOUT = 0.05
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """Which dwell each of G points belongs to.
-
-    Attributes
-    ----------
-    dwell : (G,) number of the dwell from 0, -1 for none. rms_mm : of what the distances between the points differ by.
-    limit_mm : points farther from their dwell than this have none.
-    other : (G,) the dwell that each point fits next best, -1 for none.
-    unclear : (G,) points that would fit another dwell as well; they have none in what `assign_by_order` returns.
-    next_best : (by how many dwells all points are shifted, rms in mm), None where there is no other.
-    """
-
-    dwell: IntArray
-    rms_mm: float
-    limit_mm: float
-    other: IntArray
-    unclear: BoolArray
-    next_best: tuple[int, float] | None = None
-
-    @property
-    def count(self) -> int:
-        """Points with a dwell."""
-        return int((self.dwell >= 0).sum())
-
-
-@dataclass(frozen=True)
-class NoAssignment:
-    """Why there is none.
-
-    Attributes
-    ----------
-    why : as the `what` of a problem. value, allowed : likewise.
-    point, dwell : the first point that does not fit, and the dwell where it would be in order; None where not known.
-    """
-
-    why: str
-    value: str = ""
-    allowed: str = ""
-    point: int | None = None
-    dwell: int | None = None
 
 
 def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: float) -> Assignment | NoAssignment:
@@ -115,16 +71,10 @@ def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: 
             )
         rms_mm, i, j = starts[0]
         allowed_mm = largest_rms_mm(place[i : i + window])
-        best = f"{window} points in succession differ by {rms_mm:.3g} mm rms at best{_unit_hint(place, point)}"
+        best = f"{window} points in succession differ by {rms_mm:.3g} mm rms at best{unit_hint(place, point)}"
         what = "no order of the dwells has the distances between the points"
         refusals.append(result or NoAssignment(what, best, f"{allowed_mm:.3g} mm or less", int(group[j]), int(stop[i])))
     return refusals[0]
-
-
-def repeat_distance_mm(sigma_mm: float) -> float:
-    """Points nearer to each other are at one place: six standard deviations of the difference of two, REPEAT_MM or
-    more."""
-    return REPEAT_MM if np.isnan(sigma_mm) else max(REPEAT_MM, _LIMIT_SIGMAS * np.sqrt(2.0) * sigma_mm)
 
 
 def _collapsed(places_mm: FloatArray, near_mm: float) -> tuple[IntArray, FloatArray]:
@@ -163,7 +113,7 @@ def _grown(
     if not is_spread(p) or distances_rms_mm(p, q) > largest_rms_mm(p):
         return None
     dwell = np.full(len(measured_mm), -2)
-    limit_mm = max(_LIMIT_SIGMAS * distances_rms_mm(p, q), 4.0 * near_mm)
+    limit_mm = max(LIMIT_SIGMAS * distances_rms_mm(p, q), 4.0 * near_mm)
     for _ in range(_ROUNDS):
         motion = lay_over(q, p)
         residual_mm = np.linalg.norm(expected_mm[:, None, :] - motion(measured_mm)[None, :, :], axis=2)
@@ -177,7 +127,7 @@ def _grown(
             return None
         # the median, because points that do not belong there are among them
         typical_mm = float(np.median(residual_mm[dwell[points], points])) * 1.5
-        limit_mm = max(_LIMIT_SIGMAS * typical_mm, near_mm)
+        limit_mm = max(LIMIT_SIGMAS * typical_mm, near_mm)
     unclear = (dwell >= 0) & (match.margin < CLEAR_MARGIN)
     points = np.flatnonzero(dwell >= 0)
     if not is_spread(expected_mm[dwell[points]]):
@@ -200,11 +150,11 @@ def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: Floa
             f"{best.rms_mm:.3g} mm rms",
             f"{allowed_mm:.3g} mm or less",
         )
-    may_lack = max(1.0, _MOST_WITHOUT * len(best.dwell))
+    may_lack = max(1.0, MOST_WITHOUT * len(best.dwell))
     rivals = [
         each
         for each in ordered[1:]
-        if each.count >= best.count - may_lack and (each.dwell == best.dwell)[points].mean() < _OTHER
+        if each.count >= best.count - may_lack and (each.dwell == best.dwell)[points].mean() < OTHER_SHARE
     ]
     if best.unclear.sum() > may_lack:
         rivals.append(_with_other_dwells(best, expected_mm, measured_mm))
@@ -226,7 +176,7 @@ def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: Floa
         return NoAssignment(
             f"{len(without)} of {len(best.dwell)} points fit no dwell in order",
             f"{best.rms_mm:.3g} mm rms of the others",
-            f"one, or {_MOST_WITHOUT:.0%}",
+            f"one, or {MOST_WITHOUT:.0%}",
             first,
             int(before[-1]) + 1 if len(before) else 0,
         )
@@ -274,15 +224,3 @@ def _next_best(best: Assignment, expected_mm: FloatArray, measured_mm: FloatArra
         return None
     rms_mm, shift = min(results)
     return shift, rms_mm
-
-
-def _unit_hint(place: FloatArray, point: FloatArray) -> str:
-    """A remark where the instrument's steps are so many times the machine's as one unit is of another."""
-    steps = [float(np.median(np.abs(separation_mm(values[:-1], values[1:])))) for values in (place, point)]
-    ratio = steps[1] / max(steps[0], 1e-9)
-    for factor, told in ((25.4, "mm read as inches"), (1 / 25.4, "inches read as mm"), (1000.0, "mm read as m")):
-        if abs(ratio / factor - 1.0) < 0.1:
-            return f"; its steps are {ratio:.3g} times the machine's: {told}?"
-    if abs(ratio * 1000.0 - 1.0) < 0.1:
-        return f"; its steps are {ratio:.3g} times the machine's: m read as mm?"
-    return ""

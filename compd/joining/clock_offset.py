@@ -153,7 +153,7 @@ class _SharedMotion:
                 value=value,
                 allowed=allowed,
                 next_step="record with moves between dwells of different length, or give --offset S; join points at "
-                "rest --by order or --by name",
+                "rest --by order, name or distance",
             )
         )
 

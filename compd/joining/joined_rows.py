@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.instruments.export import ATTITUDE_AXES, LENGTH_AXES, InstrumentExport
-from compd.joining.by_order import REPEAT_MM
+from compd.joining.assignment import REPEAT_MM
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns
 from compd.recording.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column

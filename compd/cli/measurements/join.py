@@ -1,4 +1,4 @@
-"""`compd join`: a reference instrument's export beside the gauges, by time, by order or by name."""
+"""`compd join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
 
 from __future__ import annotations
 
@@ -73,7 +73,9 @@ def join(
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
     by: Annotated[
         ByChoice | None,
-        typer.Option(help="Put rows together by one clock; points at rest by their order, or by their names."),
+        typer.Option(
+            help="Put rows together by one clock; points at rest by their order, their names, or distances alone."
+        ),
     ] = None,
     machine: MachineOption = None,
     plan: Annotated[
@@ -96,7 +98,7 @@ def join(
     chosen = choose_by(by, exported)
     check_options(chosen, offset, moving, plan)
     if chosen != ByChoice.TIME:
-        join_points(gauges, exported, out, instrument, "order" if chosen == ByChoice.ORDER else "name", machine, plan)
+        join_points(gauges, exported, out, instrument, chosen.value, machine, plan)
         return
     recording = read_recording(gauges, needs_reference=False)
     track = track_of(exported)

@@ -79,6 +79,15 @@ def test_a_point_that_was_forgotten_and_one_beside_it_are_told(tmp_path: Path, t
     assert "line 9" in result.output
 
 
+def test_points_in_any_order_are_joined_by_their_distances(tmp_path: Path, tip_mm: FloatArray) -> None:
+    export = listed(tmp_path / "points.txt", tip_mm[::-1])
+    assert "--by distance" in refusal(join(export, "--unit", "mm"))
+    result = join(export, "--unit", "mm", "--by", "distance")
+    assert result.exit_code == 0, result.output
+    assert "joined by distance: 12 of 12 points" in result.output
+    assert "line 2: dwell 12" in result.output
+
+
 @pytest.mark.parametrize(
     "words", [("--by", "order", "--moving"), ("--by", "name", "--offset", "1"), ("--by", "order", "--plan", "p")]
 )

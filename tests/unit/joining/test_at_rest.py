@@ -134,6 +134,22 @@ def test_a_table_with_one_row_per_place_and_repeats_of_the_instrument(tmp_path: 
     assert recording.scale_mm == pytest.approx(np.repeat(measured.length_mm, 3, axis=0))
 
 
+def test_by_distance_in_any_order_and_without_names(tmp_path: Path) -> None:
+    """The dwells at machine zero are at one place, at the start and at the end: its point has no clear dwell."""
+    rng = np.random.default_rng(8)
+    measured = recorded_at_5_hz(tmp_path, rng)
+    order = rng.permutation(len(measured.tip_mm) - 1)
+    joined = measured.join(points(seen(rng, measured.tip_mm[order])), "distance")
+    zero_line = 2 + int(np.flatnonzero(order == 0)[0])
+    assert joined.left_out["points that fit two dwells alike"] == f"line {zero_line}"
+    assert joined.joined == 20
+    recording = read_recording(tmp_path / "joined.csv")
+    assert recording.reference_mm == pytest.approx(in_own_frame(measured.tip_mm[1:-1]), abs=6 * NOISE_MM)
+    assert recording.sidecar.provenance["join"]["by"] == "distance"
+    with pytest.raises(RecordingError, match="by time or by order"):
+        measured.join(points(measured.length_mm[:, :1]), "distance", link=1)
+
+
 @pytest.mark.parametrize("named", ["P{:03d}", "{}", "pt {}"])
 def test_by_name_in_any_order(tmp_path: Path, named: str) -> None:
     rng = np.random.default_rng(4)

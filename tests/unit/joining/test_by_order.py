@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.joining.by_order import Assignment, NoAssignment, assign_by_order
+from compd.joining.assignment import Assignment, NoAssignment
+from compd.joining.by_order import assign_by_order
 from compd.joining.distances import distances_rms_mm, is_spread, lay_over
 from tests.support.points_at_rest import in_own_frame
 
