@@ -88,6 +88,8 @@ def try_case(machine: InjectedMachine, case: Case) -> Outcome:
         _watch_fault(machine, case, outcome, watcher, start, start_s)
         during = watcher.seen[start:]
         end_s = time.monotonic()
+        if case.lost and not machine.daemon.ends():
+            outcome.problems.append("the daemon goes on without one of its processes")
         machine.repair()
         if not case.lost:
             _leave(machine, case, outcome, watcher, end_s)

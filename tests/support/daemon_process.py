@@ -104,6 +104,14 @@ class Daemon:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 
+    def ends(self) -> bool:
+        """Wait for the main process to end by itself; whether it did."""
+        try:
+            self.process.wait(STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
     @property
     def alive(self) -> bool:
         """Whether the main process runs."""
