@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import typer
 
@@ -73,16 +73,16 @@ def join_points(
     export: InstrumentExport,
     out: Path,
     instrument: Instrument,
-    by: By,
+    by: ByChoice,
     machine: Path | None,
     plan: Path | None,
 ) -> RestJoin:
-    """Join the recording `gauges` with the points, and print what was joined."""
+    """Join the recording `gauges` with points at rest, not by time, and print what was joined."""
     from compd.comparison.open import read_with_machine
     from compd.joining.at_rest import join_at_rest
 
     recording, configuration = read_with_machine(gauges, machine, needs_reference=False)
-    joined = join_at_rest(recording, configuration, export, out, instrument, by, plan)
+    joined = join_at_rest(recording, configuration, export, out, instrument, cast("By", by.value), plan)
     _report(joined)
     return joined
 

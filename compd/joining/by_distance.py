@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -30,9 +31,10 @@ from compd.joining.distances import Motion, distances_rms_mm, is_spread, largest
 
 # Fewer different points fit among many dwells by chance.
 LEAST_POINTS = 5
-# Points far apart from which triangles are made, and how many of these are tried: a few points may be at no dwell.
-_CORNERS = 6
-_TRIANGLES = 8
+# Points far apart from which triangles are made: some of them may be at no dwell.
+_CORNERS = 8
+# Triangles that must find the dwells of nearly all points; the others are then not tried.
+_WITNESSES = 2
 # Triangles of dwells that are followed for one of the points, those with the most similar sides first.
 _CANDIDATES = 4000
 _ROUNDS = 6
@@ -57,23 +59,19 @@ def assign_by_distance(
     place_of = _places(expected_mm, near_mm)
     place_mm = expected_mm[np.unique(place_of, return_index=True)[1]]
     different_mm = measured_mm[np.unique(_places(measured_mm, near_mm), return_index=True)[1]]
-    if in_M:
-        frames = [Motion(np.eye(3), np.zeros(3))]
-    elif min(len(place_mm), len(different_mm)) < LEAST_POINTS or not is_spread(different_mm):
+    few = min(len(place_mm), len(different_mm)) < LEAST_POINTS or not is_spread(different_mm)
+    if few and not in_M:
         return NoAssignment(
             "too few different places to tell by their distances",
             f"{len(place_mm)} of the machine, {len(different_mm)} of the instrument",
             f"{LEAST_POINTS} or more that are not on one line",
         )
+    if in_M:
+        results = _distinct([_grown(place_mm, measured_mm, Motion(np.eye(3), np.zeros(3)), near_mm, in_M)])
     else:
-        frames = _frames(place_mm, different_mm, 3.0 * largest_rms_mm(place_mm))
-    results = _distinct([_grown(place_mm, measured_mm, frame, near_mm, in_M) for frame in frames])
+        results = _found(place_mm, measured_mm, different_mm, near_mm)
     if not results:
-        mirrored = not in_M and any(
-            _grown(place_mm, -measured_mm, frame, near_mm, False) is not None
-            for frame in _frames(place_mm, -different_mm, 3.0 * largest_rms_mm(place_mm))
-        )
-        if mirrored:
+        if not in_M and _found(place_mm, -measured_mm, -different_mm, near_mm):
             return NoAssignment(
                 "the points are a mirror image of the dwells", "a left-handed frame", "x, y, z of a right-handed frame"
             )
@@ -96,33 +94,46 @@ def _places(values_mm: FloatArray, near_mm: float) -> IntArray:
     return number
 
 
-def _frames(place_mm: FloatArray, point_mm: FloatArray, tolerance_mm: float) -> list[Motion]:
-    """The motions that lay triangles of points over triangles of places whose sides are as long, to `tolerance_mm`."""
+def _found(place_mm: FloatArray, measured_mm: FloatArray, different_mm: FloatArray, near_mm: float) -> list[Assignment]:
+    """All assignments that grow from triangles of points, the best first."""
+    results: list[Assignment] = []
+    witnesses = 0
     between = np.linalg.norm(place_mm[:, None] - place_mm[None], axis=2)
-    frames = []
-    for corners in _triangles(point_mm):
-        a, b, c = corners
-        sides = [float(np.linalg.norm(p - q)) for p, q in ((a, b), (a, c), (b, c))]
-        first, second = np.nonzero(np.abs(between - sides[0]) <= tolerance_mm)
-        misfit = np.maximum(np.abs(between[first] - sides[1]), np.abs(between[second] - sides[2]))  # (pairs, places)
-        pair, third = np.nonzero(misfit <= tolerance_mm)
-        best = np.argsort(misfit[pair, third], kind="stable")[:_CANDIDATES]
-        for i, j, k in zip(first[pair[best]], second[pair[best]], third[best], strict=True):
-            frames.append(lay_over(corners, place_mm[[i, j, k]]))
-    return frames
+    for corners in _triangles(different_mm):
+        frames = _frames(corners, place_mm, between, 3.0 * largest_rms_mm(place_mm))
+        own = _distinct([_grown(place_mm, measured_mm, frame, near_mm, False) for frame in frames])
+        results += own
+        witnesses += bool(own) and own[0].count >= len(measured_mm) - _may_lack(len(measured_mm))
+        if witnesses == _WITNESSES:
+            break
+    return _distinct(results)
+
+
+def _frames(corners: FloatArray, place_mm: FloatArray, between_mm: FloatArray, tolerance_mm: float) -> list[Motion]:
+    """The motions that lay a triangle of points, (3, 3), over triangles of places whose sides are as long.
+
+    between_mm : (P, P) distances between the places. tolerance_mm : by which sides may differ.
+    """
+    a, b, c = corners
+    sides = [float(np.linalg.norm(p - q)) for p, q in ((a, b), (a, c), (b, c))]
+    first, second = np.nonzero(np.abs(between_mm - sides[0]) <= tolerance_mm)
+    misfit = np.maximum(np.abs(between_mm[first] - sides[1]), np.abs(between_mm[second] - sides[2]))  # (pairs, places)
+    pair, third = np.nonzero(misfit <= tolerance_mm)
+    best = np.argsort(misfit[pair, third], kind="stable")[:_CANDIDATES]
+    triangles = zip(first[pair[best]], second[pair[best]], third[best], strict=True)
+    return [lay_over(corners, place_mm[[i, j, k]]) for i, j, k in triangles]
 
 
 def _triangles(point_mm: FloatArray) -> list[FloatArray]:
-    """The largest triangles, (3, 3) each, of a few points that are far from each other."""
+    """Triangles, (3, 3) each, of a few points that are far from each other, the largest first."""
     chosen = [int(np.argmax(np.linalg.norm(point_mm - point_mm.mean(axis=0), axis=1)))]
     distance = np.linalg.norm(point_mm - point_mm[chosen[0]], axis=1)
     while len(chosen) < min(_CORNERS, len(point_mm)):
         chosen.append(int(distance.argmax()))
         distance = np.minimum(distance, np.linalg.norm(point_mm - point_mm[chosen[-1]], axis=1))
     corners = [point_mm[list(each)] for each in combinations(chosen, 3)]
-    areas = [float(np.linalg.norm(np.cross(b - a, c - a))) for a, b, c in corners]
-    largest = sorted(range(len(corners)), key=lambda number: -areas[number])[:_TRIANGLES]
-    return [corners[number] for number in largest if is_spread(corners[number])]
+    corners.sort(key=lambda points: -float(np.linalg.norm(np.cross(points[1] - points[0], points[2] - points[0]))))
+    return [each for each in corners if is_spread(each)]
 
 
 def _grown(
@@ -153,7 +164,12 @@ def _grown(
     return Assignment(dwell, rms_mm, limit_mm, np.where(unclear, now[:, 1], -1).astype(np.int64), unclear)
 
 
-def _distinct(results: list[Assignment | None]) -> list[Assignment]:
+def _may_lack(points: int) -> float:
+    """How many of so many points may be at no dwell."""
+    return max(1.0, MOST_WITHOUT * points)
+
+
+def _distinct(results: Sequence[Assignment | None]) -> list[Assignment]:
     """Different assignments, those with the most points first, then those with the most similar distances."""
     different = {tuple(result.dwell.tolist()): result for result in results if result is not None}
     return sorted(different.values(), key=lambda each: (-each.count, each.rms_mm))
@@ -163,7 +179,7 @@ def _decided(
     results: list[Assignment], place_mm: FloatArray, place_of: IntArray, measured_mm: FloatArray
 ) -> Assignment | NoAssignment:
     """The best assignment, with dwells in place of places, if it is clearly better than all others and right."""
-    may_lack = max(1.0, MOST_WITHOUT * len(measured_mm))
+    may_lack = _may_lack(len(measured_mm))
     best = min(results[: 1 + sum(each.count >= results[0].count - may_lack for each in results[1:])], key=_rms)
     with_place = best.dwell >= 0
     allowed_mm = largest_rms_mm(place_mm[best.dwell[with_place]])

@@ -98,7 +98,7 @@ def join(
     chosen = choose_by(by, exported)
     check_options(chosen, offset, moving, plan)
     if chosen != ByChoice.TIME:
-        join_points(gauges, exported, out, instrument, chosen.value, machine, plan)
+        join_points(gauges, exported, out, instrument, chosen, machine, plan)
         return
     recording = read_recording(gauges, needs_reference=False)
     track = track_of(exported)

@@ -85,7 +85,7 @@ def test_points_in_any_order_are_joined_by_their_distances(tmp_path: Path, tip_m
     result = join(export, "--unit", "mm", "--by", "distance")
     assert result.exit_code == 0, result.output
     assert "joined by distance: 12 of 12 points" in result.output
-    assert "line 2: dwell 12" in result.output
+    assert "line 1: dwell 12" in result.output
 
 
 @pytest.mark.parametrize(

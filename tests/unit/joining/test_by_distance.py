@@ -78,8 +78,8 @@ def test_symmetrical_places_are_refused() -> None:
     # in {M} nothing is ambiguous
     wanted = rng.permutation(len(square))
     assert assigned(square, square[wanted] + 0.01, in_M=True).dwell.tolist() == wanted.tolist()
-    # one more place on one side, and the frame is clear
-    marked = np.vstack([square, [[61.0, 17.0, 8.0]]])
+    # three more places on one side, and the frame is clear; one alone might be a point beside the machine
+    marked = np.vstack([square, [[61.0, 17.0, 8.0], [55.0, -20.0, 3.0], [70.0, 30.0, 20.0]]])
     wanted = rng.permutation(len(marked))
     assert assigned(marked, measured(rng, marked[wanted])).dwell.tolist() == wanted.tolist()
 
@@ -92,7 +92,7 @@ def test_symmetrical_places_are_refused() -> None:
         (lambda rng, place_mm: measured(rng, place_mm) / 25.4, "no choice of dwells"),
         (lambda rng, place_mm: measured(rng, place_mm[: LEAST_POINTS - 1]), "too few different places"),
         (lambda rng, place_mm: np.linspace(0, 1, 9)[:, None] * [10.0, 20.0, 30.0], "too few different places"),
-        (lambda rng, place_mm: np.vstack([measured(rng, place_mm[:20]), places(rng, 10)]), "at no dwell"),
+        (lambda rng, place_mm: np.vstack([measured(rng, place_mm[:20]), in_own_frame(places(rng, 10))]), "at no dwell"),
     ],
     ids=["others", "mirrored", "inches", "four", "line", "a third elsewhere"],
 )
