@@ -44,7 +44,7 @@ def split(campaign: Path, directory: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("by", ["order", "name"])
+@pytest.mark.parametrize("by", ["order", pytest.param("name", marks=pytest.mark.long)])
 @pytest.mark.parametrize("number", [NUMBERS[0], pytest.param(NUMBERS[1], marks=pytest.mark.long)])
 def test_found_as_in_the_campaigns_own_recording(tmp_path: Path, number: int, by: str) -> None:
     files = simulate_campaign("tripod-cmm", tmp_path / "campaign.csv", seed=number, hidden=number)

@@ -18,11 +18,11 @@ from compd.simulation.truth.instruments import BALLBAR_SIGMA_UM, POSE_SIGMA_URAD
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.measured import aligned, tripod
 
-KINDS: list[tuple[Kind, str]] = [
+KINDS = [
     ("ballbar", "tripod-cmm"),
-    ("ball", "tripod-cmm"),
+    pytest.param("ball", "tripod-cmm", marks=pytest.mark.long),
     ("pin", "tripod-cmm"),
-    ("pin", "hexapod"),
+    pytest.param("pin", "hexapod", marks=pytest.mark.long),
     ("pose", "hexapod"),
 ]
 
