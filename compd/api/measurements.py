@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,6 +15,7 @@ from compd.comparison.shape_search import search_constants
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, recorded_limits
 from compd.diagnosis.planning.next_measurement import plan_measurement as plan_fitted_rivals
+from compd.diagnosis.planning.tip_ways import plan_ways
 from compd.errors import CompdError, Problem
 from compd.model.library.effects_file import gather_effects, named_effect
 
@@ -123,7 +125,8 @@ def plan_measurement(
     for effect in others:
         fitted = search_constants(aligned, fitted, effect, sigma_um).fitted
     models = [search_constants(aligned, fitted, effect, sigma_um).fitted for effect in contending]
-    return plan_fitted_rivals(aligned, models[0][:-1], [model[-1] for model in models], sigma_um, given, rows)
+    plan = plan_fitted_rivals(aligned, models[0][:-1], [model[-1] for model in models], sigma_um, given, rows)
+    return plan if aligned.model is None else replace(plan, ways=plan_ways(aligned.model, plan.rows))
 
 
 def _plan_limits(

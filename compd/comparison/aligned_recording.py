@@ -10,29 +10,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import in_place_unit
-from compd.comparison.external_machine import external_change, external_observations, external_prediction
-from compd.comparison.registration import Registration, displacement_columns, register, registration_columns
-from compd.comparison.velocity import velocities
-from compd.configuration import Configuration
-from compd.errors import CompdError, Problem, RecordingError
-from compd.machine_builder import build_model
+from compd.comparison.external_machine import external_change, external_prediction
+from compd.comparison.fixed_ends import FixedEnds
+from compd.comparison.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.measured_attitude import MM_PER_RAD, attitude_mm, attitude_registration_columns, measured_attitude
+from compd.comparison.measured_attitude import UNIT as ATTITUDE_UNIT
+from compd.comparison.registration import (
+    Registration,
+    displacement_columns,
+    points_spread_mm,
+    registration_columns,
+)
+from compd.errors import CompdError
 from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
 from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
 from compd.model.effect_needs import unmet_needs
-from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
 from compd.model.machine import MachineModel
-from compd.model.motion import Movement
 from compd.model.observations import Observations
-from compd.model.observe import observe
 from compd.model.prediction import predict
 from compd.model.sensitivity import Sensitivity, sensitivities
 from compd.model.solve_status import MEANING, Reason
 from compd.recording.gaps import filled
 from compd.recording.recording import Recording, UsableRows
 from compd.tables import Columns, data_frame, html_table
-from compd.units import REFERENCE_UNITS
+from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +42,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlignedRecording:
-    """A recording with its machine: N rows with m measured coordinates each, x, y, z of the tip or lengths of links.
+    """A recording with its machine: N rows with m measured coordinates each.
+
+    These are x, y, z of the tip, with rx, ry, rz of the attitude where that was measured too; or lengths of links; or
+    the distance from a fixed ball.
 
     Attributes
     ----------
@@ -52,13 +57,16 @@ class AlignedRecording:
         What effects are computed from, for all N rows, also those that are not used: effects with memory need their
         history.
     labels : tuple of str
-        The m coordinates: ``"x"``, ``"y"``, ``"z"``, or ``"link 1"`` ...
+        The m coordinates: ``"x"``, ``"y"``, ``"z"``, ``"rx"`` ..., or ``"link 1"`` ..., or ``"distance"``.
     axes : tuple of int
-        The same as numbers: 0, 1, 2 for x, y, z; or the links, from 0.
+        The axes of the tip that are measured, 0, 1, 2 for x, y, z; all three of a distance; or the links, from 0.
     measured_mm : (N, m) array
-        The reference in {M}, or changes of link lengths, mm; nan where nothing was measured.
+        The reference in {M}, or changes of link lengths, or distances, mm; a urad of the attitude counts as a um. nan
+        where nothing was measured.
     registration : Registration or None
         How `measured_mm` came from the instrument's frame into {M}; None where it was measured there.
+    ends : FixedEnds or None
+        Of distances and pins the fixed balls or pins, whose places are always fitted along; None for others.
     geometry_hash : str
         Of the configuration that the model was built from; ``""`` for ``machine: external``.
     """
@@ -71,6 +79,7 @@ class AlignedRecording:
     measured_mm: FloatArray
     registration: Registration | None
     geometry_hash: str = ""
+    ends: FixedEnds | None = None
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property
@@ -84,8 +93,32 @@ class AlignedRecording:
         return self.recording.reference_link_mm is not None
 
     @property
+    def of_distance(self) -> bool:
+        """Whether the distance from fixed balls was measured."""
+        return self.ends is not None and self.ends.of_lengths
+
+    @property
+    def with_attitude(self) -> bool:
+        """Whether the attitude is among the measured coordinates, as the last three of them."""
+        return self.labels[-len(ATTITUDE_LABELS) :] == ATTITUDE_LABELS
+
+    @property
+    def shows_tip(self) -> bool:
+        """Whether all three coordinates of the tip are measured; they are the first three then."""
+        return self.labels[:3] == ("x", "y", "z")
+
+    @property
+    def lengths(self) -> slice:
+        """The measured coordinates that are in `unit`: all but those of the attitude."""
+        return slice(len(self.labels) - 3 * self.with_attitude)
+
+    def unit_of(self, label: str) -> str:
+        """The unit in which people read the residual of a coordinate."""
+        return ATTITUDE_UNIT if label in ATTITUDE_LABELS else self.unit
+
+    @property
     def registered(self) -> bool:
-        """Whether the parameters of the instrument's frame are always fitted along."""
+        """Whether the parameters of the instrument's frame, or the places of fixed ends, are always fitted along."""
         reference = self.recording.reference
         return reference is not None and reference.frame == "instrument" and not self.of_links
 
@@ -97,11 +130,41 @@ class AlignedRecording:
         rows = self.rows if rows is None else rows
         if self.model is None:
             predicted = external_prediction(self.recording)
-            return predicted + external_change(added, self.axes, self.of_links) if added else predicted
+            predicted = predicted + external_change(added, self.axes, self.of_links) if added else predicted
+            return self._from_ends(predicted)
         prediction = predict(self.model, rows, added)
         if self.of_links:
             return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
-        return prediction.tip_mm[:, list(self.axes)]
+        shown = self._from_ends(prediction.tip_mm[:, list(self.axes)])
+        if self.with_attitude:
+            return np.concatenate([shown, attitude_mm(prediction.rotation_M_P, rows.rotation_M_P)], axis=1)
+        return shown
+
+    def _from_ends(self, tip_mm: FloatArray) -> FloatArray:
+        """(N, m) what is measured of the tip (N, axes): its distance from the row's fixed ball, or the tip itself."""
+        return self.ends.lengths_mm(tip_mm) if self.ends is not None and self.ends.of_lengths else tip_mm
+
+    @cached_property
+    def nominal_tip_mm(self) -> FloatArray:
+        """(N, 3) the tip that is predicted without effects, in the frame in which the reference shows it."""
+        if self.model is None:
+            return self.rows.tip_M_mm
+        return predict(self.model, self.rows, {}).tip_mm
+
+    def shown(self, sensitivity: Sensitivity) -> FloatArray:
+        """(N, m, size) the measured coordinates' share of a prediction's derivatives."""
+        if self.of_links:
+            return sensitivity.link_length[:, list(self.axes)]
+        shown = self.along_ends(sensitivity.tip[:, list(self.axes)])
+        if self.with_attitude:
+            return np.concatenate([shown, sensitivity.rotation * MM_PER_RAD], axis=1)
+        return shown
+
+    def along_ends(self, change: FloatArray) -> FloatArray:
+        """(N, m, size) changes of the tip (N, axes, size) along what is measured: of a distance from the fixed ball."""
+        if self.ends is None or not self.ends.of_lengths:
+            return change
+        return np.asarray(self.ends.directions(self.nominal_tip_mm) @ change)
 
     def sensitivity(self, ports: Collection[Port]) -> Mapping[Port, Sensitivity]:
         """Derivatives of the prediction by what is added at `ports`; each is computed once."""
@@ -119,21 +182,24 @@ class AlignedRecording:
         """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
         added = split_by_port(effect, self.rows, basis)
         if self.model is None:
-            return external_change(added, self.axes, self.of_links)
+            return self.along_ends(external_change(added, self.axes, self.of_links))
         by_port = self.sensitivity(effect.ports)
-        changes = [
-            (by_port[port].link_length if self.of_links else by_port[port].tip)[:, list(self.axes)] @ values
-            for port, values in added.items()
-        ]
+        changes = [self.shown(by_port[port]) @ values for port, values in added.items()]
         return np.asarray(sum(changes[1:], start=changes[0]))
 
     @cached_property
     def registration_columns(self) -> FloatArray:
         """(N, m, Q) derivatives (mm) of what is always fitted along; none of a machine's own frame, Q = 0.
 
-        Of an instrument's frame its small motion; of an external model a constant of each coordinate, because where
-        its zero lies says nothing about the machine.
+        Of an instrument's frame its small motion; of fixed ends their places; of an external model a constant of each
+        coordinate, because where its zero lies says nothing about the machine.
         """
+        if self.ends is not None:
+            return self.ends.columns(self.nominal_tip_mm)
+        if self.registered and self.with_attitude:
+            tip_M_mm = self.rows.tip_M_mm
+            of_tip, spread_mm = registration_columns(tip_M_mm, self.axes), points_spread_mm(tip_M_mm)
+            return attitude_registration_columns(of_tip, self.rows.rotation_M_P, spread_mm)
         if self.registered:
             return registration_columns(self.rows.tip_M_mm, self.axes)
         if self.model is None:
@@ -224,78 +290,14 @@ class AlignedRecording:
         measured = self.recording.reference_rotation_rad
         if measured is None or self.model is None:
             return None
-        attitude = rotation_matrix(measured)
-        if self.registration is not None:
-            attitude = compose(self.registration.rotation, attitude)
-        modelled = predict(self.model, self.rows, added).rotation_M_P
-        return np.asarray(rotation_vector(compose(attitude, modelled.transpose(0, 2, 1)))) * 1e6
+        attitude = measured_attitude(measured, self.rows.rotation_M_P, self.registration)
+        return attitude_mm(attitude, predict(self.model, self.rows, added).rotation_M_P) * UM_PER_MM
 
     def _why_no_pose(self, rows: BoolArray) -> str:
         if self.model is None:
             return "the model's prediction is empty"
         reasons = predict(self.model, self.rows, {}).reason[rows]
         return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
-
-
-def align_recording(
-    recording: Recording,
-    configuration: Configuration | None,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
-) -> AlignedRecording:
-    """A recording on the machine that the configuration describes; None only for an external model.
-
-    Raises RecordingError where there is no reference, or where nothing can be computed from any row.
-    """
-    where = str(recording.path)
-    if recording.reference is None:
-        raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
-    starts = _session_starts(recording)
-    if configuration is None:
-        model, geometry_hash = None, ""
-        observations = external_observations(recording, starts)
-    else:
-        model = build_model(configuration.geometry, configuration.wiring)
-        geometry_hash = configuration.geometry_hash
-        observations = _observations(recording, model, starts)
-    if recording.reference_link_mm is not None:
-        labels = tuple(f"link {i}" for i in recording.reference_links)
-        links = tuple(i - 1 for i in recording.reference_links)
-        return AlignedRecording(
-            recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
-        )
-    measured_mm = recording.reference_mm
-    if measured_mm is None:
-        raise RecordingError(Problem(where=where, what="has no column of the reference"))
-    axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
-    registration = None
-    if recording.reference.frame == "instrument":
-        registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
-    return AlignedRecording(
-        recording, model, observations, recording.reference_axes, axes, measured_mm, registration, geometry_hash
-    )
-
-
-def _registered(
-    recording: Recording,
-    measured_mm: FloatArray,
-    tip_M_mm: FloatArray,
-    axes: tuple[int, ...],
-    criteria: ComparisonCriteria,
-) -> tuple[Registration | None, FloatArray]:
-    """How the instrument's frame lies in {M}, and what was measured (N, m), in {M}; None where nothing fixes it.
-
-    Points in the plane z = 0 are turned in it. Along fewer axes, or of a point of which the third coordinate matters,
-    no frame can be laid over another: it must lie near already.
-    """
-    in_plane = axes == (0, 1) and not np.isfinite(tip_M_mm[:, 2]).any()
-    if len(axes) < 3 and not in_plane:
-        return None, measured_mm
-    points, predicted = np.zeros((len(measured_mm), 3)), np.zeros((len(measured_mm), 3))
-    points[:, list(axes)], predicted[:, list(axes)] = measured_mm, tip_M_mm[:, list(axes)]
-    registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
-    if registration is not None:
-        measured_mm = registration.into_M(points)[:, list(axes)]
-    return registration, measured_mm
 
 
 def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
@@ -308,49 +310,3 @@ def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[d
         raise CompdError(problems)
     by_effect, _ = deltas_by_effect(fitted, rows, {})
     return by_effect, sum_deltas(list(by_effect.values()))
-
-
-def _observations(recording: Recording, model: MachineModel, starts: BoolArray) -> Observations:
-    """Every row of the recording, as effects take it; comparators that were not recorded count as unmoved.
-
-    starts : (N,) rows without a history.
-    """
-    assert model.constants is not None
-    count = recording.rows
-    scale_mm = recording.scale_mm
-    if scale_mm is None:
-        raise RecordingError(
-            Problem(
-                where=str(recording.path),
-                what="has no scale columns",
-                allowed="scale_1_mm ...",
-                next_step="a machine's recording needs its scales; `machine: external` needs none",
-            )
-        )
-    comparators = model.joint_weights.shape[1]
-    joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
-    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
-    approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
-    at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
-    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm)
-    movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
-    return observe(
-        model,
-        model.constants,
-        scale_mm=scale_mm,
-        joint_mm=joint_mm,
-        frame_mm=frame_mm,
-        quantities=recording.quantities,
-        time_s=recording.time_s,
-        session_start=starts,
-        movement=movement,
-    )
-
-
-def _session_starts(recording: Recording) -> BoolArray:
-    """(N,) rows without a history: the first of each session."""
-    starts = np.zeros(recording.rows, dtype=bool)
-    starts[:1] = True
-    if recording.session is not None:
-        starts[1:] = recording.session[1:] != recording.session[:-1]
-    return starts

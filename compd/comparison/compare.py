@@ -12,6 +12,7 @@ from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.comparison import NO_QUANTITY, Comparison
 from compd.comparison.contributions import contributions
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.measured_attitude import MM_PER_RAD
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
 from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
@@ -54,16 +55,17 @@ def compare(
         residual_um,
         used,
         aligned.recording.visit,
-        aligned.recording.reference_sigma_mm * UM_PER_MM,
+        _declared_um(aligned),
         np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
         _last_digit_um(aligned),
         _orders(aligned),
         criteria,
         aligned.unit,
+        angles=3 if aligned.with_attitude else 0,
     )
     links_um = None
-    if aligned.model is not None and not aligned.of_links and len(aligned.axes) == 3:
-        links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um))
+    if aligned.model is not None and aligned.shows_tip:
+        links_um = link_residuals(aligned.sensitivity(["link"])["link"], np.nan_to_num(residual_um[:, :3]))
         links_um[~known] = np.nan
     return Comparison(
         aligned=aligned,
@@ -144,7 +146,8 @@ def _uncertainty(
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
         return None, first_order_uncertainty(aligned, None, fitted, covariance)
-    gauges = gauge_noise(aligned)
+    # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
+    gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
     if repeats is not None:
@@ -157,12 +160,27 @@ def _uncertainty(
 
 
 def _last_digit_um(aligned: AlignedRecording) -> FloatArray:
-    """(m,) uncertainty of the last digit of the reference as recorded; 0 of a ball plate, which is calibrated."""
+    """(m,) uncertainty of the last digit of the reference as recorded; 0 of a ball plate, which is calibrated, and of
+    pins, of which nothing is read."""
     recording = aligned.recording
     recorded_mm = recording.reference_link_mm if aligned.of_links else recording.reference_mm
+    if aligned.of_distance and recording.reference_distance_mm is not None:
+        recorded_mm = recording.reference_distance_mm[:, None]
     if recorded_mm is None or recording.plate is not None:
         return np.zeros(len(aligned.labels))
-    return last_digit_um(recorded_mm * UM_PER_MM)
+    digits_um = last_digit_um(recorded_mm * UM_PER_MM)
+    if aligned.with_attitude and recording.reference_rotation_rad is not None:
+        return np.append(digits_um, last_digit_um(recording.reference_rotation_rad * MM_PER_RAD * UM_PER_MM))
+    return digits_um
+
+
+def _declared_um(aligned: AlignedRecording) -> FloatArray:
+    """(m,) declared standard uncertainty of the reference; nan where nobody declared it."""
+    recording = aligned.recording
+    declared_um = recording.reference_sigma_mm * UM_PER_MM
+    if aligned.with_attitude and recording.reference is not None:
+        return np.append(declared_um, np.full(3, recording.reference.sigma_urad))
+    return declared_um
 
 
 def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:

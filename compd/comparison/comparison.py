@@ -16,6 +16,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.contributions import Contribution
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error, residual_ending
+from compd.comparison.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
@@ -98,19 +99,33 @@ class Comparison:
 
     @property
     def rms_um(self) -> float:
-        """Root mean square per coordinate, over rows and axes."""
-        return rms(self.rms_by_axis_um)
+        """Root mean square per coordinate, over rows and axes that are lengths; `attitude_rms_urad` is apart."""
+        return rms(self.rms_by_axis_um[self.aligned.lengths])
+
+    @property
+    def attitude_rms_urad(self) -> float:
+        """Root mean square per axis of the attitude over the rows used, urad; nan where none was measured."""
+        if self.attitude_residual_urad is None:
+            return math.nan
+        if self.aligned.with_attitude:
+            return rms(self.rms_by_axis_um[-3:])
+        return float(np.sqrt(np.nanmean(self.attitude_residual_urad[self.used] ** 2)))
 
     @cached_property
     def distance_um(self) -> FloatArray:
-        """(N,) length of the residual vector; of link lengths, the largest absolute residual."""
+        """(N,) length of the residual vector of the tip; of link lengths, the largest absolute residual."""
         if self.aligned.of_links:
             return np.asarray(np.abs(self.residual_um).max(axis=1))
-        return np.asarray(np.linalg.norm(self.residual_um, axis=1))
+        return np.asarray(np.linalg.norm(self.residual_um[:, self.aligned.lengths], axis=1))
 
     @property
     def floor_ratio(self) -> float:
-        """(rms / floor)^2, which is the reduced chi-squared; 1 at the noise floor, inf where the floor is 0."""
+        """(rms / floor)^2, which is the reduced chi-squared; 1 at the noise floor, inf where the floor is 0.
+
+        Of an attitude beside lengths the mean over the coordinates, each against its own floor.
+        """
+        if self.aligned.with_attitude and (self.floor.by_axis_um > 0).all():
+            return float(np.mean((self.rms_by_axis_um / self.floor.by_axis_um) ** 2))
         return (self.rms_um / self.floor.um) ** 2 if self.floor.um > 0 else math.inf
 
     @property
@@ -131,6 +146,9 @@ class Comparison:
         """The result in a sentence or two, for a person at the machine."""
         unit = self.aligned.unit
         error, noise = format_error(self.rms_um, unit, 3), format_error(self.floor.um, unit, 3)
+        if self.aligned.with_attitude:
+            error = f"{error} and {format_error(self.attitude_rms_urad, ATTITUDE_UNIT, 3)}"
+            noise = f"{noise} and {format_error(rms(self.floor.by_axis_um[-3:]), ATTITUDE_UNIT, 3)}"
         who = f"{self.aligned.recording.machine}: measured and modelled differ by {error} (rms per coordinate)"
         if not self.floor.known:
             return (
@@ -240,9 +258,9 @@ class Comparison:
             "outlier_rows": recording.row[self.outlier].tolist(),
             "contributions": {source: part._asdict() for source, part in self.contributions.items()},
             "prediction_std_um": {
-                "total": rms(self.uncertainty.total_um[self.used]),
-                "gauges": rms(self.uncertainty.gauges_um[self.used]),
-                "parameters": rms(self.uncertainty.parameters_um[self.used]),
+                "total": rms(self.uncertainty.total_um[self.used][:, self.aligned.lengths]),
+                "gauges": rms(self.uncertainty.gauges_um[self.used][:, self.aligned.lengths]),
+                "parameters": rms(self.uncertainty.parameters_um[self.used][:, self.aligned.lengths]),
                 "how": "no gauges of its own" if self.gauges is None else self.gauges.how,
             },
             "where_it_fails": [trend.as_json() for trend in self.trends],
@@ -251,8 +269,8 @@ class Comparison:
         if self.aligned.registered:
             report["registration"] = self._registration()
         if self.attitude_residual_urad is not None:
-            attitude_urad = self.attitude_residual_urad[self.used]
-            report["attitude_rms_urad"] = float(np.sqrt(np.nanmean(attitude_urad**2)))
+            report["attitude_rms_urad"] = self.attitude_rms_urad
+            report["attitude_counts"] = self.aligned.with_attitude
         finite: dict[str, Any] = nan_to_null(report)
         return finite
 
@@ -264,11 +282,18 @@ class Comparison:
         return {OUTLIER: count} if count else {}
 
     def _registration(self) -> dict[str, Any]:
-        registration = self.aligned.registration
+        registration, ends = self.aligned.registration, self.aligned.ends
+        if ends is not None:
+            return {
+                "how": "the places of the fixed ends, laid over the prediction and fitted along",
+                "parameters": ends.parameters,
+                "places_mm": dict(zip(ends.name, ends.place_mm.tolist(), strict=True)),
+            }
         if registration is None:
             return {"how": "displacements and small rotations fitted along"}
         return {
-            "how": "laid over the prediction, six parameters fitted along",
+            "how": "laid over the prediction, six parameters fitted along"
+            + (", and three of the target's turn on the platform" if self.aligned.with_attitude else ""),
             "translation_mm": registration.translation_mm.tolist(),
             "rotation": registration.rotation.tolist(),
         }

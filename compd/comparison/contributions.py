@@ -47,5 +47,6 @@ def contributions(
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
         others = [effect for effect in fitted if effect.effect.id != name]
         residual_um = residual_um - fit_along(aligned, others, residual_um, rows).total_um
-        result[name] = Contribution(rms(((predicted_mm - without_mm) * UM_PER_MM)[rows]), rms(residual_um[rows]))
+        moved_um = ((predicted_mm - without_mm) * UM_PER_MM)[rows][:, aligned.lengths]
+        result[name] = Contribution(rms(moved_um), rms(residual_um[rows][:, aligned.lengths]))
     return result

@@ -17,7 +17,7 @@ Sources: N. R. Draper, H. Smith, Applied Regression Analysis, Wiley 1998, sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ class NoiseFloor:
     by_axis_um : (m,) per coordinate.  source : where it is from.  how : the same in a sentence.
     dof : degrees of freedom, over all coordinates; inf for a declaration that nothing tests.
     contradiction : a remark where repeats and the declaration are far apart; "" where they are not.
+    angles : how many of the coordinates, the last ones, are an attitude's, in urad.
     """
 
     by_axis_um: FloatArray
@@ -51,11 +52,12 @@ class NoiseFloor:
     how: str
     dof: float
     contradiction: str = ""
+    angles: int = 0
 
     @property
     def um(self) -> float:
-        """Root mean square over the coordinates."""
-        return rms(self.by_axis_um)
+        """Root mean square over the coordinates that are lengths."""
+        return rms(self.by_axis_um[: len(self.by_axis_um) - self.angles])
 
     @property
     def known(self) -> bool:
@@ -94,6 +96,7 @@ def noise_floor(
     orders: tuple[FloatArray, ...],
     criteria: ComparisonCriteria = ComparisonCriteria(),
     unit: str = "um",
+    angles: int = 0,
 ) -> NoiseFloor:
     """The noise floor from repeats; else from what is declared; else an estimate.
 
@@ -102,20 +105,52 @@ def noise_floor(
     gauges_um : (m,) the gauges' noise at the tip, nan where unknown (then left out).
     digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
     orders : quantities (N,) by which rows are sorted for an estimate.
-    unit : in which people read the residual, in place of um.
+    unit : in which people read the residual, in place of um.  angles : how many of the coordinates, the last ones, are
+        an attitude's, in urad.
     """
+    return replace(
+        _noise_floor(residual_um, use, visit, declared_um, gauges_um, digit_um, orders, criteria, _Units(unit, angles)),
+        angles=angles,
+    )
+
+
+class _Units(NamedTuple):
+    """The unit of the coordinates but for the last `angles` ones, which are in urad."""
+
+    unit: str
+    angles: int
+
+    def text(self, by_axis: FloatArray) -> str:
+        """Root mean square of values (m,) by their units, for people: "0.16 um and 2.0 urad"."""
+        lengths = len(by_axis) - self.angles
+        length = format_error(rms(by_axis[:lengths]), self.unit, 3)
+        return f"{length} and {format_error(rms(by_axis[lengths:]), 'urad', 3)}" if self.angles else length
+
+
+def _noise_floor(
+    residual_um: FloatArray,
+    use: BoolArray,
+    visit: IntArray | None,
+    declared_um: FloatArray,
+    gauges_um: FloatArray,
+    digit_um: FloatArray,
+    orders: tuple[FloatArray, ...],
+    criteria: ComparisonCriteria,
+    units: _Units,
+) -> NoiseFloor:
+    """As `noise_floor`."""
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
     is_declared = bool(np.isfinite(declared_um).all())
     scatter = repeat_scatter(residual_um, use, visit)
     if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
         scatter = scatter._replace(by_axis_um=np.maximum(scatter.by_axis_um, digit_um))
         if (scatter.by_axis_um > 0).all():
-            return _from_repeats(scatter, expected_um if is_declared else None, criteria, unit)
+            return _from_repeats(scatter, expected_um if is_declared else None, criteria, units)
     no_repeats = _why_no_repeats(scatter, criteria)
     if is_declared:
-        declared = f"the reference's {format_error(rms(declared_um), unit, 3)}"
+        declared = f"the reference's {units.text(declared_um)}"
         if not np.isnan(gauges_um).any():
-            declared += f" with the gauges' {format_error(rms(gauges_um), unit, 3)} at the tip"
+            declared += f" with the gauges' {units.text(gauges_um)} at the tip"
         how = f"declared: {declared}; {no_repeats}, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
     return _from_differences(residual_um[use], tuple(order[use] for order in orders), no_repeats)
@@ -131,7 +166,7 @@ def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> st
 
 
 def _from_repeats(
-    scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, unit: str
+    scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, units: _Units
 ) -> NoiseFloor:
     """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom.
 
@@ -139,15 +174,15 @@ def _from_repeats(
     """
     axes = len(scatter.by_axis_um)
     dof = scatter.dof * axes
-    scattered = format_error(rms(scatter.by_axis_um), unit, 3)
+    scattered = units.text(scatter.by_axis_um)
     how = f"repeats of one visit scatter by {scattered} ({scatter.pairs} pairs of rows)"
     if expected_um is None:
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
-    declared = f"declared noise of {format_error(rms(expected_um), unit, 3)}"
+    declared = f"declared noise of {units.text(expected_um)}"
     ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
     below = float(fdtr(dof, criteria.declared_dof * axes, ratio))
     if min(below, 1 - below) < criteria.contradiction_p_value / 2:
-        remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio, sigma_key(unit))
+        remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio, sigma_key(units.unit))
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)
     pooled_dof = scatter.dof + criteria.declared_dof
     variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof

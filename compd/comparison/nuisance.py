@@ -15,7 +15,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
 from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
-from compd.comparison.statistics.robust import robust_regression
+from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
 from compd.model.effect import FittedEffect
 from compd.units import UM_PER_MM
 
@@ -73,6 +73,8 @@ def fit_along(
     G = nuisance_columns(aligned, effects)
     if not G.shape[2] or not use.any():
         return FittedAlong(none, none)
-    theta = robust_regression(G[use], residual_um[use])
+    # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
+    size_um = np.maximum(trimmed_scale(residual_um[use]), LEAST_SIGMA) if aligned.with_attitude else np.ones(1)
+    theta = robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um)
     count = aligned.registration_columns.shape[2]
     return FittedAlong(G[:, :, :count] @ theta[:count], G[:, :, count:] @ theta[count:])

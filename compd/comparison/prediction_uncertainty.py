@@ -66,7 +66,7 @@ def first_order_uncertainty(
         assert aligned.model is not None
         middle_mm = aligned.model.zero.distances_mm + np.nanmedian(aligned.rows.frame_mm, axis=0)
         by_port = {
-            port: (sensitivity.link_length if aligned.of_links else sensitivity.tip)[:, list(aligned.axes)]
+            port: aligned.shown(sensitivity)
             for port, sensitivity in aligned.sensitivity(["scale", "joint", "base_joint"]).items()
         }
         by_port["frame"] = by_port["base_joint"] @ base_joints_by_distances(aligned.model, middle_mm[None])[0]
@@ -98,7 +98,7 @@ def monte_carlo(
     bases = [effect.effect.basis(aligned.rows, effect.constants, None)[0][index] for effect in fitted]
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in fitted)])
     root = _covariance_root(covariance)
-    predicted = np.empty((trials, len(index), len(aligned.axes)))
+    predicted = np.empty((trials, len(index), len(aligned.labels)))
     for trial in range(trials):
         numbers = theta + root @ rng.standard_normal(len(theta))
         added: list[Deltas] = [

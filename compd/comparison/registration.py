@@ -98,7 +98,7 @@ def registration_columns(tip_M_mm: FloatArray, axes: Sequence[int]) -> FloatArra
     if not known.any() or not rows.any():
         return np.stack(columns, axis=2)
     lever_mm = tip_M_mm - tip_M_mm[rows].mean(axis=0)
-    spread_mm = max(float(np.sqrt(np.mean(lever_mm[rows][:, known] ** 2))), LEAST_SPREAD_MM)
+    spread_mm = points_spread_mm(tip_M_mm)
     for about in range(3):
         first, second = (about + 1) % 3, (about + 2) % 3
         # phi e_about x lever: the first axis moves by minus the second's lever, the second by the first's
@@ -109,6 +109,13 @@ def registration_columns(tip_M_mm: FloatArray, axes: Sequence[int]) -> FloatArra
                 column[:, list(axes).index(axis)] = sign * lever_mm[:, lever] / spread_mm
             columns.append(column)
     return np.stack(columns, axis=2)
+
+
+def points_spread_mm(tip_M_mm: FloatArray) -> float:
+    """Root mean square of the coordinates of points (N, 3) from their centroid, along the axes that are known."""
+    known: BoolArray = np.asarray(np.isfinite(tip_M_mm).any(axis=0))
+    points_mm = tip_M_mm[:, known][np.isfinite(tip_M_mm[:, known]).all(axis=1)]
+    return max(float(np.sqrt(np.mean((points_mm - points_mm.mean(axis=0)) ** 2))), LEAST_SPREAD_MM)
 
 
 def displacement_columns(rows: int, coordinates: int) -> FloatArray:

@@ -113,7 +113,7 @@ def find_trends(
     coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(aligned.labels)]
     if links_um is not None:
         # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
-        ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used]), 1e-12)
+        ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used][:, aligned.lengths]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
     time_s = aligned.recording.time_s
     all_covariates = [covariate._replace(values=filled(covariate.values, time_s)) for covariate in covariates(aligned)]
@@ -125,10 +125,12 @@ def find_trends(
             continue
         link = int(label.removeprefix("link ")) if label.startswith("link") else 0
         candidates = [covariate for covariate in all_covariates if not link or covariate.link in (0, link)]
-        largest_at = _largest_at(aligned, values, used, criteria.location_ratio)
+        largest_at = _largest_at(aligned, values, used, criteria.location_ratio, aligned.unit_of(label))
         trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at, criteria)
     trends.sort(key=lambda pair: -pair[0])
-    return _without_weaker_links([replace(trend, residual_unit=aligned.unit) for _, trend in trends])
+    return _without_weaker_links(
+        [replace(trend, residual_unit=aligned.unit_of(trend.coordinate)) for _, trend in trends]
+    )
 
 
 def _thinned(used: BoolArray) -> BoolArray:
@@ -245,7 +247,7 @@ def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> flo
     return float(abs(np.corrcoef(a, b)[0, 1]))
 
 
-def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, least_ratio: float) -> str:
+def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, least_ratio: float, unit: str) -> str:
     """The third of the workspace, or of the recording, in which the error is much larger than in the opposite third."""
     largest, text = least_ratio, ""
     places = {"time": aligned.recording.time_s}
@@ -260,6 +262,6 @@ def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, 
             ratio = rms_um[end] / max(rms_um[other], 1e-12)
             if ratio > largest:
                 largest = ratio
-                here, there = (format_error(rms_um[k], aligned.unit) for k in (end, other))
+                here, there = (format_error(rms_um[k], unit) for k in (end, other))
                 text = f"{ENDS[name][end]} ({here} rms, {there} at the other end)"
     return text

@@ -33,6 +33,7 @@ def thinned(aligned: AlignedRecording, most_rows: int) -> AlignedRecording:
         recording=recording,
         rows=replace(rows, session_start=starts),
         measured_mm=aligned.measured_mm[index],
+        ends=None if aligned.ends is None else aligned.ends.select(index),
         _by_port={},
     )
 

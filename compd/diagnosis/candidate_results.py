@@ -28,10 +28,18 @@ def candidate_results(
     names = dict.fromkeys(candidate.name for candidate in losses.candidates if candidate.kind == "effect")
     why = "acts in one session or sector only: what it does there predicts no other"
     results += [CandidateResult(name, "not_testable", why) for name in names if name not in losses.best_variants]
-    why = "makes nothing on these rows but a constant, which is fitted along"
+    why = why_nothing_else(problem)
     results += [CandidateResult(candidate.name, "not_testable", why) for candidate in problem.same_as_nuisance]
     results += [CandidateResult(name, "not_testable", reason) for name, reason in problem.pool.untestable.items()]
     return tuple(results)
+
+
+def why_nothing_else(problem: DiagnosisProblem) -> str:
+    """Why effects cannot be seen that do nothing but what is fitted along in any case."""
+    if (ends := problem.aligned.ends) is None:
+        return "makes nothing on these rows but a constant, which is fitted along"
+    fixed = "fixed balls" if ends.of_lengths else "pins"
+    return f"makes nothing on these rows but a shift of the {fixed}, which is fitted along"
 
 
 def explained_fraction(before: float, after: float, floor: float) -> float:

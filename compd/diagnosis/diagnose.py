@@ -13,7 +13,7 @@ from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
-from compd.diagnosis.candidate_results import candidate_results, explained_fraction
+from compd.diagnosis.candidate_results import candidate_results, explained_fraction, why_nothing_else
 from compd.diagnosis.candidates.candidates import library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
@@ -238,5 +238,8 @@ def _untested(
     """Effects that cannot be tried, first those that may be what was found: by a proxy, or as a rival."""
     likely = {explanation.losses.candidates[k].effect.id for k in explanation.proxies}
     likely |= {rival.name for step in steps for rival in step.rivals}
-    untested = [UntestedEffect(name, why, name in likely) for name, why in problem.pool.untestable.items()]
+    reasons = dict(problem.pool.untestable)
+    if problem.aligned.ends is not None:
+        reasons |= {candidate.effect.id: why_nothing_else(problem) for candidate in problem.same_as_nuisance}
+    untested = [UntestedEffect(name, why, name in likely) for name, why in reasons.items()]
     return tuple(sorted(untested, key=lambda effect: not effect.likely))

@@ -4,7 +4,9 @@ A recording that breaks a rule is refused:
 
 - `time_s` is different in every row; a row without it is left out. Rows in another order than that of time are taken in
   that order, with a warning, unless sessions would get mixed: then the clock began again.
-- `session`, `visit`, `point` and `ball` are whole numbers from 0; `point` may be text.
+- `session`, `visit`, `point`, `ball` and `pin` are whole numbers from 0; `point`, `pin` and, with a distance, `ball`
+  may be text.
+- `reference_distance_mm` is greater than 0.
 - `approach_<i>` is 1 or -1, or empty where it is not known.
 - At least two rows have all that is needed: the gauges, and a value of the reference.
 
@@ -21,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.recording.columns import ID_COLUMNS
+from compd.recording.columns import DISTANCE_COLUMN, ID_COLUMNS
 from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList, rows_text, values_text
 
@@ -67,7 +69,7 @@ LIMITS: tuple[Limit, ...] = tuple(
         ("force_x_N, force_y_N, force_z_N", r"force_[xyz]_N", -20000.0, 20000.0, "a force on the tip in N"),
         (
             "reference_..._mm, model_..._mm",
-            r"(?:reference|model)_(?:[xyz]|link_\d+)_mm",
+            r"(?:reference|model)_(?:[xyz]|link_\d+|distance)_mm",
             -20000.0,
             20000.0,
             "a length in mm; are these um?",
@@ -106,6 +108,10 @@ def check_values(table: CsvTable, problems: ProblemList) -> None:
                 "1 or -1, or an empty cell where it is not known",
                 "write the direction in which the link last moved",
             )
+    if DISTANCE_COLUMN in table.columns:
+        wrong = table.columns[DISTANCE_COLUMN] <= 0  # an empty cell is nan, and not wrong
+        next_step = "give the whole distance, with the nominal length, and not its change"
+        _report(table, DISTANCE_COLUMN, wrong, problems, "no distance", "more than 0", next_step)
     _check_limits(table, problems)
 
 

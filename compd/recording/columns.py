@@ -15,7 +15,8 @@ from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
 FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
-ID_COLUMNS = ("session", "visit", "point", "ball")
+ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
+DISTANCE_COLUMN = "reference_distance_mm"
 POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
 # Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
@@ -43,6 +44,7 @@ class ColumnKind(NamedTuple):
     def units(self) -> tuple[str, ...]:
         """The unit, and for lengths of the reference and for derivatives those that `reference.unit` may put there."""
         of_reference = self.unit == "mm" and self.names.startswith(("reference_", "d_"))
+        of_reference &= self.names != DISTANCE_COLUMN
         return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
 
 
@@ -104,7 +106,20 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "mm",
             "in place of the tip: the change of link i as an interferometer measured it; the unit as that of the tip",
         ),
-        ("ball", r"ball", "", "in place of the tip: number of the ball of a calibrated ball plate that was touched"),
+        (
+            "reference_distance_mm",
+            r"reference_distance",
+            "mm",
+            "in place of the tip: the distance from the tip to a fixed ball, by a ballbar or a laser tracer",
+        ),
+        (
+            "ball",
+            r"ball",
+            "",
+            "in place of the tip: number of the ball of a calibrated ball plate that was touched; beside a distance "
+            "number or name of the fixed end that it was measured from, optional where there is one",
+        ),
+        ("pin", r"pin", "", "in place of the tip: number or name of the fixed pin in which the tip was"),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
         (
             "force_x_N, force_y_N, force_z_N",

@@ -13,6 +13,7 @@ from compd.recording.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
+    DISTANCE_COLUMN,
     FRAME_COLUMNS,
     ID_COLUMNS,
     approach_columns,
@@ -21,7 +22,7 @@ from compd.recording.columns import (
     scale_columns,
 )
 from compd.recording.problem_list import ProblemList
-from compd.recording.reference import sigma_key
+from compd.recording.reference import OF_FIXED_PLACES, sigma_key
 from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
 from compd.units import REFERENCE_UNITS
 
@@ -98,7 +99,7 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     links = tuple(_numbers(names, "reference_link", ending))
     axes = tuple(axis for axis in AXES if f"reference_{axis}_{ending}" in names)
     attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
-    if quantity == "ball_plate":
+    if quantity in ("ball_plate", *OF_FIXED_PLACES):
         axes = AXES
     has_approach = approaches > 0 and (external or approaches == scales)
     layout = Layout(scales, joints, len(frame) == 9, has_approach, axes, len(attitude) == 3, links, (), ending)
@@ -189,7 +190,7 @@ def _check_reference(
     names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], problems: ProblemList
 ) -> None:
     """Check the reference's columns against the quantity that the sidecar names."""
-    present = [name for name in names if name.startswith("reference_") or name == "ball"]
+    present = [name for name in names if name.startswith("reference_") or name in ("ball", "pin")]
     if sidecar.reference is None:
         if present:
             problems.add(
@@ -206,6 +207,8 @@ def _check_reference(
         "tool_pose": [*positions, *ATTITUDE_COLUMNS],
         "link_length": [name for name in present if name.startswith("reference_link_")],
         "ball_plate": ["ball"],
+        "distance": [DISTANCE_COLUMN, "ball"],
+        "fixed_point": ["pin"],
     }
     extra = [name for name in present if name not in wanted[quantity]]
     if extra:
@@ -226,9 +229,11 @@ def _check_reference(
         beyond = [i for i in layout.links if layout.scales and i > layout.scales]
         if beyond:
             problems.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
-    if quantity == "ball_plate" and "ball" not in names:
-        _add_missing(["ball"], names, problems)
-    count = len(layout.links) if quantity == "link_length" else len(layout.axes)
+    if quantity in ("ball_plate", "fixed_point"):
+        _add_missing([name for name in wanted[quantity] if name not in names], names, problems)
+    if quantity == "distance":
+        _check_distance(names, sidecar.reference.radius_mm, problems)
+    count = len(layout.links) if quantity == "link_length" else 1 if quantity == "distance" else len(layout.axes)
     key, sigma = sigma_key(sidecar.unit), sidecar.reference.standard_uncertainty
     if count and len(sigma) not in (1, count):
         problems.add(
@@ -236,6 +241,20 @@ def _check_reference(
             f"{key} has {len(sigma)} values for {count} reference columns",
             allowed=f"1 or {count} values",
             next_step=f"mend `{key}:` in the sidecar",
+        )
+
+
+def _check_distance(names: Sequence[str], radius_mm: float | None, problems: ProblemList) -> None:
+    """The distance is in the column or, the same in every row, in the sidecar; in one of the two."""
+    if radius_mm is None and DISTANCE_COLUMN not in names:
+        _add_missing([DISTANCE_COLUMN], names, problems)
+    elif radius_mm is not None and DISTANCE_COLUMN in names:
+        problems.add(
+            "",
+            f"{DISTANCE_COLUMN}: the sidecar gives the distance of every row, `radius_mm`",
+            f"{radius_mm:g} mm",
+            "one of the two",
+            "delete the column, or `radius_mm:` in the sidecar",
         )
 
 

@@ -67,9 +67,11 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     problems = [
         Problem(
             where=str(recording.sidecar.path),
-            what="the instrument's own frame is fitted anew for every recording",
-            value="reference.frame: instrument",
-            allowed="machine",
+            what=f"{_fitted_anew(recording)} fitted anew for every recording",
+            value=f"reference.quantity: {recording.reference.quantity}"
+            if recording.reference.of_fixed_places
+            else "reference.frame: instrument",
+            allowed="tool_position, tool_pose, link_length" if recording.reference.of_fixed_places else "machine",
             next_step="compare and diagnose it by itself",
         )
         for recording in recordings
@@ -105,11 +107,20 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     return problems
 
 
+def _fitted_anew(recording: Recording) -> str:
+    """What of the reference every recording has of its own, with its verb."""
+    assert recording.reference is not None
+    if recording.reference.of_fixed_places:
+        return f"the places of the {'pins' if recording.reference.quantity == 'fixed_point' else 'fixed balls'} are"
+    return "the instrument's own frame is"
+
+
 def _reference_text(recording: Recording) -> str:
     reference = recording.reference
     if reference is None:
         return "none"
-    return f"{reference.quantity}, {reference.frame}, sigma {reference.standard_uncertainty} {reference.unit}"
+    attitude = f", {reference.sigma_urad:g} urad" if np.isfinite(reference.sigma_urad) else ""
+    return f"{reference.quantity}, {reference.frame}, sigma {reference.standard_uncertainty} {reference.unit}{attitude}"
 
 
 def _folds_text(recording: Recording) -> str:
@@ -186,6 +197,8 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         reference_contents = {"quantity": reference.quantity, "frame": reference.frame}
         if reference.unit != "um":
             reference_contents["unit"] = reference.unit
+        if np.isfinite(reference.sigma_urad):
+            reference_contents["sigma_urad"] = reference.sigma_urad
         sigma = [value for value in reference.standard_uncertainty if np.isfinite(value)]
         if sigma:
             reference_contents[sigma_key(reference.unit)] = sigma[0] if len(sigma) == 1 else sigma

@@ -80,10 +80,10 @@ def plan_text(rows: Sequence[Mapping[str, Any]]) -> str:
     return stream.getvalue()
 
 
-def write_plan_file(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write the plan. Raises RecordingError where it cannot be written."""
+def write_text_file(path: Path, text: str) -> None:
+    """Write a plan's text. Raises RecordingError where it cannot be written."""
     try:
-        write_files({path: plan_text(rows)})
+        write_files({path: text})
     except OSError as error:
         raise RecordingError(Problem(where=str(path), what=f"cannot be written: {error.strerror}")) from error
 

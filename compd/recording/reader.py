@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from compd.recording.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
+    DISTANCE_COLUMN,
     FRAME_COLUMNS,
     approach_columns,
     correct_names,
@@ -64,7 +65,8 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
             )
         )
     table_problems = ProblemList(path)
-    table = read_table(path, table_problems, is_header, ("point",))
+    named = ("point", "pin", "ball") if _names_fixed_ends(sidecar) else ("point", "pin")
+    table = read_table(path, table_problems, is_header, named)
     balls = sidecar.reference.balls if sidecar and sidecar.reference else None
     plate = None if balls is None else read_plate(balls, problems)
     if table is None:
@@ -76,7 +78,7 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     layout = read_layout(list(table.letters), sidecar, reference_valid, table_problems)
     check_values(table, table_problems)
     excluded = _excluded(table, sidecar, table_problems)
-    needed = _needed_columns(layout, sidecar)
+    needed = _needed_columns(layout, sidecar, table.letters)
     if all(name in table.columns for name in needed):
         check_rows(table, excluded, needed, table_problems)
     if plate is not None and "ball" in table.columns:
@@ -111,12 +113,20 @@ def _without_time(recording: Recording) -> Recording:
     return replace(recording, columns=columns, has_time=False)
 
 
-def _needed_columns(layout: Layout, sidecar: Sidecar | None) -> list[str]:
+def _names_fixed_ends(sidecar: Sidecar | None) -> bool:
+    """Whether the column `ball` names the fixed ends of distances, and no ball of a plate."""
+    return sidecar is not None and sidecar.reference is not None and sidecar.reference.quantity == "distance"
+
+
+def _needed_columns(layout: Layout, sidecar: Sidecar | None, names: Collection[str]) -> list[str]:
     """Columns without which a row is of no use: time, and the reference with what predicts it."""
     reference = sidecar.reference if sidecar else None
     reference_columns = [f"reference_{name}" for name in layout.reference]
     if reference is not None and reference.quantity == "ball_plate":
         reference_columns = ["ball"]
+    if reference is not None and reference.of_fixed_places:
+        own = ("pin",) if reference.quantity == "fixed_point" else (DISTANCE_COLUMN, "ball")
+        reference_columns = [name for name in own if name in names]
     predictors = list(scale_columns(layout.scales))
     if sidecar is not None and sidecar.external:
         predictors = [f"model_{name}" for name in layout.reference]
@@ -176,6 +186,9 @@ def _build(
     links = [f"link_{i}" for i in layout.links]
     if plate is not None and ball is not None:
         position = plate.positions_of_mm(ball)
+    distance_mm = columns.get(DISTANCE_COLUMN)
+    if sidecar.reference is not None and sidecar.reference.radius_mm is not None:
+        distance_mm = np.full(len(kept), sidecar.reference.radius_mm)
     return Recording(
         path=table.path,
         sha256=_sha256(table.content, sidecar, plate),
@@ -196,8 +209,11 @@ def _build(
         reference_rotation_rad=stack(ATTITUDE_COLUMNS),
         reference_links=layout.links,
         reference_link_mm=in_mm("reference", links),
+        reference_distance_mm=distance_mm,
         ball=ball,
         plate=plate,
+        pin=ids("pin"),
+        end_names=table.labels.get("pin" if "pin" in columns else "ball", ()),
         model_mm=in_mm("model", AXES),
         model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
         model_link_mm=in_mm("model", links),
@@ -205,6 +221,7 @@ def _build(
         left_out={reason: count for reason, count in left_out.items() if count},
         columns=columns,
         warnings=warnings,
+        point_labels=table.labels.get("point", ()),
     )
 
 

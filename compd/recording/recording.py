@@ -49,7 +49,7 @@ class Recording:
     time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
     has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None where the column is absent; -1 where the cell is empty.
-        Text ids of points are numbered in sorted order.
+        Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
@@ -61,7 +61,11 @@ class Recording:
         ball plate the calibrated place of the row's ball, all three axes.
     reference_rotation_rad : (N, 3) or None: rotation vector of {P} in {M}.
     reference_link_mm : (N, m) or None: change of the links `reference_links` (1-based numbers).
-    ball : (N,) int or None, -1 where empty. plate : the ball plate.
+    reference_distance_mm : (N,) or None: from the tip to the fixed end that `ball` names, or to the only one.
+    ball : (N,) int or None, -1 where empty; text names of fixed ends are numbered in sorted order. plate : the ball
+        plate.
+    pin : (N,) int or None: the fixed pin in which the tip was; -1 where empty, text numbered in sorted order.
+    end_names : the text names of fixed ends or pins, by number; empty where these are numbers.
     model_mm, model_rotation_rad, model_link_mm : with `machine: external` the user's own model's prediction, column
         for column as the reference's.
     excluded : (N,) bool, by the person; the reasons are in `sidecar.excluded`.
@@ -89,8 +93,11 @@ class Recording:
     reference_rotation_rad: FloatArray | None
     reference_links: tuple[int, ...]
     reference_link_mm: FloatArray | None
+    reference_distance_mm: FloatArray | None
     ball: IntArray | None
     plate: BallPlate | None
+    pin: IntArray | None
+    end_names: tuple[str, ...]
     model_mm: FloatArray | None
     model_rotation_rad: FloatArray | None
     model_link_mm: FloatArray | None
@@ -99,6 +106,7 @@ class Recording:
     columns: Mapping[str, FloatArray]
     warnings: tuple[Problem, ...] = ()
     has_time: bool = True
+    point_labels: tuple[str, ...] = ()
 
     @property
     def machine(self) -> str:
@@ -144,8 +152,23 @@ class Recording:
 
     @property
     def reference_columns(self) -> tuple[str, ...]:
-        """Names of the columns that hold the reference (`ball` for a ball plate)."""
-        return tuple(name for name in self.columns if name.startswith("reference_") or name == "ball")
+        """Names of the columns that hold the reference (`ball` for a ball plate, `pin` for a fixed pin)."""
+        return tuple(name for name in self.columns if name.startswith("reference_") or name in ("ball", "pin"))
+
+    @property
+    def fixed_end(self) -> IntArray | None:
+        """(N,) number of the fixed ball or pin whose place is unknown, -1 where empty; None for other references."""
+        if self.reference is None or not self.reference.of_fixed_places:
+            return None
+        if self.reference.quantity == "fixed_point":
+            return self.pin
+        # without a column there is one fixed end
+        return np.zeros(self.rows, dtype=np.int64) if self.ball is None else self.ball
+
+    def end_name(self, number: int) -> str:
+        """The fixed ball or pin of this number as the file names it: "pin 2", "ball post"."""
+        kind = "pin" if self.pin is not None else "ball"
+        return f"{kind} {self.end_names[number] if self.end_names else number}"
 
     @property
     def model_columns(self) -> tuple[str, ...]:
@@ -155,7 +178,8 @@ class Recording:
     @property
     def reference_sigma_mm(self) -> FloatArray:
         """(axes or links,) standard uncertainty of the reference; nan where it is not known."""
-        count = len(self.reference_axes) or len(self.reference_links)
+        of_distance = self.reference_distance_mm is not None
+        count = 1 if of_distance else len(self.reference_axes) or len(self.reference_links)
         sigma = self.reference.standard_uncertainty if self.reference else (np.nan,)
         return np.broadcast_to(np.array(sigma) / UM_PER_MM, (count,)).astype(np.float64)
 

@@ -11,8 +11,10 @@ from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator, mod
 from compd.configuration.section import Section, refusal
 from compd.units import REFERENCE_UNITS
 
-Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate"]
+Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate", "distance", "fixed_point"]
 Frame = Literal["machine", "instrument"]
+# Measured from, or at, a place that nobody knows: it is fitted along, so that there is no frame to name.
+OF_FIXED_PLACES = ("distance", "fixed_point")
 
 _SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
 StandardUncertainty = Annotated[
@@ -29,7 +31,8 @@ class Reference(Section):
     """What the reference instrument measured. An unknown uncertainty is nan; `balls` is relative to the sidecar."""
 
     quantity: Quantity = Field(
-        description="what was measured: the tip, the tip and the attitude, the links' change, or balls of a ball plate"
+        description="what was measured: the tip, the tip and the attitude, the links' change, balls of a ball plate, "
+        "the distance from the tip to a fixed ball, or the tip in a fixed pin"
     )
     unit: Annotated[str, WithJsonSchema({"enum": list(REFERENCE_UNITS)})] = Field(
         default="um",
@@ -41,7 +44,8 @@ class Reference(Section):
         default="machine",
         validate_default=True,
         description="machine: the coordinates are in {M}; instrument: in the instrument's own frame, so that a "
-        "registration of six parameters is always fitted; of a ball plate always instrument unless it is written",
+        "registration of six parameters is always fitted; of a ball plate always instrument unless it is written; of "
+        "distance and fixed_point there is none",
     )
     sigma_um: StandardUncertainty = Field(
         default=(math.nan,),
@@ -56,6 +60,27 @@ class Reference(Section):
         validate_default=True,
         description="ball_plate only: the ball plate's file, relative to the sidecar",
     )
+
+    sigma_urad: float = Field(
+        default=math.nan,
+        description="tool_pose only: standard uncertainty of the attitude, urad, about each axis; with it "
+        "the attitude counts beside the tip, without it is only compared",
+    )
+    absolute: bool = Field(
+        default=False,
+        description="distance only: true for a calibrated length; without it a constant is fitted to the length from "
+        "each fixed end",
+    )
+    radius_mm: float | None = Field(
+        default=None,
+        description="distance only: the same distance in every row, in place of the column `reference_distance_mm`: "
+        "the radius of a calibrated ball and that of the probe that touches it",
+    )
+
+    @property
+    def of_fixed_places(self) -> bool:
+        """Whether fixed ends or pins were measured whose places are unknown."""
+        return self.quantity in OF_FIXED_PLACES
 
     @property
     def standard_uncertainty(self) -> tuple[float, ...]:
@@ -79,7 +104,7 @@ class Reference(Section):
     @classmethod
     def _unit_of_the_quantity(cls, unit: Any, info: ValidationInfo) -> Any:
         quantity = info.data.get("quantity")
-        if quantity in ("tool_pose", "ball_plate") and unit != "um":
+        if quantity in ("tool_pose", "ball_plate", *OF_FIXED_PLACES) and unit != "um":
             raise refusal(f"of {quantity} is um", "um, or nothing", "delete it")
         return _one_of(unit, tuple(REFERENCE_UNITS), "give the values in one of these")
 
@@ -87,8 +112,10 @@ class Reference(Section):
     @classmethod
     def _frame_of_the_quantity(cls, frame: Any, info: ValidationInfo) -> Any:
         quantity, unit = info.data.get("quantity"), info.data.get("unit", "um")
-        if frame is None and quantity in ("link_length", "ball_plate"):
-            return "instrument" if quantity == "ball_plate" else "machine"
+        if frame is None and quantity in ("link_length", "ball_plate", *OF_FIXED_PLACES):
+            return "machine" if quantity == "link_length" else "instrument"
+        if quantity in OF_FIXED_PLACES:
+            raise refusal("the fixed place is not known in any frame: it is fitted along", "nothing", "delete it")
         if quantity == "link_length" and frame == "instrument":
             raise refusal("a link's length has no frame", "machine, or nothing", "delete it")
         if unit != "um" and frame in (None, "machine"):
@@ -115,6 +142,30 @@ class Reference(Section):
             )
         return tuple(numbers)
 
+    @field_validator("sigma_urad", mode="before")
+    @classmethod
+    def _attitude_uncertainty(cls, sigma: Any, info: ValidationInfo) -> Any:
+        if sigma is None:
+            return math.nan
+        _only_of("tool_pose", info)
+        return _positive(sigma, "is no standard uncertainty", "a number greater than 0, in urad")
+
+    @field_validator("absolute", mode="before")
+    @classmethod
+    def _absolute_length(cls, absolute: Any, info: ValidationInfo) -> Any:
+        _only_of("distance", info)
+        if not isinstance(absolute, bool):
+            raise refusal("is neither true nor false", "true, false", "write true for a calibrated length")
+        return absolute
+
+    @field_validator("radius_mm", mode="before")
+    @classmethod
+    def _radius_of_a_touched_ball(cls, radius: Any, info: ValidationInfo) -> Any:
+        if radius is None:
+            return None
+        _only_of("distance", info)
+        return _positive(radius, "is no distance", "a number greater than 0, in mm")
+
     @field_validator("balls", mode="before")
     @classmethod
     def _balls_of_a_ball_plate(cls, balls: Any, info: ValidationInfo) -> Any:
@@ -134,3 +185,15 @@ def _one_of(value: Any, names: tuple[str, ...], next_step: str) -> Any:
     if value not in names:
         raise refusal("is missing" if value is None else "is unknown", ", ".join(names), next_step)
     return value
+
+
+def _only_of(quantity: Quantity, info: ValidationInfo) -> None:
+    """Refuse a key that belongs to another quantity than that of the reference; one that is not known passes."""
+    if info.data.get("quantity") not in (None, quantity):
+        raise refusal(f"belongs to {quantity}, not to {info.data['quantity']}", next_step="delete it")
+
+
+def _positive(value: Any, what: str, allowed: str) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value < math.inf:
+        raise refusal(what, allowed, "leave it out where it is not known")
+    return float(value)

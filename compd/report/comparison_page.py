@@ -201,7 +201,8 @@ def _axis(comparison: Comparison, label: str) -> str:
     if label not in comparison.aligned.labels:
         return "-"
     size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
-    return f"{_three(rms(size))} / {_three(np.quantile(size, 0.95))} / {_shown(comparison, size.max())}"
+    largest = format_error(float(size.max()), comparison.aligned.unit_of(label), 3)
+    return f"{_three(rms(size))} / {_three(np.quantile(size, 0.95))} / {largest}"
 
 
 def _constant(comparison: Comparison) -> str:

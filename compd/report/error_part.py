@@ -60,10 +60,10 @@ def error_part(
     after_um = comparison.residual_um - (_moved(comparison, described) if described else 0.0)
     used = comparison.used & np.isfinite(part_um).all(axis=1) & np.isfinite(after_um).all(axis=1)
     on_links = all(set(fitted.effect.ports) <= LINK_PORTS for fitted in effects)
-    if on_links and comparison.link_residual_um is not None and aligned.rows.links == len(aligned.axes):
+    if on_links and comparison.link_residual_um is not None and aligned.rows.links == len(aligned.axes) == 3:
         link = aligned.sensitivity(["link"])["link"]
         labels = tuple(f"link {i + 1}" for i in range(aligned.rows.links))
-        parts = (link_residuals(link, part_um), link_residuals(link, np.nan_to_num(after_um)))
+        parts = (link_residuals(link, part_um[:, :3]), link_residuals(link, np.nan_to_num(after_um[:, :3])))
         return ErrorPart(labels, *parts, used, at_links=True)
     return ErrorPart(tuple(aligned.labels), part_um, after_um, used, at_links=aligned.of_links)
 

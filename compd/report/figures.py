@@ -53,7 +53,7 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
     chosen = thin(used, ARROWS)
     tip_mm, unit = places_mm[chosen], aligned.unit
     vector_um = np.zeros((len(chosen), 3))
-    vector_um[:, list(aligned.axes)] = comparison.residual_um[chosen]
+    vector_um[:, list(aligned.axes)] = _at_tip(comparison)[chosen]
     typical_mm = max(rms(np.linalg.norm(vector_um, axis=1)) / UM_PER_MM, 1e-9)
     reach_mm = float(np.ptp(tip_mm, axis=0).max()) or 1.0
     enlarged = 10.0 ** np.floor(np.log10(ARROW_SHARE * reach_mm / typical_mm))
@@ -145,7 +145,7 @@ def plot_histogram(comparison: Comparison) -> Figure:
             row=1,
             col=k,
         )
-        figure.update_xaxes(title_text=f"residual of {label}, {unit}", row=1, col=k)
+        figure.update_xaxes(title_text=f"residual of {label}, {comparison.aligned.unit_of(label)}", row=1, col=k)
     style_figure(figure, f"residual of {labels[0]}, {unit}", "rows", 350)
     return figure.update_layout(margin={"t": 70}, legend={"y": 1.12})
 
@@ -206,6 +206,14 @@ def _aspect(extent: FloatArray, axes: list[int]) -> dict[str, object]:
         "aspectratio": dict(zip("xyz", np.maximum(ratio, THIN).tolist(), strict=True)),
         "camera": {"eye": dict(zip("xyz", eye.tolist(), strict=True)), "up": {"xyz"[axes[1]]: 1.0}},
     }
+
+
+def _at_tip(comparison: Comparison) -> FloatArray:
+    """(N, axes) the residual as a vector at the tip, um; of a distance along the line from the fixed ball."""
+    aligned, residual_um = comparison.aligned, comparison.residual_um
+    if aligned.ends is not None and aligned.ends.of_lengths:
+        return np.asarray(aligned.ends.directions(aligned.nominal_tip_mm)[:, 0] * residual_um)
+    return residual_um[:, aligned.lengths]
 
 
 def _places_mm(comparison: Comparison) -> tuple[FloatArray, list[int]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.recording.instrument_export import Track
+from compd.instruments.track import Track
 
 # Base joints of a tripod, in mm; the scales are distances from them, as on the real thing, and nothing polynomial.
 _BASE_MM = np.array([[0.0, 250.0, 700.0], [-216.5, -125.0, 700.0], [216.5, -125.0, 700.0]])
@@ -57,4 +57,4 @@ def track_of(
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     shift_mm = np.array([1200.0, -300.0, 80.0])
     seen_mm = path.tip(time_s) @ turn + shift_mm + rng.normal(0.0, noise_mm, (len(time_s), 3))
-    return Track(Path("tracker.csv"), time_s - offset_s, seen_mm, ("x", "y", "z"), {}, 0), np.vstack([turn, shift_mm])
+    return Track(Path("tracker.csv"), time_s - offset_s, seen_mm, ("x", "y", "z")), np.vstack([turn, shift_mm])

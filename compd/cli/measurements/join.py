@@ -1,4 +1,4 @@
-"""`compd join`: a reference instrument's export beside the gauges, by time."""
+"""`compd join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
 
 from __future__ import annotations
 
@@ -8,6 +8,20 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from compd.cli.export_options import (
+    AngleUnitOption,
+    ColumnsOption,
+    DatesOption,
+    DecimalOption,
+    GroupOption,
+    RateOption,
+    ShapeOption,
+    SheetOption,
+    UnitOption,
+)
+from compd.cli.join_at_rest import ByChoice
+from compd.cli.options import MachineOption
 
 
 class FrameChoice(StrEnum):
@@ -19,7 +33,7 @@ class FrameChoice(StrEnum):
 
 def join(
     gauges: Annotated[Path, typer.Argument(help="The recording of the gauges, NAME.csv with NAME.yaml.")],
-    export: Annotated[Path, typer.Argument(help="The instrument's export: CSV with a time and x, y, z or a length.")],
+    export: Annotated[Path, typer.Argument(help="The instrument's export: text, SpatialAnalyzer, CARTO or Excel.")],
     out: Annotated[Path, typer.Argument(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
     time: Annotated[str | None, typer.Option(help="The export's time column; guessed from its name.")] = None,
     x: Annotated[str | None, typer.Option(help="The export's column of x; guessed from its name.")] = None,
@@ -27,7 +41,21 @@ def join(
     z: Annotated[str | None, typer.Option(help="The export's column of z; guessed from its name.")] = None,
     length: Annotated[str | None, typer.Option(help="The export's column of a length; guessed from its name.")] = None,
     link: Annotated[int | None, typer.Option(help="For a length: the link that it measures, 1 to 6.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of the lengths where names have none: mm, um, m ...")] = None,
+    ball: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="For a length, of a ballbar or a tracer: the fixed ball from which it goes to the tip."
+        ),
+    ] = None,
+    shape: ShapeOption = None,
+    columns: ColumnsOption = None,
+    unit: UnitOption = None,
+    angle_unit: AngleUnitOption = None,
+    decimal: DecimalOption = None,
+    dates: DatesOption = None,
+    rate_hz: RateOption = None,
+    group: GroupOption = None,
+    sheet: SheetOption = None,
     offset: Annotated[
         float | None,
         typer.Option(help="Recording time minus instrument time, in s; estimated from the motion if left out."),
@@ -36,18 +64,45 @@ def join(
         FrameChoice, typer.Option(help="Frame of the coordinates: {M}, or the instrument's own, which is then fitted.")
     ] = FrameChoice.INSTRUMENT,
     sigma_um: Annotated[float | None, typer.Option(help="Standard uncertainty of the instrument per axis, um.")] = None,
+    sigma_urad: Annotated[
+        float | None,
+        typer.Option(
+            help="Standard uncertainty of an attitude about each axis, urad; without it, it is only compared."
+        ),
+    ] = None,
     moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
+    by: Annotated[
+        ByChoice | None,
+        typer.Option(
+            help="Put rows together by one clock; points at rest by their order, their names, or distances alone."
+        ),
+    ] = None,
+    machine: MachineOption = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="With --by name: the plan that was measured; its row k is the point P00k.")
+    ] = None,
 ) -> None:
-    """Put an instrument's export beside a recording, on one clock; the offset is estimated and shown."""
-    from compd.recording.instrument_export import read_track
-    from compd.recording.join import Instrument, join_reference
+    """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
+    from compd.cli.export_options import echo_taken, read_options
+    from compd.cli.join_at_rest import check_options, choose_by, join_points
+    from compd.instruments.read import read_export
+    from compd.instruments.track import track_of
+    from compd.joining.by_time import Instrument, join_reference
     from compd.recording.reader import read_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
+    options = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
+    exported = read_export(export, options)
+    echo_taken(export, exported.shape, exported.taken, exported.left_out)
+    instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball)
+    chosen = choose_by(by, exported)
+    check_options(chosen, offset, moving, plan)
+    if chosen != ByChoice.TIME:
+        join_points(gauges, exported, out, instrument, chosen, machine, plan)
+        return
     recording = read_recording(gauges, needs_reference=False)
-    track = read_track(export, {role: name for role, name in roles.items() if name is not None}, unit)
-    joined = join_reference(recording, track, out, Instrument(frame.value, sigma_um, link), offset, moving)
-    typer.echo(f"{export}: " + ", ".join(f"{role} from {name!r}" for role, name in track.names.items()))
+    track = track_of(exported)
+    joined = join_reference(recording, track, out, instrument, offset, moving)
     clock = joined.offset
     if math.isnan(clock.std_s):
         agreement = "not known" if math.isnan(clock.agreement) else f"{clock.agreement:.4f}"
@@ -63,6 +118,4 @@ def join(
     )
     for reason, count in joined.left_out.items():
         typer.echo(f"    {count} rows without: {reason}")
-    if track.left_out:
-        typer.echo(f"    {track.left_out} rows of the export have an empty cell")
     typer.echo(f"written: {joined.path} and {joined.path.with_suffix('.yaml')}")

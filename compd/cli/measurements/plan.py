@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
+
+
+class PlanShape(StrEnum):
+    """Who is to read the rows."""
+
+    plan = "plan"
+    sa = "sa"
+    csv = "csv"
+    gcode = "gcode"
 
 
 def plan(
@@ -44,6 +54,16 @@ def plan(
             "May be repeated.",
         ),
     ] = None,
+    shape: Annotated[
+        PlanShape,
+        typer.Option(
+            "--as",
+            help="plan (CSV for `compd simulate --plan`); targets for the instrument: sa (SpatialAnalyzer), csv; gcode "
+            "for the controller.",
+        ),
+    ] = PlanShape.plan,
+    feed: Annotated[float | None, typer.Option(min=0.1, help="For gcode: mm/min between the places.")] = None,
+    dwell: Annotated[float, typer.Option(min=0, help="For gcode: seconds at rest at each place.")] = 3.0,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds, other settings) on which rival effects differ most.
@@ -52,11 +72,13 @@ def plan(
     """
     from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
+    from compd.diagnosis.planning.plan_formats import MARKS
     from compd.output_file import check_replaceable
     from compd.recording.plan_file import PURPOSE_COLUMN
 
     if out is not None:
-        check_replaceable(out, (f"{PURPOSE_COLUMN},".encode(),), "a plan", overwrite)
+        mark = f"{PURPOSE_COLUMN},".encode() if shape is PlanShape.plan else MARKS[shape.value]
+        check_replaceable(out, (mark,), "a plan", overwrite)
     box = None if workspace is None else _numbers("--workspace", workspace, 6)
     heat = None if temperature is None else _numbers("--temperature", temperature, 2)
     planned = plan_measurement(
@@ -73,9 +95,9 @@ def plan(
         limits=_by_column(limit or []),
     )
     if out is None:
-        planned.write_to(sys.stdout)
+        sys.stdout.write(planned.text(shape.value, feed, dwell))
     else:
-        planned.write(out)
+        planned.write(out, shape.value, feed, dwell)
     typer.echo(f"{planned.summary}\n{planned.instructions}", err=out is None)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -118,8 +119,12 @@ def _reference(contents: Recording) -> str:
     if reference is None:
         return "none yet; put an instrument's export beside it with `compd join`"
     parts = [reference.quantity, ", ".join(contents.reference_columns)]
-    if reference.quantity != "link_length":
+    if reference.of_fixed_places:
+        parts.append("fixed places are fitted along")
+    elif reference.quantity != "link_length":
         parts.append(f"in the {reference.frame}'s frame")
     sigma = ", ".join(f"{value:g}" for value in reference.standard_uncertainty)
     parts.append("uncertainty not known" if sigma == "nan" else f"sigma {sigma} {reference.unit}")
+    if math.isfinite(reference.sigma_urad):
+        parts.append(f"attitude {reference.sigma_urad:g} urad")
     return "; ".join(parts)

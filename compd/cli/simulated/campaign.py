@@ -15,6 +15,10 @@ class ReferenceKind(StrEnum):
     tracker = "tracker"
     interferometer = "interferometer"
     ball_plate = "ball_plate"
+    ballbar = "ballbar"
+    pin = "pin"
+    ball = "ball"
+    pose = "pose"
 
 
 def campaign(

@@ -3,30 +3,117 @@
 from __future__ import annotations
 
 import signal
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from compd.cli.options import OverwriteOption
 from compd.units import UM_PER_MM
 
+if TYPE_CHECKING:
+    from compd.simulation.wires.looks import Looks
+
 _ANSWER_TIMEOUT_S = 15.0
 # So long at rest, every gauge has been read anew.
 _REST_S = 0.5
 
 
+class ExportFormat(StrEnum):
+    """In which shape the export is written."""
+
+    csv = "csv"
+    iso = "iso"
+    german = "german"
+    sa = "sa"
+    blanks = "blanks"
+    carto = "carto"
+    xlsx = "xlsx"
+
+
 def tracker(
     simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in.")],
-    out: Annotated[Path, typer.Option(help="The export, a CSV for `compd join`.")],
+    out: Annotated[Path, typer.Option(help="The export, for `compd join`.")],
     seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
     rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Measurements per second.")] = 20.0,
+    shape: Annotated[
+        ExportFormat,
+        typer.Option(
+            "--as",
+            help="Shape of the export: csv with seconds, iso with date stamps, german (semicolons, decimal comma), sa "
+            "(SpatialAnalyzer), blanks (numbers alone), carto (.rtx; with --link), xlsx.",
+        ),
+    ] = ExportFormat.csv,
+    link: Annotated[
+        int | None, typer.Option(min=1, max=6, help="An interferometer along this link, in place of the tracker.")
+    ] = None,
+    points: Annotated[
+        bool, typer.Option("--points", help="One row per dwell, named P1, P2 ..., without a time.")
+    ] = False,
+    unit: Annotated[str, typer.Option(help="Unit of the lengths in the export.")] = "mm",
     overwrite: OverwriteOption = False,
 ) -> None:
     """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
 
     Its clock begins at 0, as a real one's does: `compd join` finds the offset from the motion.
     """
+    from datetime import datetime
+
+    from compd.errors import CompdError, Problem
+    from compd.files import write_files
+    from compd.instruments.writers.registry import FORMATS
+    from compd.output_file import check_replaceable
+    from compd.simulation.wires.looks import Looks
+
+    written = FORMATS[shape.value]
+    _check_options(shape, link, points, unit)
+    if not out.parent.is_dir():
+        raise CompdError(
+            Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
+        )
+    check_replaceable(out, (), "an export", overwrite)
+    looks = Looks(link)
+    start = datetime.now()
+    compared = _look(simulation, out, looks, seconds, rate_hz)
+    if points:
+        samples = looks.points(unit)
+    else:
+        samples = looks.at_rate(rate_hz, unit, start) if written.constant_rate else looks.track(unit, start)
+    if not len(samples.values):
+        raise CompdError(
+            Problem(where=str(out), what="the machine has not rested once", next_step="let the tracker look for longer")
+        )
+    write_files({out: written.write(samples)})
+    typer.echo(f"{len(looks)} looks in {looks.seconds:.0f} s" + (f", {len(samples.values)} points" if points else ""))
+    if hint := _for_join(shape, link, points, unit, rate_hz):
+        typer.echo(f"the file does not say it, so give `compd join`: {hint}")
+    if compared:
+        typer.echo(compared)
+
+
+def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: str) -> None:
+    """Raise CompdError for a shape that cannot hold what is to be written, or for no unit."""
+    from compd.errors import CompdError, Problem
+    from compd.units import UNIT_KINDS
+
+    problems = []
+    if unit not in UNIT_KINDS[0]:
+        problems.append(
+            Problem(where="--unit", what="is no unit of a length", value=unit, allowed=", ".join(UNIT_KINDS[0]))
+        )
+    if shape is ExportFormat.carto and link is None:
+        problems.append(Problem(where="--as carto", what="is one length", next_step="say of which link: --link 1"))
+    if shape is ExportFormat.carto and points:
+        problems.append(Problem(where="--as carto", what="is a track", next_step="leave --points out"))
+    if shape is ExportFormat.sa and link is not None:
+        problems.append(Problem(where="--as sa", what="is x, y, z", next_step="leave --link out, or choose --as carto"))
+    if problems:
+        raise CompdError(problems)
+
+
+def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate_hz: float) -> str:
+    """Look until the time is over, and return in words how far the daemon's tip was from what the tracker saw."""
     import numpy as np
 
     from compd.cli.progress import ElapsedShown
@@ -34,46 +121,49 @@ def tracker(
     from compd.client import connect
     from compd.clock import MonotonicClock
     from compd.errors import CompdError, Problem
-    from compd.output_file import check_replaceable
     from compd.simulation.wires.control_client import ControlClient
 
-    if not out.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
-        )
-    check_replaceable(out, (), "an export", overwrite)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    looks: list[list[float]] = []
     apart_mm, at_rest = [], 0
     with (
         ControlClient(simulation / "control.sock") as machine,
         connect_patiently(str(simulation / "compd.sock"), lambda path: connect(path, _ANSWER_TIMEOUT_S)) as daemon,
         ElapsedShown(seconds, MonotonicClock()) as shown,
     ):
-        typer.echo(f"{out}: the tracker looks {rate_hz:g} times a second")
+        looks.check_links(len(machine.ask("TRUTH")["scale_mm"]))
+        typer.echo(f"{out}: the {looks.instrument} looks {rate_hz:g} times a second")
         try:
             for setpoint in shown.show(daemon.watch(rate_hz), lambda: f"{len(looks)} looks"):
                 seen = machine.ask("MEASURE")
-                looks.append([seen["monotonic_s"], *seen["reference_mm"]])
+                looks.add(seen)
                 at_rest = 0 if seen["moving"] else at_rest + 1
                 if at_rest > _REST_S * rate_hz and setpoint["valid"] and seen["tip_frame"] == "M":
                     apart_mm.append(np.subtract(setpoint["tip_M_mm"], seen["reference_mm"]))
-                if seconds is not None and seen["monotonic_s"] - looks[0][0] >= seconds:
+                if seconds is not None and looks.seconds >= seconds:
                     break
         except KeyboardInterrupt:
             pass  # the usual end
-    if not looks:
+    if not len(looks):
         raise CompdError(
             Problem(where=str(out), what="the tracker has not looked once", next_step="let it look for longer")
         )
-    table = np.array(looks)
-    table[:, 0] -= table[0, 0]
-    lines = [",".join(f"{value:.6f}" for value in row) for row in table]
-    out.write_text("\n".join(["time_s,x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
-    typer.echo(f"{len(looks)} looks in {table[-1, 0]:.0f} s")
-    if apart_mm:
-        rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * UM_PER_MM
-        typer.echo(
-            f"at rest the daemon's tip and the tracker's differ by {rms_um:.2f} um, rms per coordinate; "
-            f"{seen['sigma_um']:g} um of it is the tracker's own noise"
-        )
+    if not apart_mm:
+        return ""
+    rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * UM_PER_MM
+    return (
+        f"at rest the daemon's tip and the tracker's differ by {rms_um:.2f} um, rms per coordinate; "
+        f"{seen['sigma_um']:g} um of it is the tracker's own noise"
+    )
+
+
+def _for_join(shape: ExportFormat, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
+    """Options without which `compd join` asks, because the file says nothing of it."""
+    from compd.instruments.writers.registry import FORMATS
+
+    written = FORMATS[shape.value]
+    given = [
+        f"--unit {unit}" if not written.says_unit else "",
+        f"--rate-hz {rate_hz:g}" if shape is ExportFormat.blanks and not points else "",
+        f"--link {link}" if link is not None else "",
+    ]
+    return " ".join(filter(None, given))

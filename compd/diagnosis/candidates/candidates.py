@@ -148,6 +148,8 @@ def variant(effect: Effect, constants: ConstantValues, aligned: AlignedRecording
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
     """What the effect needs and the recording has not, in words; "" where it has everything."""
+    if effect.registration and aligned.ends is not None:
+        return "fitted along in any case: nobody knows where the fixed balls or pins are"
     if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
     return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))

@@ -9,6 +9,9 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.measured_attitude import MM_PER_RAD
+from compd.comparison.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
@@ -38,10 +41,15 @@ def constant_candidate(aligned: AlignedRecording) -> Candidate | None:
 def constant_effect(aligned: AlignedRecording) -> Effect:
     """The constant as an effect, one number in um for each measured coordinate."""
     axes, of_links = list(aligned.axes), aligned.of_links
+    if aligned.with_attitude:
+        axes += [3, 4, 5]
 
     def columns(rows: Observations, constants: ConstantValues) -> FloatArray:
         size = rows.links if of_links else 6
-        return np.broadcast_to(MM_PER_UM * np.eye(size)[:, axes], (len(rows), size, len(axes)))
+        one_each = MM_PER_UM * np.eye(size)[:, axes]
+        if not of_links:
+            one_each[3:] /= MM_PER_RAD  # a urad of the attitude, which the port takes in rad
+        return np.broadcast_to(one_each, (len(rows), size, len(axes)))
 
     return Effect(
         id=CONSTANT,
@@ -52,12 +60,17 @@ def constant_effect(aligned: AlignedRecording) -> Effect:
         source="no cause: many effects make a constant",
         needs=(),
         parameters=tuple(
-            Parameter(f"c_{name}", "um", -math.inf, math.inf, "nothing is known of it") for name in aligned.label_names
+            Parameter(f"c_{name}", _parameter_unit(name), -math.inf, math.inf, "nothing is known of it")
+            for name in aligned.label_names
         ),
         mistaken_for=(),
         separated_by="",
         basis=memoryless_basis(columns),
     )
+
+
+def _parameter_unit(name: str) -> str:
+    return ATTITUDE_UNIT if name in ATTITUDE_LABELS else "um"
 
 
 def makes_only(columns: FloatArray, of: FloatArray) -> bool:

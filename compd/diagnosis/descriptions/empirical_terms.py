@@ -22,7 +22,7 @@ from compd.diagnosis.descriptions.search_covariates import (
 )
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
 from compd.diagnosis.descriptions.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
-from compd.model.effect import Effect
+from compd.model.effect import Effect, Port
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
@@ -112,10 +112,11 @@ class EmpiricalTerm:
     def _measured_along_axes(self, aligned: AlignedRecording) -> FloatArray:
         """(N, m, axes) by how much the measured coordinates change per displacement of the port along each axis."""
         axes = ["xyz".index(axis) for axis in self.axes]
-        if self.port == "reference":
+        if self.port == "reference" and aligned.model is None:
             shown = np.equal.outer(aligned.axes, axes).astype(np.float64)
-            return np.broadcast_to(shown, (len(aligned.rows), *shown.shape))
-        return aligned.sensitivity(["tool"])["tool"].tip[:, list(aligned.axes)][:, :, axes]
+            return aligned.along_ends(np.broadcast_to(shown, (len(aligned.rows), *shown.shape)))
+        port: Port = "reference" if self.port == "reference" else "tool"
+        return aligned.shown(aligned.sensitivity([port])[port])[:, :, axes]
 
     def declaration(
         self, axis: str, value: float | None = None, sizes: Mapping[str, float] | None = None

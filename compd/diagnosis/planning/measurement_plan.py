@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
+from compd.instruments.writers.gcode import Motion
+from compd.instruments.writers.target import Way
 from compd.number_text import join_words
-from compd.recording.plan_file import NOT_SET, plan_text, write_plan_file
+from compd.recording.plan_file import NOT_SET, plan_text, write_text_file
 from compd.tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
@@ -53,6 +56,8 @@ class MeasurementPlan:
         What tells the rivals apart, in words, should these rows not.
     alike : tuple of pairs of str
         Of three rivals or more, the pairs that no rows within the limits tell apart; the rows are for the others.
+    ways : tuple
+        For each row the way on which the links come from the wanted side, for G-code; empty where it is not known.
     """
 
     rivals: tuple[str, ...]
@@ -61,6 +66,7 @@ class MeasurementPlan:
     before: float
     separated_by: str = ""
     alike: tuple[tuple[str, str], ...] = ()
+    ways: tuple[Way | None, ...] = ()
 
     @property
     def tells_apart(self) -> bool:
@@ -110,24 +116,41 @@ class MeasurementPlan:
         text = "; ".join(parts)
         return f"{text[:1].upper()}{text[1:]}."
 
-    def write_to(self, stream: TextIO) -> None:
-        """Write the rows as CSV."""
-        stream.write(plan_text(self.rows))
+    def text(self, format: PlanFormat = "plan", feed_mm_per_min: float | None = None, dwell_s: float = DWELL_S) -> str:
+        """The text of the file that `write` writes, with the same parameters."""
+        if format == "plan":
+            return plan_text(self.rows)
+        motion = None if feed_mm_per_min is None else Motion(feed_mm_per_min, dwell_s)
+        title = f"{', '.join(self.rivals)}; {len(self.rows)} rows"
+        return target_bytes(self.rows, format, self.ways, motion, title).decode()
 
-    def write(self, path: str | Path) -> None:
-        """Write the rows as CSV, for a person at the machine or for `compd simulate --plan`.
+    def write(
+        self,
+        path: str | Path,
+        format: PlanFormat = "plan",
+        feed_mm_per_min: float | None = None,
+        dwell_s: float = DWELL_S,
+    ) -> None:
+        """Write the rows, for a person at the machine, for `compd simulate --plan`, or for instrument and controller.
 
         Parameters
         ----------
         path : str or Path
             Where to; an existing file is replaced.
+        format : str
+            ``"plan"``: CSV, as `compd simulate --plan` reads it. Targets for the instrument, named P001 ...: ``"sa"``
+            (SpatialAnalyzer ASCII) or ``"csv"``. ``"gcode"``: a programme for the controller.
+        feed_mm_per_min, dwell_s : float
+            For G-code: the feed between places, which is needed, and the time at rest at each.
 
         Raises
         ------
+        CompdError
+            For G-code without a feed, or targets of a plan that has no places of the tip.
         RecordingError
             Where the file cannot be written.
         """
-        write_plan_file(Path(path), self.rows)
+        write_text_file(Path(path), self.text(format, feed_mm_per_min, dwell_s))
 
     def to_dataframe(self) -> pd.DataFrame:
         """The rows, as a pandas data frame.

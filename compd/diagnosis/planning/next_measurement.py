@@ -174,6 +174,18 @@ def _programmes(
 
     Raises CompdError where nothing could be.
     """
+    if aligned.ends is not None:
+        held = "within the length of the bar" if aligned.ends.of_lengths else "in its pins"
+        raise CompdError(
+            Problem(
+                where=str(aligned.recording.path),
+                what=f"rows are chosen all over the workspace, and this reference measures only {held}",
+                allowed="a reference that follows the tip: tool_position, tool_pose, link_length",
+                next_step="measure from further balls, at other heights, warm and cold"
+                if aligned.ends.of_lengths
+                else "measure at further pins, warm and cold, or with a reference that follows the tip",
+            )
+        )
     if aligned.model is not None:
         given = limits if isinstance(limits, ProgrammeLimits) else recorded_limits(aligned)
         return machine_programmes(aligned, effects, given)

@@ -104,8 +104,8 @@ class DiagnosisProblem:
 
     @property
     def unit_um(self) -> float:
-        """Error per coordinate at a loss of 1, um."""
-        return rms(self.sigma_um)
+        """Error per coordinate at a loss of 1, um; of lengths alone where an attitude is measured beside them."""
+        return rms(self.sigma_um[self.aligned.lengths])
 
     def whiten(self, columns_um: FloatArray) -> FloatArray:
         """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
@@ -203,11 +203,14 @@ def build_problem(
 
 
 def _unit_um(comparison: Comparison) -> FloatArray:
-    """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all: a unit only."""
+    """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all of one unit."""
     if comparison.floor.known:
         return comparison.floor.by_axis_um
-    size_um = rms(trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)]))
-    return np.full(len(comparison.aligned.labels), max(size_um, LEAST_SIGMA))
+    sizes_um = trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)])
+    unit_um = np.full(len(sizes_um), max(rms(sizes_um[comparison.aligned.lengths]), LEAST_SIGMA))
+    if comparison.aligned.with_attitude:
+        unit_um[-3:] = max(rms(sizes_um[-3:]), LEAST_SIGMA)
+    return unit_um
 
 
 def _everything(

@@ -180,6 +180,14 @@ def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:
     return sorted(concerning, key=lambda effect: not effect.likely)
 
 
+def shown_by(diagnosis: Diagnosis) -> str:
+    """What a reference at fixed places can show at all, behind "nothing is missing"; "" for others."""
+    ends = diagnosis.before.aligned.ends
+    if ends is None:
+        return ""
+    return " that lengths can show" if ends.of_lengths else " that pins can show"
+
+
 def was_any_tried(diagnosis: Diagnosis) -> bool:
     """Whether the recording tests any effect of the library."""
     return any(candidate.status != "not_testable" for candidate in diagnosis.candidates)

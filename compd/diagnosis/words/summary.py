@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
-from compd.diagnosis.words.phrases import change_text, followed_text, rivals_text, was_any_tried
+from compd.diagnosis.words.phrases import change_text, followed_text, rivals_text, shown_by, was_any_tried
 from compd.number_text import join_words, number_text
 
 CANNOT_KNOW = "how much of it is noise cannot be known"
@@ -23,8 +23,8 @@ def summary(diagnosis: Diagnosis) -> str:
     match diagnosis.verdict:
         case "adequate" if fall.noise_known:
             but = " but for a constant" if diagnosis.constant else ""
-            own = number_text(fall.noise, fall.unit)
-            return f"Nothing is missing{but}: the error of {before} is the measurement's own noise ({own})."
+            own, nothing = number_text(fall.noise, fall.unit), f"Nothing is missing{shown_by(diagnosis)}{but}"
+            return f"{nothing}: the error of {before} is the measurement's own noise ({own})."
         case "identified":
             them = "it" if len(diagnosis.steps) == 1 else "them"
             return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."

@@ -18,6 +18,7 @@ from compd.diagnosis.words.phrases import (
     parameter_texts,
     physics_clause,
     rivals_text,
+    shown_by,
     thermal_in_one_session,
     untested_here,
     was_any_tried,
@@ -77,7 +78,9 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
         case "adequate" if fall.noise_known and diagnosis.constant is not None:
             text = "nothing is missing but a constant; what varies is noise"
         case "adequate" if fall.noise_known:
-            text = f"nothing is missing; the error of {number_text(fall.before, fall.unit)} is noise"
+            text = (
+                f"nothing is missing{shown_by(diagnosis)}; the error of {number_text(fall.before, fall.unit)} is noise"
+            )
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
         case "ambiguous":

@@ -22,6 +22,7 @@ from compd.simulation.campaign.campaign_plan import (
 from compd.simulation.campaign.row_log import LoggedRows, RowLog
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.closure import Posture
+from compd.simulation.truth.fixed_places import FixedPlaces
 from compd.simulation.truth.instruments import EXACT, ReferenceInstrument
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.probing import PROBING_STEP_S, probing_steps_mm
@@ -47,19 +48,22 @@ class Campaign:
         *,
         reference: ReferenceInstrument = EXACT,
         balls_M: FloatArray | None = None,
+        places: FixedPlaces | None = None,
     ) -> None:
         """seed : of joints and noise.
 
         balls_M : (points, 3) mm, for a ball plate: the balls that are probed at the plan's points.
+        places : of fixed balls and pins: those at which the plan's points are measured.
         """
         weather = plan.weather
         self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
         self._mechanism = self._world.mechanism
         self._plan = plan
         self._rng = np.random.default_rng([seed, 2, plan.number])
-        self._log = RowLog(self._world, wiring, self._rng, reference)
+        self._log = RowLog(self._world, wiring, self._rng, reference, places)
         self._reference = reference
         self._balls_M = balls_M
+        self._places = places
         self._direction = np.ones(self._mechanism.links)
         self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
@@ -79,6 +83,8 @@ class Campaign:
                 self._add_row(item, item.point)
                 if item.repeated:
                     self._stay(REPEAT_AFTER_S)
+                    if self._places is not None and self._places.touched:
+                        self._touch(item.point - 1)  # lifted off and set down again
                     self._add_row(item, item.point)
             else:
                 self._pass(item)
@@ -102,14 +108,32 @@ class Campaign:
         self._world.advance_to(self._world.scale_mm, self._world.posture, time_s, 0.0)
 
     def _go_to(self, item: CampaignItem) -> None:
-        """Move to the item's point, rest, and with a ball plate probe its ball."""
+        """Move to the item's point, rest, and touch what is to be touched there."""
         self._visit += 1
         guess = self._postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
-        if self._balls_M is not None:
-            ball_M = self._reference.measure(self._balls_M[item.point - 1], self._rng)
-            for scale_mm in probing_steps_mm(self._world, ball_M, guess):
+        self._touch(item.point - 1)
+
+    def _touch(self, point: int) -> None:
+        """Bring the tip to what it touches at a point (from 0); nothing where it touches nothing."""
+        target_M, guess = self._target_M(point), self._postures[point]
+        if target_M is not None:
+            for scale_mm in probing_steps_mm(self._world, target_M, guess):
                 self._move(scale_mm, guess, PROBING_STEP_S)
+
+    def _target_M(self, point: int) -> FloatArray | None:
+        """(3,) where the tip comes to rest by touch at a point (from 0), with the touch's noise; None where it does not
+        touch anything."""
+        if self._balls_M is not None:
+            return self._reference.measure(self._balls_M[point], self._rng)
+        if self._places is None or not self._places.touched:
+            return None
+        end_M, tip_M = self._places.end_M[self._places.end_of_point[point]], self._places.tip_M[point]
+        radius_mm = float(np.linalg.norm(tip_M - end_M))
+        if radius_mm == 0:  # in a pin
+            return self._reference.measure(tip_M, self._rng)
+        touched_mm = float(self._reference.measure(np.array([radius_mm]), self._rng)[0])
+        return np.asarray(end_M + (tip_M - end_M) * (touched_mm / radius_mm))
 
     def _move(self, scale_mm: FloatArray, guess: Posture, time_s: float) -> None:
         moved = scale_mm - self._world.scale_mm

@@ -9,7 +9,15 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import Wiring
-from compd.recording.columns import POSITION_COLUMNS, approach_columns, link_reference_column, scale_columns
+from compd.recording.columns import (
+    ATTITUDE_COLUMNS,
+    DISTANCE_COLUMN,
+    POSITION_COLUMNS,
+    approach_columns,
+    link_reference_column,
+    scale_columns,
+)
+from compd.simulation.truth.fixed_places import FixedPlaces
 from compd.simulation.truth.indicated_tip import IndicatedTip
 from compd.simulation.truth.instruments import ReferenceInstrument
 from compd.simulation.truth.world import World
@@ -44,8 +52,13 @@ class RowLog:
         wiring: Wiring,
         rng: np.random.Generator,
         reference: ReferenceInstrument,
+        places: FixedPlaces | None = None,
     ) -> None:
-        """reference : with an exact one (sigma_um 0) the indicated tip is logged as well."""
+        """reference : with an exact one (sigma_um 0) the indicated tip is logged as well.
+
+        places : of the balls or pins at which a ballbar, a probe or a nest measures.
+        """
+        self._places = places
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
@@ -78,17 +91,39 @@ class RowLog:
 
     def _reference_columns(self) -> list[str]:
         """Names of the reference's columns."""
-        if self._reference.kind == "ball_plate":
+        kind = self._reference.kind
+        if kind == "ball_plate":
             return ["ball"]
-        if self._reference.kind == "interferometer":
+        if kind == "interferometer":
             return [link_reference_column(i) for i in range(1, self._world.mechanism.links + 1)]
-        return list(POSITION_COLUMNS)
+        if kind == "pose":
+            return [*POSITION_COLUMNS, *ATTITUDE_COLUMNS]
+        return {"pin": ["pin"], "ball": ["ball"], "ballbar": ["ball", DISTANCE_COLUMN]}.get(kind, [*POSITION_COLUMNS])
 
     def _reference_values(self, point: int | None) -> dict[str, float]:
         """One noisy measurement by column."""
         if self._reference.kind == "ball_plate":
             return {"ball": np.nan if point is None else point}
+        if self._places is not None and point is not None:
+            return self._from_fixed_place(self._places, point)
         interferometer = self._reference.kind == "interferometer"
         true_mm = self._world.link_change_mm() if interferometer else self._world.reference_tip_mm()
-        measured_mm = self._reference.measure(true_mm, self._rng).tolist()
-        return {name: round(value, 6) for name, value in zip(self._reference_columns(), measured_mm, strict=True)}
+        measured = self._reference.measure(true_mm, self._rng).tolist()
+        digits = [6] * len(measured)
+        if self._reference.kind == "pose":
+            measured += self._reference.measure_attitude(self._world.rotation_M_P(), self._rng).tolist()
+            digits += [9] * 3
+        return {
+            name: round(value, places)
+            for name, value, places in zip(self._reference_columns(), measured, digits, strict=True)
+        }
+
+    def _from_fixed_place(self, places: FixedPlaces, point: int) -> dict[str, float]:
+        """The fixed end at which a point is measured, and of a ballbar how long it is there."""
+        end = float(places.end_of_point[point - 1] + 1)
+        if self._reference.kind != "ballbar":
+            return {self._reference.kind: end}
+        away_mm = self._world.reference_tip_mm() - places.end_M[places.end_of_point[point - 1]]
+        true_mm = np.linalg.norm(away_mm) - places.length_error_mm
+        length_mm = float(self._reference.measure(np.array([true_mm]), self._rng)[0])
+        return {"ball": end, DISTANCE_COLUMN: round(length_mm, 6)}

@@ -12,7 +12,7 @@ from compd.errors import CompdError, Problem
 from compd.recording.ball_plate import write_plate
 from compd.recording.writer import write_recording
 from compd.simulation.campaign.plan_reader import read_plan
-from compd.simulation.campaign.simulated_recording import simulate_recording
+from compd.simulation.campaign.simulated_recording import FIXED, simulate_recording
 from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, write_answer
 from compd.simulation.truth.instruments import Kind
 from compd.simulation.truth.mechanism import Mechanism
@@ -79,7 +79,9 @@ def simulate_campaign(
         Hide a cause, chosen with its size by this number.
     reference : str
         The instrument beside the machine: ``"tracker"`` (0.15 um per axis), ``"interferometer"`` (0.05 um, along the
-        links) or ``"ball_plate"``.
+        links), ``"ball_plate"``, ``"ballbar"`` (0.2 um, of 100 mm from three balls), ``"pin"`` (three fixed pins; a
+        hexapod comes with twelve attitudes), ``"ball"`` (a calibrated ball of 25 mm at three places, touched) or
+        ``"pose"`` (the tip and the attitude, 2 urad).
     other_days : int
         Number of another campaign on the same machine, with other points, weather and loads; 0 is the first one.
     plan : str or Path, optional
@@ -109,13 +111,15 @@ def simulate_campaign(
     path = path if path.suffix == ".csv" else path.with_name(f"{path.name}.csv")
     configuration = load_machine(machine)
     mechanism = Mechanism(configuration.geometry)
-    if plan is not None and reference == "ball_plate":
+    if plan is not None and reference in ("ball_plate", *FIXED):
         raise CompdError(
             Problem(
                 where="reference",
-                what="a ball plate's balls are not where the plan goes",
+                what="a ball plate's balls are not where the plan goes"
+                if reference == "ball_plate"
+                else "fixed balls and pins are not where the plan goes",
                 value=reference,
-                allowed="tracker, interferometer",
+                allowed="tracker, interferometer, pose",
                 next_step="leave the plan or the reference out",
             )
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,13 +17,34 @@ from compd.simulation.campaign.planned_campaign import PlannedCampaign
 from compd.simulation.campaign.sizing import CauseSizer
 from compd.simulation.causes.hidden_cause import HiddenCause, SizedCause
 from compd.simulation.truth.cause import Cause
-from compd.simulation.truth.instruments import INSTRUMENTS, Kind, ball_plate_mm
+from compd.simulation.truth.fixed_places import (
+    PROBE_RADIUS_MM,
+    TOUCHED_RADIUS_MM,
+    FixedPlaces,
+    ballbar_places,
+    pin_places,
+    touched_ball_places,
+)
+from compd.simulation.truth.instruments import INSTRUMENTS, TRACKER_SIGMA_UM, Kind, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.strengths import FULLY_MEASURED
 
 OUTLIER_SHARE = 0.01
-QUANTITY = {"tracker": "tool_position", "interferometer": "link_length", "ball_plate": "ball_plate"}
+QUANTITY: Mapping[Kind, str] = {
+    "tracker": "tool_position",
+    "interferometer": "link_length",
+    "ball_plate": "ball_plate",
+    "ballbar": "distance",
+    "pin": "fixed_point",
+    "ball": "distance",
+    "pose": "tool_pose",
+}
+FIXED: Mapping[Kind, Callable[[Mechanism, np.random.Generator], FixedPlaces]] = {
+    "ballbar": ballbar_places,
+    "pin": pin_places,
+    "ball": touched_ball_places,
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +82,7 @@ def simulate_recording(
     plan; not with a ball plate, whose balls have fixed places.
     """
     geometry, wiring = configuration.geometry, configuration.wiring
-    sizer = CauseSizer(geometry, wiring, seed)
+    sizer = CauseSizer(geometry, wiring, seed, max(INSTRUMENTS[reference].sigma_um, TRACKER_SIGMA_UM))
     sized = tuple(sizer.size(cause) for cause in hidden)
     weak = sizer.weak_disturbances([cause.id for cause in hidden])
     causes = [*(cause.cause for cause in sized), *weak]
@@ -71,23 +92,37 @@ def simulate_recording(
     if planned_rows:
         campaign = PlannedCampaign(geometry, wiring, planned_rows, seed, other_days, FULLY_MEASURED, causes, instrument)
     else:
-        balls_M, days = _days(sizer.mechanism, reference, seed, other_days)
-        campaign = Campaign(geometry, wiring, days, seed, FULLY_MEASURED, causes, reference=instrument, balls_M=balls_M)
+        balls_M, places, days = _days(sizer.mechanism, reference, seed, other_days)
+        campaign = Campaign(
+            geometry, wiring, days, seed, FULLY_MEASURED, causes, reference=instrument, balls_M=balls_M, places=places
+        )
     reference_block: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": instrument.sigma_um}
-    if reference == "tracker":
+    if reference in ("tracker", "pose"):
         reference_block["frame"] = "machine"
+    if reference == "pose":
+        reference_block["sigma_urad"] = instrument.sigma_urad
+    if reference == "ball":
+        reference_block |= {"radius_mm": TOUCHED_RADIUS_MM + PROBE_RADIUS_MM, "absolute": True}
     if balls_M is not None:
         reference_block["balls"] = plate_file
     sidecar = sidecar_contents(configuration.machine, reference_block)
     return SimulatedRecording(campaign.run().columns, sidecar, balls_M, sized, tuple(weak))
 
 
-def _days(mechanism: Mechanism, reference: Kind, seed: int, number: int) -> tuple[FloatArray | None, CampaignPlan]:
-    """Balls (17, 3) or None, and the plan. With a ball plate the plan's points are the balls, without passes."""
+def _days(
+    mechanism: Mechanism, reference: Kind, seed: int, number: int
+) -> tuple[FloatArray | None, FixedPlaces | None, CampaignPlan]:
+    """Balls of a plate (17, 3) or None, fixed balls or pins or None, and the plan.
+
+    What is fixed is where the plan's points are, and without passes: nothing is measured on the way.
+    """
+    if reference in FIXED:
+        places = FIXED[reference](mechanism, np.random.default_rng([seed, 5, number]))
+        return None, places, draw_campaign_plan(mechanism, seed, number, points_mm=places.scale_mm, passes=0)
     if reference != "ball_plate":
-        return None, draw_campaign_plan(mechanism, seed, number)
+        return None, None, draw_campaign_plan(mechanism, seed, number)
     balls_M = ball_plate_mm(mechanism.tip0_M)
     turn_rad = np.zeros(3)
     postures = [mechanism.posture_at(ball_M, turn_rad) for ball_M in balls_M]
     points_mm = np.array([mechanism.lengths(posture) - mechanism.lengths0_mm for posture in postures])
-    return balls_M, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0)
+    return balls_M, None, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0)

@@ -210,6 +210,10 @@ class World:
         """(3,) the tip as a reference instrument without noise shows it, in `tip_frame`."""
         return self._state.shown
 
+    def rotation_M_P(self) -> FloatArray:
+        """(3, 3) attitude of the platform: the axes of {P} in {M}, as columns."""
+        return np.asarray(self._state.posture[1:].T)
+
     def link_change_mm(self) -> FloatArray:
         """(n,) change of the true distance between each link's joint centres since machine zero."""
         return self._state.link_mm - self._mechanism.lengths0_mm

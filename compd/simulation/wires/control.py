@@ -1,7 +1,7 @@
 """The simulated machine's control socket: one JSON object per line on a Unix socket.
 
     {"class": "TRUTH"}                                the true tip, and what the machine does
-    {"class": "MEASURE"}                              the tip as a laser tracker shows it, with its noise
+    {"class": "MEASURE"}                              the tip as a laser tracker shows it, and the links' lengths
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
     {"class": "TOUR"}                                 visit random points from now on
     {"class": "PLAN"}                                 measure the planned rows, from the first

@@ -13,7 +13,7 @@ import numpy as np
 from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.plugins import SIMULATED_GAUGES, load
-from compd.simulation.truth.instruments import TRACKER
+from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER
 from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
@@ -26,8 +26,9 @@ from compd.simulation.wires.tcp_port import ANY, claimed_port
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02
-# The tracker's noise does not depend on the machine's seed.
+# The instruments' noise does not depend on the machine's seed.
 TRACKER_SEED = 17
+INTERFEROMETER_SEED = 18
 
 
 class Simulation:
@@ -46,6 +47,7 @@ class Simulation:
         self.ports: Mapping[str, Port] = {}
         self._clock = clock
         self._tracker_rng = np.random.default_rng(TRACKER_SEED)
+        self._interferometer_rng = np.random.default_rng(INTERFEROMETER_SEED)
         self._live = LiveWorld(world, clock)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="world", daemon=True)
@@ -140,12 +142,15 @@ class Simulation:
             }
 
     def measure(self) -> Answer:
-        """The tip as a laser tracker on the surface plate shows it now: the MEASURED message.
+        """The tip as a laser tracker on the surface plate shows it now, and the links' lengths: the MEASURED message.
 
-        monotonic_s : on the clock that also stamps the gauges' readings.
+        monotonic_s : on the clock that also stamps the gauges' readings. link_mm : change of each link's length since
+        machine zero, as interferometers along the links show it.
         """
         with self._live.now() as world:
-            tip_mm = TRACKER.measure(world.look().shown, self._tracker_rng)
+            state = world.look()
+            tip_mm = TRACKER.measure(state.shown, self._tracker_rng)
+            link_mm = INTERFEROMETER.measure(state.link_mm - world.mechanism.lengths0_mm, self._interferometer_rng)
             return {
                 "class": "MEASURED",
                 "instrument": "laser tracker",
@@ -155,6 +160,8 @@ class Simulation:
                 "tip_frame": world.tip_frame,
                 "reference_mm": [round(value, 6) for value in tip_mm.tolist()],
                 "sigma_um": TRACKER.sigma_um,
+                "link_mm": [round(value, 6) for value in link_mm.tolist()],
+                "link_sigma_um": INTERFEROMETER.sigma_um,
             }
 
     def _drive(self, message: Mapping[str, Any]) -> Answer:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError, Problem, RecordingError
-from compd.recording.plan_file import SPEED_COLUMN, plan_row, plan_text, read_plan_file, write_plan_file
+from compd.recording.plan_file import SPEED_COLUMN, plan_row, plan_text, read_plan_file, write_text_file
 
 LIMITS = {"force_x_N": (-100.0, 100.0), SPEED_COLUMN: (0.0, 50.0)}
 ROWS = [
@@ -27,7 +27,7 @@ def test_a_plan_is_rounded_to_what_a_person_can_set() -> None:
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     path = tmp_path / "next.csv"
-    write_plan_file(path, ROWS)
+    write_text_file(path, plan_text(ROWS))
     problems: list[Problem] = []
     file = read_plan_file(path, 3, LIMITS, problems)
     assert problems == []
@@ -38,7 +38,9 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 
 def test_a_wrong_cell_is_a_problem_and_not_a_number(tmp_path: Path) -> None:
     path = tmp_path / "next.csv"
-    write_plan_file(path, [{**ROWS[0], "force_x_N": 101, "approach_2": 0.5, "tip_y_mm": "", SPEED_COLUMN: 51}])
+    write_text_file(
+        path, plan_text([{**ROWS[0], "force_x_N": 101, "approach_2": 0.5, "tip_y_mm": "", SPEED_COLUMN: 51}])
+    )
     problems: list[Problem] = []
     (line,) = read_plan_file(path, 3, LIMITS, problems).lines
     assert [problem.where.rpartition(" ")[2] for problem in problems] == [
@@ -54,7 +56,7 @@ def test_a_wrong_cell_is_a_problem_and_not_a_number(tmp_path: Path) -> None:
 
 def test_a_column_of_another_machine_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "next.csv"
-    write_plan_file(path, ROWS)
+    write_text_file(path, plan_text(ROWS))
     problems: list[Problem] = []
     read_plan_file(path, 2, {SPEED_COLUMN: (0.0, 50.0)}, problems)
     assert [problem.value for problem in problems] == ["force_x_N", "approach_3"]
@@ -63,6 +65,6 @@ def test_a_column_of_another_machine_is_refused(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_or_read_is_named(tmp_path: Path) -> None:
     path = tmp_path / "nowhere" / "next.csv"
     with pytest.raises(RecordingError, match="cannot be written"):
-        write_plan_file(path, ROWS)
+        write_text_file(path, plan_text(ROWS))
     with pytest.raises(CompdError, match="cannot be read"):
         read_plan_file(path, 3, LIMITS, [])

@@ -150,6 +150,10 @@ def test_a_tracker_shows_the_tip_with_its_noise(start: Callable[[Path], Running]
     assert {answer["monotonic_s"] for answer in answers} == {running.clock.monotonic()}
     assert np.std(off_um) == pytest.approx(answers[0]["sigma_um"], rel=0.2)
     assert np.abs(off_um.mean(axis=0)).max() < 0.1
+    link_um = 1e3 * np.array([answer["link_mm"] for answer in answers])
+    assert np.std(link_um, axis=0) == pytest.approx(np.full(3, answers[0]["link_sigma_um"]), rel=0.25)
+    # no cause is hidden: the links have changed by what the scales show, but for the joints' and the frame's errors
+    assert link_um.mean(axis=0) / 1e3 == pytest.approx([3.0, -4.0, 5.0], abs=0.1)
 
 
 def test_truth_for_other_scale_values_and_under_load(start: Callable[[Path], Running]) -> None:

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.clock_offset import ClockOffset, estimate_offset, evaluate_offset
-from compd.recording.columns import link_reference_column
-from compd.recording.instrument_export import LENGTH, Track
+from compd.instruments.track import LENGTH, Track
+from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
+from compd.recording.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 from compd.recording.recording import Recording
 from compd.recording.reference import Frame
 from compd.recording.sidecar import sidecar_contents
@@ -21,6 +22,8 @@ from compd.recording.writer import write_recording
 
 # The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
 STILL_MM = 0.001
+# 1 um at 100 mm from the point about which the platform turns.
+STILL_RAD = 1e-5
 _NOISE_SIGMAS = 6.0
 # Between samples further apart than this many periods nothing is interpolated.
 _GAP_PERIODS = 5.0
@@ -53,12 +56,16 @@ class Instrument:
     Attributes
     ----------
     frame : of its x, y, z. sigma_um : standard uncertainty per axis; None where it is not known.
-    link : for a length, the link that it measures (1-based).
+    sigma_urad : standard uncertainty of an attitude about each axis; None where it is not known.
+    link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
+        another fixed end, from which it is measured to the tip.
     """
 
     frame: Frame = "instrument"
     sigma_um: float | None = None
     link: int | None = None
+    sigma_urad: float | None = None
+    ball: int | None = None
 
 
 def join_reference(
@@ -83,7 +90,7 @@ def join_reference(
     RecordingError
         Where the offset cannot be estimated, no row matches, or the files cannot be written.
     """
-    problems = _problems(recording, track, instrument)
+    problems = _problems(recording, track, instrument, moving)
     if problems or recording.scale_mm is None:
         raise RecordingError(problems)
     if offset_s is None:
@@ -91,10 +98,10 @@ def join_reference(
     else:
         offset = evaluate_offset(recording.time_s, recording.scale_mm, track, offset_s)
     still_mm = max(STILL_MM, _NOISE_SIGMAS * track.noise_mm)
-    reference_mm, left_out = _reference_at_rows(
+    reference, left_out = _reference_at_rows(
         recording.time_s - offset.offset_s, track, offset, np.inf if moving else still_mm
     )
-    matched = int(np.isfinite(reference_mm).all(axis=1).sum())
+    matched = int(np.isfinite(reference).all(axis=1).sum())
     if not matched:
         raise RecordingError(
             Problem(
@@ -103,17 +110,35 @@ def join_reference(
                 next_step="check the offset; rows in motion are taken with --moving",
             )
         )
-    names = [
-        f"reference_{axis}_mm" if instrument.link is None else link_reference_column(instrument.link)
-        for axis in track.axes
-    ]
-    columns = {**recording.columns, **dict(zip(names, reference_mm.T, strict=True))}
+    columns = {**recording.columns, **dict(zip(_column_names(track, instrument), reference.T, strict=True))}
+    if instrument.ball is not None:
+        columns["ball"] = np.where(np.isfinite(reference[:, 0]), float(instrument.ball), np.nan)
     write_recording(out, columns, _sidecar(recording, track, instrument, offset, matched))
     return JoinResult(out, offset, matched, left_out, still_mm)
 
 
-def _problems(recording: Recording, track: Track, instrument: Instrument) -> list[Problem]:
+def _column_names(track: Track, instrument: Instrument) -> list[str]:
+    if instrument.ball is not None:
+        return [DISTANCE_COLUMN]
+    if instrument.link is not None:
+        return [link_reference_column(instrument.link)]
+    return [f"reference_{axis}_mm" for axis in track.axes] + list(
+        ATTITUDE_COLUMNS if track.rotation_rad is not None else ()
+    )
+
+
+def _problems(recording: Recording, track: Track, instrument: Instrument, moving: bool) -> list[Problem]:
     problems = []
+    if moving and track.time_std_s > 0:
+        problems.append(
+            Problem(
+                where=str(track.path),
+                what="has times that are too coarse for rows in motion: speed times their uncertainty is an error",
+                value=f"+- {track.time_std_s:.2g} s",
+                allowed="rows at rest, or times as fine as the rows",
+                next_step="leave --moving out, or export with fractions of a second",
+            )
+        )
     if recording.reference is not None:
         problems.append(
             Problem(
@@ -123,14 +148,21 @@ def _problems(recording: Recording, track: Track, instrument: Instrument) -> lis
                 next_step="join to a recording of gauges alone",
             )
         )
-    if instrument.sigma_um is not None and not 0 < instrument.sigma_um < np.inf:
+    problems += [
+        Problem(
+            where=str(track.path),
+            what="no standard uncertainty",
+            value=str(sigma),
+            allowed=f"more than 0 {unit}",
+            next_step=f"leave --sigma-{unit} out where it is not known",
+        )
+        for unit, sigma in (("um", instrument.sigma_um), ("urad", instrument.sigma_urad))
+        if sigma is not None and not 0 < sigma < np.inf
+    ]
+    if instrument.sigma_urad is not None and track.rotation_rad is None:
         problems.append(
             Problem(
-                where=str(track.path),
-                what="no standard uncertainty",
-                value=str(instrument.sigma_um),
-                allowed="more than 0 um",
-                next_step="leave --sigma-um out where it is not known",
+                where=str(track.path), what="has no attitude", next_step="leave --sigma-urad out, or export rx, ry, rz"
             )
         )
     if recording.scale_mm is None:
@@ -139,23 +171,32 @@ def _problems(recording: Recording, track: Track, instrument: Instrument) -> lis
         )
     length = track.axes == (LENGTH,)
     links = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
-    if length and (instrument.link is None or not 1 <= instrument.link <= links):
+    if length and (instrument.link is None) == (instrument.ball is None):
+        problems.append(
+            Problem(
+                where=str(track.path),
+                what="is a length; of what is not said" if instrument.link is None else "is one length",
+                allowed="--link or --ball",
+                next_step="say which link it measures with --link, or with --ball from which fixed ball to the tip",
+            )
+        )
+    if length and instrument.link is not None and not 1 <= instrument.link <= links:
         problems.append(
             Problem(
                 where=str(track.path),
                 what="is a length, of no link of this machine",
-                value=str(instrument.link or ""),
+                value=str(instrument.link),
                 allowed=f"1 to {links}",
                 next_step="say which link it measures with --link",
             )
         )
-    if not length and instrument.link is not None:
+    if not length and (instrument.link is not None or instrument.ball is not None):
         problems.append(
             Problem(
                 where=str(track.path),
-                what="is a position, not a link's length",
+                what="is a position, not a length",
                 value=", ".join(track.axes),
-                next_step="leave --link out",
+                next_step="leave --link and --ball out",
             )
         )
     return problems
@@ -164,31 +205,51 @@ def _problems(recording: Recording, track: Track, instrument: Instrument) -> lis
 def _reference_at_rows(
     time_s: FloatArray, track: Track, offset: ClockOffset, still_mm: float
 ) -> tuple[FloatArray, Mapping[str, int]]:
-    """(N, d) position at times of the instrument's clock, nan in gaps and in motion; and reason -> rows without one."""
+    """(N, d) position, and attitude behind it, at times of the instrument's clock; and reason -> rows without one.
+
+    nan outside the track, in gaps and in motion.
+    """
     after = np.searchsorted(track.time_s, time_s).clip(1, len(track.time_s) - 1)
     outside = (time_s < track.time_s[0]) | (time_s > track.time_s[-1])
     gap = ~outside & (track.time_s[after] - track.time_s[after - 1] > _GAP_PERIODS * track.period_s)
     position_mm = track.position_at(time_s)
     # an offset that a person gave has no uncertainty: then only the neighbouring samples must agree
-    reach_s = max(0.0 if np.isnan(offset.std_s) else 2.0 * offset.std_s, 1.5 * track.period_s)
-    moved_mm = np.zeros(len(time_s))
-    for shift_s in np.linspace(-reach_s, reach_s, _INSTANTS):
-        moved_mm = np.maximum(moved_mm, np.abs(track.position_at(time_s + shift_s) - position_mm).max(axis=1))
-    motion = ~outside & ~gap & (moved_mm > still_mm)
-    position_mm[outside | gap | motion] = np.nan
+    std_s = float(np.hypot(0.0 if np.isnan(offset.std_s) else offset.std_s, track.time_std_s))
+    reach_s = max(2.0 * std_s, 1.5 * track.period_s)
+    shifts_s = np.linspace(-reach_s, reach_s, _INSTANTS)
+    moved = np.zeros(len(time_s), dtype=bool)
+    for shift_s in shifts_s:
+        moved |= np.abs(track.position_at(time_s + shift_s) - position_mm).max(axis=1) > still_mm
+    reference = position_mm
+    if track.rotation_rad is not None:
+        rotation_rad = track.rotation_at(time_s)
+        still_rad = max(STILL_RAD, _NOISE_SIGMAS * track.rotation_noise_rad) if np.isfinite(still_mm) else np.inf
+        attitude = Rotation.from_rotvec(rotation_rad)
+        for shift_s in shifts_s:
+            turn = Rotation.from_rotvec(track.rotation_at(time_s + shift_s)) * attitude.inv()
+            moved |= turn.magnitude() > still_rad
+        reference = np.column_stack([position_mm, rotation_rad])
+    motion = ~outside & ~gap & moved
+    reference[outside | gap | motion] = np.nan
     reasons = {"outside the instrument's time": outside, "in a gap of the instrument": gap, "in motion": motion}
-    return position_mm, {reason: int(rows.sum()) for reason, rows in reasons.items() if rows.any()}
+    return reference, {reason: int(rows.sum()) for reason, rows in reasons.items() if rows.any()}
 
 
 def _sidecar(
     recording: Recording, track: Track, instrument: Instrument, offset: ClockOffset, matched: int
 ) -> dict[str, Any]:
     """The joined recording's sidecar; rows are numbered anew where some were left out."""
-    reference: dict[str, Any] = {"quantity": "link_length" if instrument.link else "tool_position"}
-    if not instrument.link:
-        reference["frame"] = instrument.frame
+    if instrument.ball is not None:
+        reference: dict[str, Any] = {"quantity": "distance"}
+    elif instrument.link is not None:
+        reference = {"quantity": "link_length"}
+    else:
+        tool = "tool_position" if track.rotation_rad is None else "tool_pose"
+        reference = {"quantity": tool, "frame": instrument.frame}
     if instrument.sigma_um is not None:
         reference["sigma_um"] = instrument.sigma_um
+    if instrument.sigma_urad is not None:
+        reference["sigma_urad"] = instrument.sigma_urad
     joined: dict[str, Any] = {
         "gauges": recording.path.name,
         "gauges_sha256": recording.sha256,
@@ -198,6 +259,8 @@ def _sidecar(
         "matched_rows": matched,
     }
     known = {"agreement": offset.agreement, "offset_std_s": offset.std_s}
+    if track.time_std_s > 0:
+        known["time_std_s"] = track.time_std_s
     joined |= {name: round(value, 6) for name, value in known.items() if not np.isnan(value)}
     provenance = {**recording.sidecar.provenance, "join": joined}
     return sidecar_contents(

@@ -26,7 +26,7 @@ from scipy.signal import correlate, correlation_lags
 
 from compd.arrays import BoolArray, FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.instrument_export import Track
+from compd.instruments.track import Track
 
 # Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
 MOTION_MM = 0.01
@@ -152,7 +152,8 @@ class _SharedMotion:
                 what=f"the clock offset cannot be told: {what}",
                 value=value,
                 allowed=allowed,
-                next_step="record with moves between dwells of different length, or give --offset S",
+                next_step="record with moves between dwells of different length, or give --offset S; join points at "
+                "rest --by order, name or distance",
             )
         )
 

@@ -1,0 +1,102 @@
+"""Options that say what an instrument's export is, and what a person is told about how it was read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from compd.instruments.export import ReadOptions
+
+
+class Shape(StrEnum):
+    """Shapes of exports."""
+
+    SA = "sa"
+    CSV = "csv"
+    BLANKS = "blanks"
+    CARTO = "carto"
+    XLSX = "xlsx"
+
+
+class DateOrder(StrEnum):
+    """Orders of day, month and year."""
+
+    DMY = "dmy"
+    MDY = "mdy"
+    YMD = "ymd"
+
+
+ShapeOption = Annotated[
+    Shape | None,
+    typer.Option("--as", help="The export's shape, where it is not found: SpatialAnalyzer, a delimiter, blanks ..."),
+]
+ColumnsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        help="What the columns are, in their order: time, date, x, y, z, rx, ry, rz, length, name, group, collection, "
+        "or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
+    ),
+]
+UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, where the file has none.")]
+AngleUnitOption = Annotated[str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, where it has none.")]
+DecimalOption = Annotated[
+    str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', where the file leaves both open.")
+]
+DatesOption = Annotated[
+    DateOrder | None, typer.Option("--dates", help="Order of day, month and year, where the file leaves it open.")
+]
+RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows in a second, where rows have no time.")]
+GroupOption = Annotated[
+    str | None, typer.Option("--group", help="The group of points to take, where there are several; all for all.")
+]
+SheetOption = Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, where there are several.")]
+
+
+def read_options(
+    shape: Shape | None,
+    columns: str | None,
+    names: Mapping[str, str | None],
+    unit: str | None,
+    angle_unit: str | None,
+    decimal: str | None,
+    dates: DateOrder | None,
+    rate_hz: float | None,
+    group: str | None,
+    sheet: str | None,
+) -> ReadOptions:
+    """The options as the reader takes them. Raises typer.BadParameter where the decimal mark is none.
+
+    names : role -> a column's name.
+    """
+    from compd.instruments.export import ReadOptions
+
+    if decimal not in (None, ".", ","):
+        raise typer.BadParameter("is . or ,", param_hint="--decimal")
+    return ReadOptions(
+        shape=shape.value if shape else None,
+        columns=tuple(columns.split(",")) if columns else (),
+        names={role: name for role, name in names.items() if name is not None},
+        unit=unit,
+        angle_unit=angle_unit,
+        decimal=decimal,
+        dates=dates.value if dates else None,
+        rate_hz=rate_hz,
+        group=group,
+        sheet=sheet,
+    )
+
+
+def echo_taken(path: Path, shape: str, taken: Mapping[str, str], left_out: Mapping[str, int]) -> None:
+    """Print what was found in an export, column by column, and which of its rows are not used."""
+    typer.echo(f"{path}: read as {shape}")
+    width = max(map(len, taken), default=0)
+    for role, text in taken.items():
+        typer.echo(f"    {role:<{width}}  {text}")
+    for reason, count in left_out.items():
+        typer.echo(f"    {count} row{'s' * (count != 1)} not used: {reason}")

@@ -1,0 +1,166 @@
+"""Aligning a recording with its machine: what the model predicts from the gauges, and the reference in its frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.external_machine import external_observations
+from compd.comparison.fixed_ends import place_balls, place_pins
+from compd.comparison.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.measured_attitude import attitude_mm, measured_attitude
+from compd.comparison.registration import Registration, register
+from compd.comparison.velocity import velocities
+from compd.configuration import Configuration
+from compd.errors import Problem, RecordingError
+from compd.machine_builder import build_model
+from compd.model.machine import MachineModel
+from compd.model.motion import Movement
+from compd.model.observations import Observations
+from compd.model.observe import observe
+from compd.recording.recording import Recording
+
+
+def align_recording(
+    recording: Recording,
+    configuration: Configuration | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> AlignedRecording:
+    """A recording on the machine that the configuration describes; None only for an external model.
+
+    Raises RecordingError where there is no reference, or where nothing can be computed from any row.
+    """
+    where = str(recording.path)
+    if recording.reference is None:
+        raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
+    starts = _session_starts(recording)
+    if configuration is None:
+        model, geometry_hash = None, ""
+        observations = external_observations(recording, starts)
+    else:
+        model = build_model(configuration.geometry, configuration.wiring)
+        geometry_hash = configuration.geometry_hash
+        observations = _observations(recording, model, starts)
+    if recording.reference_link_mm is not None:
+        labels = tuple(f"link {i}" for i in recording.reference_links)
+        links = tuple(i - 1 for i in recording.reference_links)
+        return AlignedRecording(
+            recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
+        )
+    if (end := recording.fixed_end) is not None:
+        return _at_fixed_ends(
+            AlignedRecording(
+                recording,
+                model,
+                observations,
+                ("x", "y", "z"),
+                (0, 1, 2),
+                np.full((recording.rows, 3), np.nan),
+                None,
+                geometry_hash,
+            ),
+            end,
+        )
+    measured_mm = recording.reference_mm
+    if measured_mm is None:
+        raise RecordingError(Problem(where=where, what="has no column of the reference"))
+    axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
+    registration = None
+    if recording.reference.frame == "instrument":
+        registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
+    labels = recording.reference_axes
+    # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
+    weighed = model is not None and len(axes) == 3 and np.isfinite(recording.reference.sigma_urad)
+    if weighed and recording.reference_rotation_rad is not None:
+        nominal = observations.rotation_M_P
+        attitude = measured_attitude(recording.reference_rotation_rad, nominal, registration)
+        measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
+        labels = (*labels, *ATTITUDE_LABELS)
+    return AlignedRecording(recording, model, observations, labels, axes, measured_mm, registration, geometry_hash)
+
+
+def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:
+    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,)."""
+    recording, where = aligned.recording, str(aligned.recording.path)
+    assert recording.reference is not None
+    tip_mm = np.where(recording.excluded[:, None], np.nan, aligned.nominal_tip_mm)
+    if recording.reference_distance_mm is None:
+        ends = place_pins(tip_mm, end, recording.end_name, where)
+        return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
+    distance_mm = recording.reference_distance_mm
+    ends = place_balls(tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where)
+    measured_mm = np.where(ends.of_row >= 0, distance_mm + ends.added_mm[ends.of_row], np.nan)[:, None]
+    return replace(aligned, ends=ends, labels=("distance",), measured_mm=measured_mm)
+
+
+def _registered(
+    recording: Recording,
+    measured_mm: FloatArray,
+    tip_M_mm: FloatArray,
+    axes: tuple[int, ...],
+    criteria: ComparisonCriteria,
+) -> tuple[Registration | None, FloatArray]:
+    """How the instrument's frame lies in {M}, and what was measured (N, m), in {M}; None where nothing fixes it.
+
+    Points in the plane z = 0 are turned in it. Along fewer axes, or of a point of which the third coordinate matters,
+    no frame can be laid over another: it must lie near already.
+    """
+    in_plane = axes == (0, 1) and not np.isfinite(tip_M_mm[:, 2]).any()
+    if len(axes) < 3 and not in_plane:
+        return None, measured_mm
+    points, predicted = np.zeros((len(measured_mm), 3)), np.zeros((len(measured_mm), 3))
+    points[:, list(axes)], predicted[:, list(axes)] = measured_mm, tip_M_mm[:, list(axes)]
+    registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
+    if registration is not None:
+        measured_mm = registration.into_M(points)[:, list(axes)]
+    return registration, measured_mm
+
+
+def _observations(recording: Recording, model: MachineModel, starts: BoolArray) -> Observations:
+    """Every row of the recording, as effects take it; comparators that were not recorded count as unmoved.
+
+    starts : (N,) rows without a history.
+    """
+    assert model.constants is not None
+    count = recording.rows
+    scale_mm = recording.scale_mm
+    if scale_mm is None:
+        raise RecordingError(
+            Problem(
+                where=str(recording.path),
+                what="has no scale columns",
+                allowed="scale_1_mm ...",
+                next_step="a machine's recording needs its scales; `machine: external` needs none",
+            )
+        )
+    comparators = model.joint_weights.shape[1]
+    joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
+    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
+    approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
+    at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
+    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm)
+    movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
+    return observe(
+        model,
+        model.constants,
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=recording.quantities,
+        time_s=recording.time_s,
+        session_start=starts,
+        movement=movement,
+    )
+
+
+def _session_starts(recording: Recording) -> BoolArray:
+    """(N,) rows without a history: the first of each session."""
+    starts = np.zeros(recording.rows, dtype=bool)
+    starts[:1] = True
+    if recording.session is not None:
+        starts[1:] = recording.session[1:] != recording.session[:-1]
+    return starts

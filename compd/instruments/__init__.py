@@ -1,0 +1,1 @@
+"""What instruments write: reading their exports, and writing plans and samples in the same shapes."""

@@ -1,0 +1,297 @@
+"""A table of text becomes an export: its columns' roles, units, times and groups."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.instruments.cells import numbers
+from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
+from compd.instruments.export import ATTITUDE_AXES, InstrumentExport, ReadOptions
+from compd.instruments.export_problems import ExportProblems
+from compd.instruments.raw_table import RawTable
+from compd.instruments.time_stamps import StampedTime, is_clock, is_date, is_stamp, read_stamps, spread_within
+from compd.units import unit_factor, unit_named
+
+ALL_GROUPS = "all"
+# Groups that a question lists.
+_SHOWN_GROUPS = 20
+_HALF_DAY = frozenset(("AM", "PM"))
+_LENGTH_UNITS = "mm, um, nm, cm, m, inch, ft"
+
+
+def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
+    """The export that a table holds. Raises RecordingError with everything that is wrong or must be said."""
+    problems = ExportProblems(table.path)
+    if not len(table.line):
+        problems.add(table.header_line, "has no rows", allowed="rows of numbers")
+        problems.check()
+    roles = find_roles(table, options, problems)
+    problems.check()
+    taken = {role: f"{column_text(table, k)}, {roles.why[role]}" for role, k in roles.column.items()}
+    unused = [k for k in range(len(table.columns)) if k not in roles.column.values()]
+    if unused:
+        taken["not used"] = ", ".join(column_text(table, k) for k in unused)
+    table = _of_group(table, roles, options, taken, problems)
+    problems.check()
+    axes = tuple(axis for axis in AXES if axis in roles.column)
+    time = _time(table, roles, options, problems)
+    values = _values(table, roles, axes, options, taken, problems)
+    problems.check()
+    complete: BoolArray = np.asarray(np.isfinite(values).all(axis=1))
+    if time is not None:
+        complete = complete & np.isfinite(time.time_s)
+        taken["time"] = f"{taken['time']}, {time.told}" if "time" in taken else time.told
+    if not complete.any():
+        problems.add(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")
+        problems.check()
+    names = _names(table, roles, taken)
+    left_out = dict(table.left_out)
+    if not complete.all():
+        left_out["with an empty cell"] = int((~complete).sum())
+        if names is not None:
+            names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
+    return InstrumentExport(
+        path=table.path,
+        shape=table.shape,
+        line=table.line[complete],
+        axes=axes,
+        values=values[complete],
+        time_s=None if time is None else time.time_s[complete],
+        time_std_s=0.0 if time is None else time.std_s,
+        name=names,
+        taken={**table.told, **taken},
+        left_out=left_out,
+    )
+
+
+def _of_group(
+    table: RawTable, roles: Roles, options: ReadOptions, taken: dict[str, str], problems: ExportProblems
+) -> RawTable:
+    """The rows of one group of points; asks where there are several and none is chosen."""
+    labels = _labels(table, roles)
+    if labels is None:
+        if options.group not in (None, ALL_GROUPS):
+            problems.add(0, "has no column of groups", f"--group {options.group}", "no --group")
+        return table
+    counts = Counter(labels)
+    listed = ", ".join(
+        f"{label or '(none)'} ({count} row{'s' * (count != 1)})" for label, count in counts.most_common(_SHOWN_GROUPS)
+    )
+    listed += f" and {len(counts) - _SHOWN_GROUPS} more" if len(counts) > _SHOWN_GROUPS else ""
+    if options.group == ALL_GROUPS or (options.group is None and len(counts) == 1):
+        taken["group"] = f"{taken.get('group', '')}: {'all of ' if len(counts) > 1 else ''}{listed}".lstrip(": ")
+        return table
+    wanted = {label for label in counts if options.group in (label, label.rpartition("::")[2])}
+    if options.group is not None and len(wanted) == 1:
+        chosen = wanted.pop()
+        rows = [i for i, label in enumerate(labels) if label == chosen]
+        taken["group"] = f"{taken.get('group', '')}: {chosen}, {len(rows)} of {len(labels)} rows".lstrip(": ")
+        columns = [[cells[i] for i in rows] for cells in table.columns]
+        others = {**table.left_out, "of other groups": len(labels) - len(rows)}
+        return replace(table, columns=columns, line=table.line[rows], left_out=others)
+    what = f"has {len(counts)} groups" if options.group is None else "has no such group, or several"
+    problems.add(
+        0, what, options.group or "", listed, "choose one with --group NAME, or take --group all for points by name"
+    )
+    return table
+
+
+def _labels(table: RawTable, roles: Roles) -> Sequence[str] | None:
+    """Row by row, the group: "collection::group" where there are several collections; None without any."""
+    group, collection = roles.column.get("group"), roles.column.get("collection")
+    if group is None or (collection is not None and len(set(table.columns[collection])) > 1):
+        if collection is None:
+            return None
+        if group is None:
+            return table.columns[collection]
+        return [f"{a}::{b}" for a, b in zip(table.columns[collection], table.columns[group], strict=True)]
+    return table.columns[group]
+
+
+def _names(table: RawTable, roles: Roles, taken: dict[str, str]) -> tuple[str, ...] | None:
+    """The names of the points; with their group in front where several groups use one name."""
+    if "name" not in roles.column:
+        return None
+    names = table.columns[roles.column["name"]]
+    labels = _labels(table, roles)
+    if labels is not None and len(set(labels)) > 1:
+        pairs = set(zip(labels, names, strict=True))
+        if len(pairs) > len(set(names)):
+            taken["name"] += ", with the group in front, as names occur in several"
+            return tuple(f"{label}::{name}" for label, name in zip(labels, names, strict=True))
+    return tuple(names)
+
+
+@dataclass(frozen=True)
+class _UnitOf:
+    """A unit, and who says it."""
+
+    unit: str
+    said: str
+
+
+def _values(
+    table: RawTable,
+    roles: Roles,
+    axes: Sequence[str],
+    options: ReadOptions,
+    taken: dict[str, str],
+    problems: ExportProblems,
+) -> FloatArray:
+    """(N, d) in mm, attitude in rad."""
+    raw = {
+        axis: numbers(table.columns[roles.column[axis]], table.line, column_text(table, roles.column[axis]), problems)
+        for axis in axes
+    }
+    columns = []
+    for wanted in ("mm", "rad"):
+        of_kind = [axis for axis in axes if (axis in ATTITUDE_AXES) == (wanted == "rad")]
+        if not of_kind:
+            continue
+        known = _unit(table, roles, of_kind, raw, wanted, options, problems)
+        factor = unit_factor(known.unit, wanted) if known else None
+        if known is None or factor is None:
+            columns += [np.full(len(table.line), np.nan)] * len(of_kind)
+            continue
+        for axis in of_kind:
+            # a unit in the name stands in the name
+            taken[axis] += f", {known.unit}" + ("" if roles.unit.get(axis) else f" {known.said}")
+            columns.append(raw[axis] * factor)
+    return np.column_stack(columns)
+
+
+def _unit(
+    table: RawTable,
+    roles: Roles,
+    axes: Sequence[str],
+    raw: dict[str, FloatArray],
+    wanted: str,
+    options: ReadOptions,
+    problems: ExportProblems,
+) -> _UnitOf | None:
+    """The one unit of these axes, as all who name one agree; None, with a problem, where none is named or two are."""
+    option, flag = (options.unit, "--unit") if wanted == "mm" else (options.angle_unit, "--angle-unit")
+    said: dict[str, str] = {}
+    for axis in axes:
+        if roles.unit.get(axis):
+            said.setdefault(roles.unit[axis], f"by the name of {axis}" if "columns" not in roles.why[axis] else "given")
+    if wanted == "mm" and table.unit:
+        said.setdefault(unit_named(table.unit) or table.unit, "by the file's header")
+    if option:
+        said.setdefault(unit_named(option) or option, f"by {flag}")
+    without = [axis for axis in axes if not roles.unit.get(axis)]
+    wrong = [unit for unit in said if unit_factor(unit, wanted) is None]
+    kind = "length" if wanted == "mm" else "angle"
+    allowed = _LENGTH_UNITS if wanted == "mm" else "rad, mrad, deg, arcsec"
+    if wrong:
+        problems.add(table.header_line, f"is no unit of {kind}", f"{wrong[0]}, {said[wrong[0]]}", allowed)
+    elif len(said) > 1:
+        problems.add(
+            table.header_line,
+            f"units are mixed: {', '.join(f'{unit} {who}' for unit, who in said.items())}",
+            allowed="one unit",
+            next_step="export in one unit, or leave out the option that differs",
+        )
+    elif said and len(without) not in (0, len(axes)) and not option and not table.unit:
+        problems.add(table.header_line, f"{', '.join(without)} has no unit, where others have one", allowed=allowed)
+    elif not said:
+        problems.ask(
+            f"no unit of {axes[0]} in its name, nor in the file",
+            _spans(axes, raw, wanted),
+            [f"{flag} {unit}" for unit in (("mm", "inch", "m") if wanted == "mm" else ("rad", "deg"))],
+            table.header_line,
+        )
+    else:
+        return _UnitOf(*next(iter(said.items())))
+    return None
+
+
+def _spans(axes: Sequence[str], raw: dict[str, FloatArray], wanted: str) -> str:
+    """From where to where the numbers go, and how long that is in other units."""
+    axis = max(axes, key=lambda axis: float(np.nanmax(raw[axis], initial=0.0) - np.nanmin(raw[axis], initial=0.0)))
+    filled = raw[axis][~np.isnan(raw[axis])]
+    if not len(filled):
+        return ""
+    span = float(filled.max()) - float(filled.min())
+    if wanted == "rad":
+        return f"{axis} spans {span:.4g}"
+    return f"{axis} spans {span:.4g}: as inch {span * 25.4:.4g} mm, as m {span * 1e3:.4g} mm"
+
+
+def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems) -> StampedTime | None:
+    """The times of the rows; None where they have none."""
+    column = roles.column.get("time")
+    if column is None:
+        if options.rate_hz is None:
+            return None
+        if not options.rate_hz > 0 or not np.isfinite(options.rate_hz):
+            problems.add(0, "is no rate", f"--rate-hz {options.rate_hz}", "more than 0 Hz")
+            return None
+        told = f"from the number of the row, {options.rate_hz:g} rows a second by --rate-hz"
+        return StampedTime(np.arange(len(table.line)) / options.rate_hz, 0.0, told)
+    if options.rate_hz is not None:
+        problems.add(table.header_line, "has a time", column_text(table, column), "no --rate-hz", "leave it out")
+        return None
+    cells = table.columns[column]
+    first = next((cell for cell in cells if cell), "")
+    if not is_stamp(first):
+        return _time_of_numbers(table, roles, cells, table.line, problems)
+    return read_stamps(
+        _whole_stamps(table, roles, column), table.line, options.dates, column_text(table, column), problems
+    )
+
+
+def _whole_stamps(table: RawTable, roles: Roles, column: int) -> Sequence[str]:
+    """Stamps of one column, or put together from date, time of day, and AM or PM in columns of their own."""
+    cells = table.columns[column]
+    date_column = roles.column.get("date")
+    if date_column is None and column and is_clock(cells[0]) and is_date(table.columns[column - 1][0]):
+        date_column = column - 1
+    elif date_column is None and is_date(cells[0]) and column + 1 < len(table.columns):
+        # the time of day stands behind the date
+        date_column, column = column, column + 1
+        cells = table.columns[column]
+    half = table.columns[column + 1] if column + 1 < len(table.columns) else ()
+    if half and half[0].upper() in _HALF_DAY and {cell.upper() for cell in half} <= _HALF_DAY:
+        cells = [f"{cell} {other}" for cell, other in zip(cells, half, strict=True)]
+    if date_column is None:
+        return cells
+    days = table.columns[date_column]
+    return [f"{day} {cell}" if cell else "" for day, cell in zip(days, cells, strict=True)]
+
+
+def _time_of_numbers(
+    table: RawTable, roles: Roles, cells: Sequence[str], line: IntArray, problems: ExportProblems
+) -> StampedTime | None:
+    """Times that are numbers: in the unit of the column, or else seconds where they have decimals."""
+    what = column_text(table, roles.column["time"])
+    values = numbers(cells, line, what, problems)
+    unit = roles.unit.get("time", "")
+    factor = unit_factor(unit, "s") if unit else None
+    told = unit or "s, as it has decimals and no unit"
+    filled = values[~np.isnan(values)]
+    if unit and factor is None:
+        problems.add(table.header_line, "is no unit of time", unit, "s, ms, us, min, h", "give --columns with time[s]")
+        return None
+    if not unit and np.all(filled == np.floor(filled)):
+        problems.ask(
+            "no unit of time in its name, and whole numbers",
+            ", ".join(cells[:3]),
+            [f"--columns with time[{other}] for {what}" for other in ("s", "ms")],
+            table.header_line or int(line[0]),
+        )
+        return None
+    ratio = factor or 1.0
+    time_s = values * ratio
+    repeated = bool(np.any(np.diff(filled) == 0.0))
+    joined = "".join(cells) if repeated else "e"
+    if "e" in joined or "E" in joined:
+        return StampedTime(time_s, 0.0, told)
+    decimals = max(len(cell.partition(".")[2]) for cell in cells)
+    time_s, std_s, spread = spread_within(time_s, ratio * 10.0**-decimals)
+    return StampedTime(time_s, std_s, f"{told}; {spread}" if spread else told)

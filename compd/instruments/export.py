@@ -1,0 +1,71 @@
+"""An instrument's export, read: points or a track of positions or lengths, each with its line in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from compd.arrays import FloatArray, IntArray
+
+POSITION_AXES = ("x", "y", "z")
+ATTITUDE_AXES = ("rx", "ry", "rz")
+LENGTH_AXES = ("length",)
+# `--as`: SpatialAnalyzer ASCII, text with a delimiter, text with columns between blanks, Renishaw CARTO, Excel.
+SHAPES = ("sa", "csv", "blanks", "carto", "xlsx")
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a person says about an export; None and empty: to be found in the file.
+
+    Attributes
+    ----------
+    shape : one of SHAPES (`--as`).
+    columns : roles of the columns in their order (`--columns`): time, x, y, z, rx, ry, rz, length, name, group, or `-`
+        for one that is not used.
+    names : role -> a column's name in the header (`--time`, `--x`, ...).
+    unit : of the lengths (`--unit`). angle_unit : of the attitude (`--angle-unit`). decimal : "." or "," (`--decimal`).
+    dates : "dmy", "mdy" or "ymd" (`--dates`). rate_hz : samples per second where rows have no time (`--rate-hz`).
+    group : which group of points (`--group`). sheet : of a workbook (`--sheet`).
+    """
+
+    shape: str | None = None
+    columns: tuple[str, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+    unit: str | None = None
+    angle_unit: str | None = None
+    decimal: str | None = None
+    dates: str | None = None
+    rate_hz: float | None = None
+    group: str | None = None
+    sheet: str | None = None
+
+
+@dataclass(frozen=True)
+class InstrumentExport:
+    """What was measured, in the order of the file.
+
+    Attributes
+    ----------
+    path : the file. shape : one of SHAPES.
+    line : (N,) line of the file, or row of the sheet, from 1; the number of the sample in a binary file.
+    axes : of `values`: a subset of x, y, z, all of them with rx, ry, rz, or "length" alone.
+    values : (N, d) mm; attitude: rotation vector, rad.
+    time_s : (N,) on the instrument's clock; None where rows have no time.
+    time_std_s : standard uncertainty of one time, beside the offset of the clock, s; 0 for stamps as fine as needed.
+    name : (N,) names of the points; None where they have none.
+    taken : what was taken for what, in words for a person: role -> "column 4 'X', mm by the header".
+    left_out : reason -> rows that are not there.
+    """
+
+    path: Path
+    shape: str
+    line: IntArray
+    axes: tuple[str, ...]
+    values: FloatArray
+    time_s: FloatArray | None = None
+    time_std_s: float = 0.0
+    name: tuple[str, ...] | None = None
+    taken: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, int] = field(default_factory=dict)

@@ -1,0 +1,82 @@
+"""What the name of a column says: which role it has, and in which unit it is."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from compd.instruments.export import ATTITUDE_AXES, POSITION_AXES
+from compd.units import unit_named
+
+_PARTS = re.compile(r"[^0-9a-z]+")
+_UNIT_BEHIND = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]\s*$")
+_LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "µ": "u", "μ": "u"})
+
+# Words, tidied, by what they make of a column, in English and German.
+_WORDS = {
+    "not measured": "nominal nom soll sollwert theo theoretical dev deviation abweichung delta error err fehler sigma "
+    "std rms uncertainty unsicherheit tol tolerance toleranz min max offset",
+    "measured": "actual act measured meas ist istwert mess gemessen value wert",
+    "time": "t time timestamp zeit zeitstempel uhrzeit messzeit elapsed seconds sekunden datetime zeitpunkt",
+    "date": "date datum",
+    "length": "length distance displacement position l d laenge abstand weg entfernung verschiebung strecke",
+    "name": "name target point punkt punktname pointname targetname label targetid pointid "
+    "bezeichnung punktbezeichnung",
+    "number": "id nr no num number nummer punktnummer index punktnr pointnumber",
+    "group": "group gruppe pointgroup punktgruppe",
+    "collection": "collection sammlung",
+    "angle": "roll pitch yaw a b c rollen nicken gieren",
+    **{axis: axis for axis in (*POSITION_AXES, *ATTITUDE_AXES)},
+}
+_MEANING = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
+# These count as the last word of a name too: "Tracker X", "raw time".
+_LAST = ("time", *POSITION_AXES, *ATTITUDE_AXES, "length")
+_LINK = re.compile(r"link_?\d+")
+
+
+class HeaderName(NamedTuple):
+    """A column's name, understood.
+
+    role : time, date, x, y, z, rx, ry, rz, length, name, number, group, collection; "angle" for one that may have any
+    of several meanings; "" for anything else. unit : as `compd.units` names it; "" for none.
+    """
+
+    role: str
+    unit: str
+
+
+def tidy_name(name: str) -> str:
+    """A name in lower case with single underscores: "Tracker X [mm]" is "tracker_x_mm"."""
+    return _PARTS.sub("_", name.lower().translate(_LETTERS)).strip("_")
+
+
+def understand(name: str) -> HeaderName:
+    """Role and unit of a column by its name alone."""
+    stem, unit = split_unit(name)
+    # "actual x" is x
+    parts = [part for part in stem.split("_") if _MEANING.get(part) != "measured"]
+    if not any(parts) or any(_MEANING.get(part) == "not measured" for part in parts):
+        return HeaderName("", unit)
+    whole, last = _MEANING.get("".join(parts), ""), _MEANING.get(parts[-1], "")
+    if whole or last in _LAST or (last == "angle" and len(parts[-1]) > 1):
+        return HeaderName(whole or last, unit)
+    numbered = parts[-1].isdigit() and len(parts) > 1 and _MEANING.get(parts[-2]) == "length"
+    return HeaderName("length" if numbered or _LINK.fullmatch("_".join(parts[-2:])) else "", unit)
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A name without its unit, tidied, and the unit: "X [mm]", "x_mm", "X mm", "X / mm" are ("x", "mm")."""
+    behind = _UNIT_BEHIND.search(name)
+    if behind:
+        unit = unit_named(behind[1])
+        stem = tidy_name(name[: behind.start()])
+        return (stem, unit) if stem else (tidy_name(name), unit)
+    tidied = _PARTS.sub("_", name.replace("µ", "u").replace("μ", "u").lower()).strip("_")
+    head, _, last = tidied.rpartition("_")
+    # as it was written: `x_M` is in a frame M, `x_m` in metres
+    written = [part for part in re.split(r"[^0-9A-Za-zµμ°\"]+", name) if part]
+    unit = unit_named(written[-1]) if head and last else ""
+    if not unit:
+        return tidy_name(name), ""
+    stem = tidy_name(head)
+    return (stem.removesuffix("_in") if unit != "inch" else stem), unit

@@ -1,0 +1,97 @@
+"""A text file as lines, whatever encoding and line ends it was written with."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from compd.errors import RecordingError
+from compd.files import read_small_file
+from compd.instruments.export_problems import ExportProblems
+
+# Some four million rows; a tracker with 50 samples a second writes them in a day.
+MOST_BYTES = 256 * 2**20
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL_BYTES = bytes([*range(9), *range(14, 32), 127])
+_UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
+
+
+@dataclass(frozen=True)
+class TextFile:
+    """The lines of a text file.
+
+    Attributes
+    ----------
+    path : the file. lines : without their ends; the first is line 1 for a person.
+    encoding : in words. complete : whether the last line has an end.
+    """
+
+    path: Path
+    lines: list[str]
+    encoding: str
+    complete: bool
+
+
+def read_content(path: Path) -> bytes:
+    """The bytes of a regular file. Raises RecordingError where it cannot be read, is empty or too long."""
+    problems = ExportProblems(path)
+    try:
+        content = read_small_file(path, MOST_BYTES)
+    except OSError as error:
+        problems.add(0, f"cannot be read: {error.strerror}", next_step="give the path of the instrument's export")
+        raise RecordingError(problems.problems) from error
+    if not content:
+        problems.add(0, "is empty", allowed="rows of numbers")
+    problems.check()
+    return content
+
+
+def decode_text(path: Path, content: bytes) -> TextFile:
+    """Text in UTF-8, in UTF-16 with a byte order mark, or else in Windows-1252.
+
+    Raises RecordingError, with the line, for what is no text.
+    """
+    problems = ExportProblems(path)
+    if content.startswith(_UTF16_MARKS):
+        text, encoding = _decoded(content, "utf-16", problems), "UTF-16"
+    else:
+        marked = content.startswith(_UTF8_MARK)
+        try:
+            text, encoding = content.decode("utf-8-sig"), "UTF-8 with a byte order mark" if marked else "UTF-8"
+        except UnicodeDecodeError:
+            text, encoding = _decoded(content, "cp1252", problems), "Windows-1252, as it is no UTF-8"
+    # programs of DOS times end a file so
+    text = text.removesuffix("\x1a")
+    # bytes are looked through ten times faster than characters
+    clean = encoding != "UTF-16" and len(content.translate(None, _CONTROL_BYTES)) == len(content)
+    control = None if clean else _CONTROL.search(text)
+    if control:
+        problems.add(
+            text.count("\n", 0, control.start()) + 1,
+            "is not text",
+            f"a byte 0x{ord(control[0]):02x}",
+            "text, a Renishaw CARTO file, or an Excel workbook (.xlsx)",
+            "export as text from the instrument's program",
+        )
+    problems.check()
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n")
+    complete = not lines[-1]
+    return TextFile(path, lines[:-1] if complete else lines, encoding, complete)
+
+
+def _decoded(content: bytes, encoding: str, problems: ExportProblems) -> str:
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        newline = "\n".encode(encoding)[-2:] if encoding == "utf-16" else b"\n"
+        problems.add(
+            content.count(newline, 0, error.start) + 1,
+            "is not text in any encoding that is known",
+            f"byte 0x{content[error.start]:02x}",
+            "UTF-8, UTF-16 with a byte order mark, or Windows-1252",
+            "save it as UTF-8",
+        )
+        raise RecordingError(problems.problems) from error

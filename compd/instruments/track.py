@@ -1,0 +1,123 @@
+"""An export that has times, as a track: where the instrument's target was at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from compd.arrays import FloatArray
+from compd.instruments.export import ATTITUDE_AXES, InstrumentExport
+from compd.instruments.export_problems import ExportProblems, lines_text
+
+LENGTH = "length"
+# 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
+_STD_PER_MEDIAN = 1.4826
+LEAST_ROWS = 3
+
+
+@dataclass(frozen=True)
+class Track:
+    """The positions or lengths that an instrument measured, sample by sample.
+
+    Attributes
+    ----------
+    path : the export. time_s : (M,) on the instrument's clock, strictly rising.
+    position_mm : (M, d) on `axes`: a subset of "x", "y", "z", or "length" alone.
+    rotation_rad : (M, 3) attitude, a rotation vector; None where none was measured.
+    time_std_s : standard uncertainty of one time, beside that of the clock's offset.
+    taken : what was taken for what, for a person. left_out : reason -> rows of the export that are not there.
+    """
+
+    path: Path
+    time_s: FloatArray
+    position_mm: FloatArray
+    axes: tuple[str, ...]
+    taken: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    rotation_rad: FloatArray | None = None
+    time_std_s: float = 0.0
+
+    @property
+    def period_s(self) -> float:
+        """Median time between two samples."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @property
+    def noise_mm(self) -> float:
+        """Standard deviation per axis, robustly, from each sample against the mean of its two neighbours."""
+        return _noise(self.position_mm)
+
+    @property
+    def rotation_noise_rad(self) -> float:
+        """As `noise_mm`, of the attitude; nan where none was measured."""
+        return np.nan if self.rotation_rad is None else _noise(self.rotation_rad)
+
+    def position_at(self, time_s: FloatArray) -> FloatArray:
+        """(N, d) position at times of the instrument's clock, linear between samples, held beyond the ends."""
+        return np.column_stack([np.interp(time_s, self.time_s, column) for column in self.position_mm.T])
+
+    def rotation_at(self, time_s: FloatArray) -> FloatArray:
+        """(N, 3) attitude, a rotation vector, as `position_at`; on the shortest arc between samples.
+
+        Raises ValueError where no attitude was measured.
+        """
+        if self.rotation_rad is None:
+            raise ValueError("no attitude was measured")
+        attitude = Slerp(self.time_s, Rotation.from_rotvec(self.rotation_rad))
+        return np.asarray(attitude(np.clip(time_s, self.time_s[0], self.time_s[-1])).as_rotvec(), dtype=np.float64)
+
+
+def track_of(export: InstrumentExport) -> Track:
+    """The track of an export whose rows have times.
+
+    Raises RecordingError where they have none, fall or stand still, or are fewer than three.
+    """
+    problems = ExportProblems(export.path)
+    if export.time_s is None:
+        problems.add(
+            0,
+            "no column is a time",
+            "; ".join(f"{role}: {text}" for role, text in export.taken.items()),
+            "e.g. time_s, or stamps of date and time",
+            "name it with --time, or say how many rows there are in a second with --rate-hz",
+        )
+        problems.check()
+    assert export.time_s is not None
+    not_rising = 1 + np.flatnonzero(np.diff(export.time_s) <= 0)
+    if len(not_rising):
+        lines = export.line[not_rising].tolist()
+        problems.add(
+            lines[0],
+            f"time does not rise ({lines_text(lines)})",
+            allowed="later than the row above",
+            next_step="choose one group of points with --group where there are several, or sort the rows",
+        )
+    if len(export.time_s) < LEAST_ROWS:
+        problems.add(
+            0,
+            f"{len(export.time_s)} rows have a time and {', '.join(export.axes)}",
+            allowed="three rows or more",
+        )
+    problems.check()
+    attitude = [k for k, axis in enumerate(export.axes) if axis in ATTITUDE_AXES]
+    position = [k for k, axis in enumerate(export.axes) if axis not in ATTITUDE_AXES]
+    return Track(
+        path=export.path,
+        time_s=export.time_s,
+        position_mm=export.values[:, position],
+        axes=tuple(export.axes[k] for k in position),
+        taken=export.taken,
+        left_out=export.left_out,
+        rotation_rad=export.values[:, attitude] if attitude else None,
+        time_std_s=export.time_std_s,
+    )
+
+
+def _noise(values: FloatArray) -> float:
+    """Steady motion cancels against the neighbours' mean; white noise of variance sigma^2 gives it 3/2 sigma^2."""
+    middle = values[1:-1] - (values[2:] + values[:-2]) / 2.0
+    return float(_STD_PER_MEDIAN * np.median(np.abs(middle)) / np.sqrt(1.5))

@@ -1,0 +1,138 @@
+"""Excel workbooks (.xlsx): the sheet that holds the list, as a table of text."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from compd.errors import Problem, RecordingError
+from compd.instruments.export import ReadOptions
+from compd.instruments.raw_table import RawTable
+from compd.instruments.workbook_cells import VALUES, Row, SheetReader, cell_name
+from compd.instruments.workbook_parts import BROKEN, SheetPart, check_workbook_file, read_sheet_part, unreadable
+from compd.instruments.workbook_table import SheetTable, find_table
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
+    from openpyxl.worksheet._read_only import ReadOnlyWorksheet
+
+# Rows of a sheet in which a number must stand for the sheet to count as one that holds numbers.
+_LOOKED_AT = 2000
+
+
+def read_workbook(path: Path, options: ReadOptions) -> RawTable:
+    """Read the list from a workbook: from the sheet that holds numbers, or from `options.sheet`.
+
+    Formulas count with the value that was computed last. Dates become ISO 8601 text, durations H:MM:SS.
+
+    Raises
+    ------
+    RecordingError
+        For what is no .xlsx, several sheets with numbers, a cell with an error or a formula without a value, another
+        header in the middle, merged cells in the list; with every problem that was found.
+    """
+    check_workbook_file(path)
+    with warnings.catch_warnings():
+        # of what a list does not need: styles, validation, extensions
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            return _read(path, options)
+        except BROKEN as error:
+            raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
+
+
+def _read(path: Path, options: ReadOptions) -> RawTable:
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True, data_only=True)
+    try:
+        sheet = _choose_sheet(path, book, options.sheet)
+        part = read_sheet_part(path, cast(Any, sheet)._worksheet_path)
+        reader = SheetReader(path, sheet.title)
+        rows = reader.read(sheet)
+        count = len(book.worksheets)
+    finally:
+        book.close()
+    if part.has_formulas:
+        book = load_workbook(path, read_only=True, data_only=False)
+        try:
+            reader.mark_formulas_without_value(book[sheet.title], rows)
+        finally:
+            book.close()
+    table = find_table(reader.place, rows)
+    problems = [*_merged(reader.place, part, table), *reader.wrong_cells(table.rows, options.decimal)]
+    if problems:
+        raise RecordingError(problems)
+    return _raw_table(path, table, reader, f"{sheet.title!r}, of {count}" if count > 1 else f"{sheet.title!r}")
+
+
+def _choose_sheet(path: Path, book: Workbook, wanted: str | None) -> ReadOnlyWorksheet:
+    """The sheet with numbers, or the one that is wanted. Raises RecordingError where it is not clear which."""
+    sheets = {sheet.title: sheet for sheet in book.worksheets}
+    if wanted is not None:
+        if wanted not in sheets:
+            raise RecordingError(
+                Problem(where=str(path), what="has no such sheet", value=wanted, allowed=", ".join(sheets))
+            )
+        return sheets[wanted]
+    with_numbers = [title for title, sheet in sheets.items() if SheetReader(path, title).has_number(sheet, _LOOKED_AT)]
+    if len(with_numbers) == 1:
+        return sheets[with_numbers[0]]
+    what = f"{len(with_numbers)} sheets hold numbers" if with_numbers else "no sheet holds a number"
+    raise RecordingError(
+        Problem(
+            where=str(path),
+            what=what,
+            value=", ".join(with_numbers or sheets),
+            allowed="one",
+            next_step="say which with --sheet" if with_numbers else "export the list again",
+        )
+    )
+
+
+def _merged(place: str, part: SheetPart, table: SheetTable) -> list[Problem]:
+    """A problem for cells of the list that are merged: all but the first of them are empty, and mean something."""
+    first, last = table.rows[0].number, table.rows[-1].number
+    inside = [area for area in part.merged if area.last_row >= first and area.first_row <= last]
+    if not inside:
+        return []
+    return [
+        Problem(
+            where=f"{place}, {', '.join(area.name for area in inside[:5])}",
+            what=f"{len(inside)} merged cells in the list",
+            allowed="a value in each cell",
+            next_step="undo the merging, and fill the cells",
+        )
+    ]
+
+
+def _raw_table(path: Path, table: SheetTable, reader: SheetReader, sheet: str) -> RawTable:
+    filled = sorted({column for row in table.rows for column, kind in enumerate(row.kinds) if kind})
+    named = [column for column, name in enumerate(table.header or ()) if name]
+    columns = sorted({*filled, *named})
+    told = {"sheet": sheet, **table.told}
+    if columns:
+        told["columns"] = f"{cell_name(columns[0])} to {cell_name(columns[-1])}"
+    if reader.dates:
+        told["dates"] = "cells with a date or a time of day, to the millisecond"
+    values = sum(any(kind in VALUES for kind in row.kinds) for row in table.rows)
+    if values < len(table.rows):
+        told["rows without a number"] = str(len(table.rows) - values)
+    header = table.header
+    return RawTable(
+        path=path,
+        shape="xlsx",
+        columns=[[_text(row, column) for row in table.rows] for column in columns],
+        line=np.array([row.number for row in table.rows]),
+        header=None if header is None else tuple((header[k] if k < len(header) else "") for k in columns),
+        header_line=table.header_row,
+        told=told,
+        left_out=table.left_out,
+    )
+
+
+def _text(row: Row, column: int) -> str:
+    return row.texts[column] if column < len(row.texts) else ""

@@ -1,0 +1,112 @@
+"""The parts of an .xlsx file, a zip archive: what is no workbook, what is too large, formulas and merged cells."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from compd.errors import Problem, RecordingError
+
+# Of the file on the disk, and unpacked: a full sheet of a million rows has 300 MB.
+MOST_BYTES = 200_000_000
+MOST_UNPACKED_BYTES = 1_000_000_000
+# What the reading of a damaged file ends with; a SyntaxError is XML that is not well formed.
+BROKEN = (
+    *(ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, EOFError, OSError, OverflowError),
+    *(NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error),
+)
+_ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_CHUNK = 1 << 20
+# Longer than what is looked for, which may lie across two chunks.
+_OVERLAP = 100
+_FORMULA = re.compile(rb"<(?:\w+:)?f[ >/]")
+_MERGED = re.compile(rb"<(?:\w+:)?mergeCell [^>]*?ref=\"(([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})(\d{1,7}))\"")
+_SAVE_AS = "open it in a spreadsheet and save it as .xlsx, without a password"
+
+
+@dataclass(frozen=True)
+class MergedArea:
+    """name : as in the sheet, "A3:A5". first_row, last_row : from 1."""
+
+    name: str
+    first_row: int
+    last_row: int
+
+
+@dataclass(frozen=True)
+class SheetPart:
+    """has_formulas : whether any cell has one. merged : areas of merged cells."""
+
+    has_formulas: bool
+    merged: tuple[MergedArea, ...]
+
+
+def check_workbook_file(path: Path) -> None:
+    """Raise RecordingError for what is no .xlsx file, cannot be read, or unpacks to more than a list can have."""
+    try:
+        if not path.is_file():
+            raise FileNotFoundError(2, "no such file")
+        with path.open("rb") as file:
+            begin = file.read(8)
+        size = path.stat().st_size
+    except OSError as error:
+        raise RecordingError(Problem(where=str(path), what=f"cannot be read: {error.strerror}")) from error
+    if begin == _OLD:
+        what = "is of an Excel before 2007 (.xls), or has a password"
+        raise RecordingError(Problem(where=str(path), what=what, allowed=".xlsx", next_step=_SAVE_AS))
+    if not begin.startswith(_ZIP):
+        raise RecordingError(
+            Problem(
+                where=str(path), what="is no .xlsx file", value=repr(begin), allowed=".xlsx", next_step="check --as"
+            )
+        )
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(part.file_size for part in archive.infolist())
+            names = archive.namelist()
+    except BROKEN as error:
+        raise RecordingError(unreadable(path, str(error))) from error
+    if size > MOST_BYTES or unpacked > MOST_UNPACKED_BYTES:
+        raise RecordingError(
+            Problem(
+                where=str(path),
+                what="is too large for a list of measurements",
+                value=f"{size} bytes, unpacked {unpacked}",
+                allowed=f"{MOST_BYTES} bytes, unpacked {MOST_UNPACKED_BYTES}",
+                next_step="save the sheet as CSV",
+            )
+        )
+    if not any(name.endswith(("workbook.xml", "workbook.bin")) for name in names):
+        raise RecordingError(unreadable(path, "it is an archive, and no workbook"))
+    if any(name.endswith("workbook.bin") for name in names):
+        raise RecordingError(
+            Problem(where=str(path), what="is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
+        )
+
+
+def unreadable(path: Path, reason: str) -> Problem:
+    """The problem of a workbook that is damaged."""
+    return Problem(
+        where=str(path),
+        what=f"cannot be read as .xlsx: {reason}",
+        next_step="save it again in a spreadsheet, or as CSV",
+    )
+
+
+def read_sheet_part(path: Path, name: str) -> SheetPart:
+    """What the reader of cells does not tell of a sheet. name : of its part in the archive."""
+    has_formulas = False
+    merged: dict[str, MergedArea] = {}
+    with zipfile.ZipFile(path) as archive, archive.open(name.lstrip("/")) as file:
+        rest = b""
+        while chunk := file.read(_CHUNK):
+            text = rest + chunk
+            has_formulas = has_formulas or _FORMULA.search(text) is not None
+            for match in _MERGED.finditer(text):
+                area = match[1].decode()
+                merged[area] = MergedArea(area, int(match[3]), int(match[5]))
+            rest = text[-_OVERLAP:]
+    return SheetPart(has_formulas, tuple(merged.values()))

@@ -1,0 +1,45 @@
+"""A place that is to be measured: for the instrument's target list, and for the controller that drives there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from compd.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the tip comes to a place so that every link comes from the side that is wanted.
+
+    via_M_mm : (3,) where it begins. end_M_mm : (3,) where it ends; None where it ends at the place, at rest.
+    speed_mm_per_s : of the tip on the way; 0 where any will do.
+    """
+
+    via_M_mm: FloatArray
+    end_M_mm: FloatArray | None = None
+    speed_mm_per_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Target:
+    """One row of a plan.
+
+    Attributes
+    ----------
+    name : unique in the plan, "P007". purpose : what it is for.
+    tip_M_mm : (3,) place of the tool's tip in {M}; None where the plan sets something else.
+    settings : what is to be set or held, by name with unit, in the order in which it is shown.
+    begins : whether it begins a programme. time_s : after the programme's beginning.
+    way : None where the tip may come as it likes, or where no straight way is as wanted.
+    no_way : why there is no such way; "" where there is one, or none is wanted.
+    """
+
+    name: str
+    purpose: str
+    tip_M_mm: FloatArray | None
+    settings: Mapping[str, float] = field(default_factory=dict)
+    begins: bool = True
+    time_s: float = 0.0
+    way: Way | None = None
+    no_way: str = ""

@@ -1,0 +1,83 @@
+"""Which dwell of the machine each point of an instrument belongs to, or why that cannot be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.joining.distances import separation_mm
+
+# Points nearer than this are repeats at one place, where the uncertainty is not larger: six standard deviations of a
+# laser tracker's 8 um at a few metres. Also the least distance at which a point no longer belongs to a dwell.
+REPEAT_MM = 0.05
+# A point farther from its dwell than so many times the rms of the others does not belong to it.
+LIMIT_SIGMAS = 6.0
+# Another assignment competes if it lacks no more dwells of points than are allowed, and if fewer than this share of its
+# pairs are the same; it must then be worse by the factor CLEARLY_WORSE, as clock offsets must.
+OTHER_SHARE = 0.9
+CLEARLY_WORSE = 2.0
+# Share of the points, or one, that may be without a dwell.
+MOST_WITHOUT = 0.05
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Which dwell each of G points belongs to.
+
+    Attributes
+    ----------
+    dwell : (G,) number of the dwell from 0, -1 for none. rms_mm : of what the distances between the points differ by.
+    limit_mm : points farther from their dwell than this have none.
+    other : (G,) the dwell that each point fits next best, -1 for none.
+    unclear : (G,) points that would fit another dwell as well; they have none in what a search returns.
+    next_best : (by how many dwells all points are shifted, rms in mm), None where there is no other.
+    """
+
+    dwell: IntArray
+    rms_mm: float
+    limit_mm: float
+    other: IntArray
+    unclear: BoolArray
+    next_best: tuple[int, float] | None = None
+
+    @property
+    def count(self) -> int:
+        """Points with a dwell."""
+        return int((self.dwell >= 0).sum())
+
+
+@dataclass(frozen=True)
+class NoAssignment:
+    """Why there is none.
+
+    Attributes
+    ----------
+    why : as the `what` of a problem. value, allowed : likewise.
+    point, dwell : the first point that does not fit, and the dwell where it would be in order; None where not known.
+    """
+
+    why: str
+    value: str = ""
+    allowed: str = ""
+    point: int | None = None
+    dwell: int | None = None
+
+
+def repeat_distance_mm(sigma_mm: float) -> float:
+    """Points nearer to each other are at one place: six standard deviations of the difference of two, REPEAT_MM or
+    more."""
+    return REPEAT_MM if np.isnan(sigma_mm) else max(REPEAT_MM, LIMIT_SIGMAS * np.sqrt(2.0) * sigma_mm)
+
+
+def unit_hint(place: FloatArray, point: FloatArray) -> str:
+    """A remark where the instrument's steps are so many times the machine's as one unit is of another."""
+    steps = [float(np.median(np.abs(separation_mm(values[:-1], values[1:])))) for values in (place, point)]
+    ratio = steps[1] / max(steps[0], 1e-9)
+    for factor, told in ((25.4, "mm read as inches"), (1 / 25.4, "inches read as mm"), (1000.0, "mm read as m")):
+        if abs(ratio / factor - 1.0) < 0.1:
+            return f"; its steps are {ratio:.3g} times the machine's: {told}?"
+    if abs(ratio * 1000.0 - 1.0) < 0.1:
+        return f"; its steps are {ratio:.3g} times the machine's: m read as mm?"
+    return ""

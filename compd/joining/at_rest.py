@@ -1,0 +1,276 @@
+"""Joining a recording of gauges with points that an instrument measured at rest, by order, name or distance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.configuration import Configuration
+from compd.errors import Problem, RecordingError
+from compd.instruments.export import LENGTH_AXES, POSITION_AXES, InstrumentExport
+from compd.joining.assignment import Assignment, NoAssignment, repeat_distance_mm
+from compd.joining.by_distance import assign_by_distance
+from compd.joining.by_name import assign_by_name, check_names
+from compd.joining.by_order import assign_by_order
+from compd.joining.by_time import Instrument
+from compd.joining.dwells import Dwell, dwell_columns, find_dwells
+from compd.joining.expected_places import expected_places_mm
+from compd.joining.joined_rows import joined_columns, joined_sidecar
+from compd.joining.misplaced_names import lines_text, listed, name_problems
+from compd.joining.plan_points import dwell_of_plan_rows, read_plan_points
+from compd.recording.recording import Recording
+from compd.recording.writer import write_recording
+from compd.units import UM_PER_MM
+
+By = Literal["order", "name", "distance"]
+
+
+@dataclass(frozen=True)
+class RestJoin:
+    """What `join_at_rest` wrote.
+
+    Attributes
+    ----------
+    path : the CSV file. by : "order", "name" or "distance".
+    dwells : of the recording. points : of the export. joined : rows written, one for each point with a dwell.
+    first, last : (line of the export, dwell) of the first and the last pair.
+    rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
+    next_best : (shift by so many dwells, its rms in mm), of an assignment by order; None where there is no other.
+    left_out : reason -> points or dwells, in words, that are in no row.
+    of_lengths : whether the points are lengths along a link.
+    """
+
+    path: Path
+    by: By
+    dwells: tuple[Dwell, ...]
+    points: int
+    joined: int
+    first: tuple[int, Dwell]
+    last: tuple[int, Dwell]
+    rms_mm: float
+    next_best: tuple[int, float] | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    of_lengths: bool = False
+
+
+@dataclass(frozen=True)
+class _Assigned:
+    """dwell : (G,) of each point, -1 for none. visit : (G,) the same for repeats. The rest as in RestJoin."""
+
+    dwell: IntArray
+    visit: IntArray
+    rms_mm: float
+    next_best: tuple[int, float] | None
+    left_out: dict[str, str]
+
+
+def join_at_rest(
+    recording: Recording,
+    configuration: Configuration | None,
+    export: InstrumentExport,
+    out: Path,
+    instrument: Instrument,
+    by: By,
+    plan: Path | None = None,
+) -> RestJoin:
+    """Write `out` (NAME.csv and NAME.yaml): one row for each point, with the gauges' readings in its dwell.
+
+    Parameters
+    ----------
+    recording : of gauges alone. configuration : of its machine; None is refused.
+    export : x, y, z of points, or lengths along `instrument.link`; times are not used.
+    by : "order": the points were measured in the order of the dwells. "name": names are ids in `point`, or with `plan`
+        the numbers of the plan's rows. "distance": neither is known, each place was visited once.
+    plan : the plan that the machine has measured.
+
+    Raises
+    ------
+    RecordingError
+        Where the dwells and the points cannot be told to belong together, or the files cannot be written.
+    """
+    if problems := _problems(recording, configuration, export, instrument, by):
+        raise RecordingError(problems)
+    assert configuration is not None
+    dwells = find_dwells(recording)
+    expected_mm = expected_places_mm(configuration, dwell_columns(recording, [d.rows for d in dwells]), instrument.link)
+    reachable = np.asarray(np.isfinite(expected_mm).all(axis=1))
+    no_pose = int((~reachable).sum())
+    if not reachable.any():
+        raise RecordingError(Problem(where=str(recording.path), what="the gauges give a pose in no dwell"))
+    kept = [dwell for dwell, known in zip(dwells, reachable, strict=True) if known]
+    places_mm = expected_mm[reachable]
+    measured_mm = export.values[:, : places_mm.shape[1]]
+    sigma_mm = np.nan if instrument.sigma_um is None else instrument.sigma_um / UM_PER_MM
+    in_M = instrument.frame == "machine"
+    if by == "name":
+        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, in_M)
+    elif by == "order":
+        assigned = _by_places(assign_by_order(places_mm, measured_mm, sigma_mm), kept, export)
+    else:
+        assigned = _by_places(assign_by_distance(places_mm, measured_mm, sigma_mm, in_M), kept, export)
+    points = np.flatnonzero(assigned.dwell >= 0)
+    columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument.link)
+    left_out = dict(assigned.left_out)
+    if no_pose:
+        left_out["dwells in which the gauges give no pose"] = str(no_pose)
+    number_rows = len(columns["time_s"])
+    sidecar = joined_sidecar(
+        recording, export, instrument, by, number_rows, len(export.line), assigned.rms_mm, assigned.next_best
+    )
+    write_recording(out, columns, sidecar)
+    pairs = [(int(export.line[j]), kept[assigned.dwell[j]]) for j in (points[0], points[-1])]
+    return RestJoin(
+        out,
+        by,
+        dwells,
+        len(export.line),
+        number_rows,
+        pairs[0],
+        pairs[1],
+        assigned.rms_mm,
+        assigned.next_best,
+        left_out,
+        instrument.link is not None,
+    )
+
+
+def _problems(
+    recording: Recording,
+    configuration: Configuration | None,
+    export: InstrumentExport,
+    instrument: Instrument,
+    by: By,
+) -> list[Problem]:
+    problems = []
+
+    def add(where: Path, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+        problems.append(Problem(where=str(where), what=what, value=value, allowed=allowed, next_step=next_step))
+
+    if recording.reference is not None:
+        what = "has a reference already"
+        add(recording.sidecar.path, what, recording.reference.quantity, "", "join to a recording of gauges alone")
+    if configuration is None or recording.scale_mm is None:
+        what = "points at rest are joined by the distances that the machine's kinematics expects"
+        add(recording.sidecar.path, what, recording.machine, "a machine with scales and a configuration", "--machine")
+    if instrument.sigma_um is not None and not 0 < instrument.sigma_um < np.inf:
+        what, next_step = "no standard uncertainty", "leave --sigma-um out where it is not known"
+        add(export.path, what, str(instrument.sigma_um), "more than 0 um", next_step)
+    if instrument.ball is not None or instrument.sigma_urad is not None:
+        add(
+            export.path,
+            "distances and attitudes are joined by time",
+            "",
+            "--by time",
+            "leave --ball and --sigma-urad out",
+        )
+    links = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
+    if export.axes == LENGTH_AXES:
+        if instrument.link is None or not 1 <= instrument.link <= links:
+            what, next_step = "is a length, of no link of this machine", "say which link it measures with --link"
+            add(export.path, what, str(instrument.link or ""), f"1 to {links}", next_step)
+        if by != "order":
+            add(export.path, "lengths are joined by time or by order", f"--by {by}", "--by order, --by time")
+    elif instrument.link is not None:
+        add(export.path, "is a position, not a link's length", ", ".join(export.axes), "", "leave --link out")
+    elif export.axes[:3] != POSITION_AXES:
+        what = "points at rest are joined by their distances, which need x, y and z"
+        add(export.path, what, ", ".join(export.axes), "x, y, z", "join by time")
+    if by == "name" and export.name is None:
+        add(
+            export.path, "has no names of points", "", "a column of names", "name it with --columns, or join --by order"
+        )
+    if len(export.line) == 0:
+        add(export.path, "has no point")
+    return problems
+
+
+def _by_places(result: Assignment | NoAssignment, dwells: list[Dwell], export: InstrumentExport) -> _Assigned:
+    """What the places tell. Raises RecordingError where they do not."""
+    if isinstance(result, NoAssignment):
+        where = str(export.path)
+        if result.point is not None and result.dwell is not None:
+            dwell = dwells[min(result.dwell, len(dwells) - 1)]
+            where += f":{export.line[result.point]}, beside {dwell}"
+        raise RecordingError(
+            Problem(
+                where=where,
+                what=result.why,
+                value=result.value,
+                allowed=result.allowed,
+                next_step="check that both are of one measurement, their unit and the machine; delete points that were "
+                "measured beside it; with names of points: --by name",
+            )
+        )
+    left_out = {}
+    fits_none = np.flatnonzero((result.dwell < 0) & ~result.unclear)
+    if len(fits_none):
+        left_out[f"points of no dwell, none within {result.limit_mm:.2g} mm"] = lines_text(export, fits_none)
+    if result.unclear.any():
+        left_out["points that fit two dwells alike"] = lines_text(export, np.flatnonzero(result.unclear))
+    without = np.setdiff1d(np.arange(len(dwells)), result.dwell)
+    if len(without):
+        left_out["dwells without a point"] = listed([str(dwells[i].number) for i in without])
+    return _Assigned(result.dwell, result.dwell, result.rms_mm, result.next_best, left_out)
+
+
+def _by_name(
+    dwells: list[Dwell],
+    places_mm: FloatArray,
+    export: InstrumentExport,
+    measured_mm: FloatArray,
+    sigma_mm: float,
+    plan: Path | None,
+    in_M: bool,
+) -> _Assigned:
+    assert export.name is not None
+    if plan is None:
+        targets = np.arange(len(dwells))
+        ids = [dwell.point for dwell in dwells]
+    else:
+        targets = dwell_of_plan_rows(places_mm, read_plan_points(plan), plan)
+        ids = [str(row) if dwell >= 0 else "" for row, dwell in enumerate(targets.tolist(), start=1)]
+        first_row = {dwell: row for row, dwell in reversed([*enumerate(targets.tolist(), start=1)])}
+        dwells = [replace(dwell, point=str(first_row.get(k, ""))) for k, dwell in enumerate(dwells)]
+    if not any(ids):
+        raise RecordingError(
+            Problem(
+                where=str(export.path),
+                what="the recording has no ids of points that names could be",
+                allowed="a column `point` in the recording, or the plan that was measured",
+                next_step="give --plan PLAN.csv, or join --by order",
+            )
+        )
+    order = np.arange(len(export.name)) if export.time_s is None else np.argsort(export.time_s, kind="stable")
+    sizes = [len(dwells[dwell].rows) if dwell >= 0 else 0 for dwell in targets]
+    named = assign_by_name(ids, sizes, [export.name[j] for j in order])
+    target_of = named.dwell[np.argsort(order)]
+    dwell_of = np.where(target_of >= 0, targets[target_of], -1)
+    left_out = {}
+    if named.unknown:
+        left_out["names that no dwell has"] = listed(named.unknown)
+    if named.unclear:
+        left_out["names of which it is not clear at which visit each point was measured"] = listed(named.unclear)
+    if named.without:
+        left_out["points of the recording without a name in the export"] = listed(named.without)
+    if not (dwell_of >= 0).any():
+        raise RecordingError(
+            Problem(
+                where=str(export.path),
+                what="no name is a point of the recording"
+                if not named.unclear
+                else "the places were visited several times, and the points do not stand in the order of measuring",
+                value=listed(export.name),
+                allowed=listed([own for own in dict.fromkeys(ids) if own]),
+                next_step="name the points as the recording or the plan does, list them in the order of measuring or "
+                "with times, or join --by order",
+            )
+        )
+    check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm), in_M)
+    if check.why or len(check.wrong) or check.rms_mm > check.allowed_mm:
+        raise RecordingError(name_problems(check, dwells, export, dwell_of))
+    return _Assigned(dwell_of, target_of, check.rms_mm, None, left_out)

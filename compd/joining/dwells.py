@@ -1,0 +1,187 @@
+"""Where the machine stood still: the dwells of a recording of gauges, each with the mean of every column."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.errors import Problem, RecordingError
+from compd.recording.columns import ID_COLUMNS, approach_columns
+from compd.recording.recording import Recording
+
+# The scales of a machine at rest stay within this, or within what their own noise can imitate.
+STILL_MM = 0.001
+NOISE_SIGMAS = 6.0
+# More is motion, however noisy the scales are: `clock_offset.MOTION_MM` for a recording without an instrument.
+LARGEST_LIMIT_MM = 0.01
+# Shorter than a measurement takes: a machine that reverses also stands still for a moment.
+LEAST_ROWS = 3
+LEAST_S = 1.0
+# Rows that may be missing or wrong in the middle of a dwell.
+_MOST_GAP_ROWS = 2
+# The quarter quantile of the absolute value of a standard normal variable.
+_QUARTER = 0.3186
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """Rows of a recording in which the machine stood at one place.
+
+    Attributes
+    ----------
+    number : from 1, in the order of time.
+    rows : (R,) positions of the rows in the recording.
+    time_s : (2,) of the first and the last of them.
+    point : id of the place as the recording has it; "" where it has none.
+    """
+
+    number: int
+    rows: IntArray
+    time_s: tuple[float, float]
+    point: str = ""
+
+    @property
+    def middle_s(self) -> float:
+        """Time in the middle of the dwell."""
+        return (self.time_s[0] + self.time_s[1]) / 2.0
+
+    def __str__(self) -> str:
+        point = f" (point {self.point})" if self.point else ""
+        return f"dwell {self.number}{point} at {self.middle_s:.1f} s"
+
+
+def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
+    """The dwells of a recording with scales, in the order of time.
+
+    Rows with an id in `point` are at rest by what the recording says: successive rows of one visit, without visits of
+    one point, are one dwell. Without a column `point` a dwell is a stretch in which every scale stays within STILL_MM,
+    or within what its noise can imitate, for LEAST_ROWS rows and LEAST_S seconds. Rows that a person excluded are in
+    no dwell.
+
+    Raises RecordingError where there is none.
+    """
+    stretches = _stretches_of_points(recording) if recording.point is not None else _still_stretches(recording)
+    if not stretches:
+        raise RecordingError(_no_dwell(recording))
+    return tuple(
+        Dwell(number, rows, (float(recording.time_s[rows[0]]), float(recording.time_s[rows[-1]])), point)
+        for number, (rows, point) in enumerate(stretches, start=1)
+    )
+
+
+def dwell_columns(recording: Recording, rows_of: Sequence[IntArray]) -> dict[str, FloatArray]:
+    """Name -> (D,) the columns of the recording, averaged over each of D sets of rows; nan where all cells are empty.
+
+    Ids and directions are those of the first row. A recording whose dwells were found by its scales also has the
+    directions of approach, which rows of dwells alone could not tell.
+    """
+    columns = dict(recording.columns)
+    if recording.point is None and recording.approach is not None:
+        columns |= dict(zip(approach_columns(recording.approach.shape[1]), recording.approach.T, strict=True))
+    averaged = {}
+    for name, values in columns.items():
+        if name in ID_COLUMNS or name.startswith("approach_"):
+            averaged[name] = np.array([values[rows[0]] for rows in rows_of])
+        else:
+            averaged[name] = np.array([_mean(values[rows]) for rows in rows_of])
+    return averaged
+
+
+def _mean(values: FloatArray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else np.nan
+
+
+def _no_dwell(recording: Recording) -> Problem:
+    if recording.point is not None:
+        return Problem(
+            where=str(recording.path), what="no row has an id in `point`", next_step="write one into rows at rest"
+        )
+    return Problem(
+        where=str(recording.path),
+        what="the machine stands still nowhere",
+        allowed=f"{LEAST_ROWS} rows and {LEAST_S:g} s or more within {STILL_MM * 1e3:g} um on every scale",
+        next_step="record faster, or dwell longer; where each row is a place at rest, say so with a column `point`",
+    )
+
+
+def _stretches_of_points(recording: Recording) -> list[tuple[IntArray, str]]:
+    """Successive rows with the same point, visit and session, and the point's id as text."""
+    assert recording.point is not None
+    ids = [recording.point] + [ids for ids in (recording.visit, recording.session) if ids is not None]
+    keys = np.column_stack(ids)
+    changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
+    stretches = []
+    for rows in np.split(np.arange(recording.rows), changes):
+        point = int(recording.point[rows[0]]) if len(rows) else -1
+        kept = rows[~recording.excluded[rows] & _has_scales(recording)[rows]]
+        if point >= 0 and len(kept):
+            stretches.append((kept, recording.point_labels[point] if recording.point_labels else str(point)))
+    return stretches
+
+
+def _has_scales(recording: Recording) -> BoolArray:
+    """(N,) rows with a value of every scale."""
+    assert recording.scale_mm is not None
+    return np.asarray(np.isfinite(recording.scale_mm).all(axis=1))
+
+
+def _still_stretches(recording: Recording) -> list[tuple[IntArray, str]]:
+    """Stretches in which no scale leaves the mean of the stretch so far by more than the limit."""
+    assert recording.scale_mm is not None
+    usable = np.flatnonzero(_has_scales(recording) & ~recording.excluded)
+    scale_mm, time_s = recording.scale_mm[usable], recording.time_s[usable]
+    limit_mm = _limits_mm(scale_mm)
+    stretches = []
+    first = 0
+    while first < len(usable):
+        kept = _stretch_from(first, scale_mm, limit_mm)
+        if len(kept) >= LEAST_ROWS and time_s[kept[-1]] - time_s[kept[0]] >= LEAST_S:
+            rows = _trimmed(kept, scale_mm, limit_mm)
+            stretches.append((usable[rows], ""))
+            first = kept[-1] + 1
+        else:
+            first += 1
+    return stretches
+
+
+def _stretch_from(first: int, scale_mm: FloatArray, limit_mm: FloatArray) -> IntArray:
+    """Rows from `first` on that stay; up to _MOST_GAP_ROWS rows that leave and are followed by one that stays do not
+    end the stretch."""
+    kept, total_mm, away = [first], scale_mm[first].copy(), 0
+    for row in range(first + 1, len(scale_mm)):
+        if (np.abs(scale_mm[row] - total_mm / len(kept)) <= limit_mm).all():
+            kept.append(row)
+            total_mm += scale_mm[row]
+            away = 0
+        else:
+            away += 1
+            if away > _MOST_GAP_ROWS:
+                break
+    return np.array(kept)
+
+
+def _trimmed(rows: IntArray, scale_mm: FloatArray, limit_mm: FloatArray) -> IntArray:
+    """The rows without those at either end that still settle: farther from the median than a third of the limit."""
+    near = (np.abs(scale_mm[rows] - np.median(scale_mm[rows], axis=0)) <= limit_mm / 3.0).all(axis=1)
+    inner = np.flatnonzero(near)
+    if len(inner) < LEAST_ROWS:
+        return rows
+    return rows[inner[0] : inner[-1] + 1]
+
+
+def _limits_mm(scale_mm: FloatArray) -> FloatArray:
+    """(n,) how far each scale may be from its mean at rest.
+
+    The noise is that of each row against the mean of its neighbours, whose variance is 3/2 sigma^2 at rest. The lower
+    quartile of its absolute value is of rows at rest where a quarter of all rows or more are.
+    """
+    if len(scale_mm) < LEAST_ROWS:
+        return np.full(scale_mm.shape[1], STILL_MM)
+    against_neighbours = np.abs(scale_mm[1:-1] - (scale_mm[2:] + scale_mm[:-2]) / 2.0)
+    noise_mm = np.quantile(against_neighbours, 0.25, axis=0) / _QUARTER / np.sqrt(1.5)
+    limits: FloatArray = np.clip(NOISE_SIGMAS * noise_mm, STILL_MM, LARGEST_LIMIT_MM)
+    return limits

@@ -1,0 +1,51 @@
+"""Where the machine's kinematics, without any effect, expects the tip and the links in each dwell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.configuration import Configuration
+from compd.machine_builder import build_model
+from compd.model.motion import Movement
+from compd.model.observe import observe
+from compd.model.prediction import predict
+from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.units import UM_PER_MM
+
+
+def expected_places_mm(
+    configuration: Configuration, columns: Mapping[str, FloatArray], link: int | None = None
+) -> FloatArray:
+    """(D, 3) the tip in {M}, or with `link` (from 1) (D, 1) the change of that link; nan where there is no pose.
+
+    columns : name with unit -> (D,) readings, as `dwell_columns` returns them. Comparators that were not recorded
+        count as unmoved, as in a comparison.
+    Raises KinematicsError for a configuration whose machine zero cannot be computed.
+    """
+    model = build_model(configuration.geometry, configuration.wiring)
+    assert model.constants is not None
+    scale_mm = np.column_stack([columns[name] for name in scale_columns(model.links)])
+    count, comparators = len(scale_mm), model.joint_weights.shape[1]
+
+    def comparators_mm(names: tuple[str, ...]) -> FloatArray:
+        return np.column_stack([columns.get(name, np.zeros(count)) for name in names]) / UM_PER_MM
+
+    joint_mm = comparators_mm(joint_columns(comparators)) if comparators else np.zeros((count, 0))
+    rows = observe(
+        model,
+        model.constants,
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=comparators_mm(FRAME_COLUMNS),
+        quantities={},
+        time_s=np.arange(count, dtype=np.float64),
+        session_start=np.zeros(count, dtype=bool),
+        movement=Movement.unknown(scale_mm, joint_mm),
+    )
+    prediction = predict(model, rows, {})
+    if link is not None:
+        return np.asarray(prediction.link_length_mm[:, link - 1 : link] - model.zero.link_length_mm[link - 1])
+    return prediction.tip_mm

@@ -1,0 +1,41 @@
+"""A machine that measures points at rest: its gauges as a recording, and the points as an instrument has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from compd.arrays import FloatArray
+from compd.instruments.export import InstrumentExport
+from compd.recording.columns import FRAME_COLUMNS
+from compd.recording.writer import write_recording
+
+SIDECAR = {"machine": "tripod-cmm"}
+# Where the instrument stands: nobody tells the join.
+TURNED = Rotation.from_rotvec([0.4, -0.9, 1.3]).as_matrix()
+MOVED_MM = np.array([2500.0, -800.0, 310.0])
+
+
+def write_gauges(path: Path, time_s: FloatArray, scale_mm: FloatArray, **extra: FloatArray) -> Path:
+    """A recording of gauges alone; comparators that do not move."""
+    columns = {"time_s": time_s, **{f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}}
+    columns |= {f"joint_{k}_um": np.zeros(len(time_s)) for k in range(1, 10)}
+    columns |= {name: np.zeros(len(time_s)) for name in FRAME_COLUMNS}
+    write_recording(path, {**columns, **extra}, SIDECAR)
+    return path
+
+
+def in_own_frame(tip_M_mm: FloatArray) -> FloatArray:
+    """(N, 3) points in the instrument's frame."""
+    return np.asarray(tip_M_mm @ TURNED.T + MOVED_MM)
+
+
+def points(measured_mm: FloatArray, names: list[str] | None = None) -> InstrumentExport:
+    """An export of points, or of lengths (N, 1), without time, whose first point stands in line 2."""
+    axes = ("length",) if measured_mm.shape[1] == 1 else ("x", "y", "z")
+    line = np.arange(2, len(measured_mm) + 2)
+    return InstrumentExport(
+        Path("points.csv"), "csv", line, axes, measured_mm, name=None if names is None else tuple(names)
+    )

@@ -1,0 +1,37 @@
+"""Exports with times as tracks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from compd.errors import RecordingError
+from compd.instruments.track import track_of
+from tests.unit.instruments.reading import read
+
+
+def test_positions_between_samples_and_attitude_on_the_shortest_arc(tmp_path: Path) -> None:
+    """Half a turn is one attitude with two rotation vectors: from one to the other nothing turns."""
+    text = "time_s,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\n0,0,0,0,3.13,0,0\n1,2,4,6,-3.13,0,0\n2,4,8,12,-3.13,0,0\n"
+    track = track_of(read(tmp_path, text))
+    assert track.axes == ("x", "y", "z")
+    np.testing.assert_allclose(track.position_at(np.array([0.5, 9.0])), [[1, 2, 3], [4, 8, 12]])
+    middle = Rotation.from_rotvec(track.rotation_at(np.array([0.5, 1.5])))
+    wanted = Rotation.from_rotvec([[np.pi, 0, 0], [-3.13, 0, 0]])
+    np.testing.assert_allclose((middle * wanted.inv()).magnitude(), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("name,x_mm,y_mm\nA,1,2\nB,2,3\nC,2,3\n", "no column is a time"),
+        ("time_s,x_mm\n1.5,1\n2.5,2\n", "2 rows have a time and x"),
+        ("time_s,x_mm\n1.5,1\n2.5,2\n2.0,2\n3.5,2\n", r"export.txt:4: time does not rise \(line 4\)"),
+    ],
+)
+def test_what_is_no_track_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
+    with pytest.raises(RecordingError, match=wanted):
+        track_of(read(tmp_path, text))
