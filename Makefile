@@ -72,7 +72,7 @@ hidden: $(STAMP)
 
 # The tutorial, a pair and a cause outside the library.
 hidden-sample: $(STAMP)
-	$(BIN)/pytest -m sample -n $(SIDE_BY_SIDE) $(HIDDEN)
+	$(BIN)/pytest -m sample -n 2 $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -56,6 +56,9 @@ def write_configuration(directory: Path) -> Path:
     data["loop"]["rate_hz"] = LOOP_HZ
     for line in data["lines"].values():
         line.setdefault("poll_every_s", POLL_EVERY_S)
+    # their devices stand still with the computer, and count on after it
+    for gauge in data["gauges"].values():
+        gauge["trust_after_loss"] = True
     path = directory / TRIPOD.name
     path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
     return path
@@ -123,9 +126,7 @@ class HiddenRun:
             for visit in visits:
                 self.drive(visit)
                 arrived_s = time.monotonic()
-                setpoint = next(
-                    message for message in setpoints if message["time_s"] > arrived_s and message["state"] == "ok"
-                )
+                setpoint = next(message for message in setpoints if _tells(message, arrived_s))
                 errors_mm.append(np.subtract(setpoint["tip_M_mm"], self.machine.ask("TRUTH")["tip_mm"]))
         return float(np.sqrt(np.mean(np.square(errors_mm)))) * 1e3
 
@@ -159,6 +160,12 @@ class HiddenRun:
         finally:
             process.terminate()
             self.outputs.append(first + process.communicate(timeout=COMMAND_TIMEOUT_S)[0])
+
+
+def _tells(setpoint: dict[str, Any], arrived_s: float) -> bool:
+    """Whether it is ok and of a time after `arrived_s`. AssertionError where it will not be without a person."""
+    assert setpoint["state"] != "fault", setpoint["reason"]
+    return setpoint["time_s"] > arrived_s and setpoint["state"] == "ok"
 
 
 @contextmanager
