@@ -14,7 +14,7 @@ help:
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
 	@echo "make pages   every command and piece of Python of README and docs, run (9 min)"
-	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (3 min)"
+	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (6 min)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from operator import attrgetter
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,7 +28,7 @@ from compd.joining.assignment import (
     repeat_distance_mm,
     unit_hint,
 )
-from compd.joining.distances import Motion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
+from compd.joining.distances import RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 # Fewer different points fit among many dwells by chance.
 LEAST_POINTS = 5
@@ -67,11 +68,11 @@ def assign_by_distance(
             f"{LEAST_POINTS} or more that are not on one line",
         )
     if in_M:
-        results = _distinct([_grown(place_mm, measured_mm, Motion(np.eye(3), np.zeros(3)), near_mm, in_M)])
+        results = _distinct([_grown(place_mm, measured_mm, RigidMotion(np.eye(3), np.zeros(3)), near_mm, in_M)])
     else:
-        results = _found(place_mm, measured_mm, different_mm, near_mm)
+        results = _assignments(place_mm, measured_mm, different_mm, near_mm)
     if not results:
-        if not in_M and _found(place_mm, -measured_mm, -different_mm, near_mm):
+        if not in_M and _assignments(place_mm, -measured_mm, -different_mm, near_mm):
             return NoAssignment(
                 "the points are a mirror image of the dwells", "a left-handed frame", "x, y, z of a right-handed frame"
             )
@@ -94,7 +95,9 @@ def _places(values_mm: FloatArray, near_mm: float) -> IntArray:
     return number
 
 
-def _found(place_mm: FloatArray, measured_mm: FloatArray, different_mm: FloatArray, near_mm: float) -> list[Assignment]:
+def _assignments(
+    place_mm: FloatArray, measured_mm: FloatArray, different_mm: FloatArray, near_mm: float
+) -> list[Assignment]:
     """All assignments that grow from triangles of points, the best first."""
     results: list[Assignment] = []
     witnesses = 0
@@ -109,7 +112,9 @@ def _found(place_mm: FloatArray, measured_mm: FloatArray, different_mm: FloatArr
     return _distinct(results)
 
 
-def _frames(corners: FloatArray, place_mm: FloatArray, between_mm: FloatArray, tolerance_mm: float) -> list[Motion]:
+def _frames(
+    corners: FloatArray, place_mm: FloatArray, between_mm: FloatArray, tolerance_mm: float
+) -> list[RigidMotion]:
     """The motions that lay a triangle of points, (3, 3), over triangles of places whose sides are as long.
 
     between_mm : (P, P) distances between the places. tolerance_mm : by which sides may differ.
@@ -137,7 +142,7 @@ def _triangles(point_mm: FloatArray) -> list[FloatArray]:
 
 
 def _grown(
-    place_mm: FloatArray, measured_mm: FloatArray, frame: Motion, near_mm: float, in_M: bool
+    place_mm: FloatArray, measured_mm: FloatArray, frame: RigidMotion, near_mm: float, in_M: bool
 ) -> Assignment | None:
     """The assignment that grows from a frame, with places in place of dwells; None where most points are at none."""
     tree, count = cKDTree(place_mm), len(measured_mm)
@@ -180,7 +185,7 @@ def _decided(
 ) -> Assignment | NoAssignment:
     """The best assignment, with dwells in place of places, if it is clearly better than all others and right."""
     may_lack = _may_lack(len(measured_mm))
-    best = min(results[: 1 + sum(each.count >= results[0].count - may_lack for each in results[1:])], key=_rms)
+    best = min((each for each in results if each.count >= results[0].count - may_lack), key=attrgetter("rms_mm"))
     with_place = best.dwell >= 0
     allowed_mm = largest_rms_mm(place_mm[best.dwell[with_place]])
     if best.rms_mm > allowed_mm:
@@ -217,7 +222,3 @@ def _decided(
             "places that were visited once",
         )
     return Assignment(dwell, best.rms_mm, best.limit_mm, other, unclear)
-
-
-def _rms(assignment: Assignment) -> float:
-    return assignment.rms_mm

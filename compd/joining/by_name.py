@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.joining.distances import LARGEST_RMS_MM, Motion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
+from compd.joining.distances import LARGEST_RMS_MM, RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 _LAST_NUMBER = re.compile(r"(?:.*\D)?0*(\d+)")
 # Robust registration: points far off are left out of it, until the same ones are.
@@ -132,7 +132,7 @@ def check_names(
         return NameCheck(
             distances_rms_mm(p, q), allowed_mm, why="the distances between the points are not their dwells'"
         )
-    motion = Motion(np.eye(3), np.zeros(3)) if in_M else lay_over(q[right], p[right])
+    motion = RigidMotion(np.eye(3), np.zeros(3)) if in_M else lay_over(q[right], p[right])
     wrong = np.flatnonzero(~right)
     from_all = np.linalg.norm(expected_mm[None, :, :] - motion(q[wrong])[:, None, :], axis=2)
     limit_mm = _limit_mm(np.linalg.norm(p[right] - motion(q[right]), axis=1), allowed_mm, near_mm)

@@ -30,7 +30,7 @@ _LAGS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144, 233, 377)
 
 
 @dataclass(frozen=True)
-class Motion:
+class RigidMotion:
     """What lays the instrument's points over the machine's: turned (d, d), then moved by moved_mm (d,)."""
 
     turned: FloatArray
@@ -41,7 +41,7 @@ class Motion:
         return np.asarray(measured_mm @ self.turned.T + self.moved_mm)
 
 
-def lay_over(measured_mm: FloatArray, expected_mm: FloatArray) -> Motion:
+def lay_over(measured_mm: FloatArray, expected_mm: FloatArray) -> RigidMotion:
     """The rotation and displacement, of lengths (d = 1) the displacement, from measured (N, d) to expected (N, d).
 
     By least squares (W. Kabsch, Acta Cryst. A32 (1976) 922), never a mirror image.
@@ -53,7 +53,7 @@ def lay_over(measured_mm: FloatArray, expected_mm: FloatArray) -> Motion:
         with np.errstate(all="ignore"):
             rotation, _ = Rotation.align_vectors(expected_mm - expected_centre, measured_mm - centre)
         turned = rotation.as_matrix()
-    return Motion(turned, np.asarray(expected_centre - turned @ centre))
+    return RigidMotion(turned, np.asarray(expected_centre - turned @ centre))
 
 
 def pairs_of(count: int) -> tuple[IntArray, IntArray]:

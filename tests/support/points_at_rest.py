@@ -13,6 +13,8 @@ from compd.recording.columns import FRAME_COLUMNS
 from compd.recording.writer import write_recording
 
 SIDECAR = {"machine": "tripod-cmm"}
+# What a machine without compensation is wrong by, and the instrument's noise.
+MACHINE_MM, NOISE_MM = 0.02, 0.005
 # Where the instrument stands: nobody tells the join.
 TURNED = Rotation.from_rotvec([0.4, -0.9, 1.3]).as_matrix()
 MOVED_MM = np.array([2500.0, -800.0, 310.0])
@@ -30,6 +32,16 @@ def write_gauges(path: Path, time_s: FloatArray, scale_mm: FloatArray, **extra: 
 def in_own_frame(tip_M_mm: FloatArray) -> FloatArray:
     """(N, 3) points in the instrument's frame."""
     return np.asarray(tip_M_mm @ TURNED.T + MOVED_MM)
+
+
+def random_places(rng: np.random.Generator, count: int) -> FloatArray:
+    """(count, 3) places within 100 mm."""
+    return rng.uniform(-100, 100, (count, 3))
+
+
+def measured(rng: np.random.Generator, place_mm: FloatArray, error_mm: float = MACHINE_MM) -> FloatArray:
+    """The points that an instrument shows of places, each of which the machine reaches with an error of its own."""
+    return in_own_frame(place_mm + rng.normal(0.0, error_mm, place_mm.shape)) + rng.normal(0, NOISE_MM, place_mm.shape)
 
 
 def points(measured_mm: FloatArray, names: list[str] | None = None) -> InstrumentExport:

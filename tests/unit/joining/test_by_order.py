@@ -9,19 +9,7 @@ from compd.arrays import FloatArray
 from compd.joining.assignment import Assignment, NoAssignment
 from compd.joining.by_order import assign_by_order
 from compd.joining.distances import distances_rms_mm, is_spread, lay_over
-from tests.support.points_at_rest import in_own_frame
-
-# What a machine without compensation is wrong by, and the instrument's noise.
-MACHINE_MM, NOISE_MM = 0.02, 0.005
-
-
-def places(rng: np.random.Generator, count: int) -> FloatArray:
-    return rng.uniform(-100, 100, (count, 3))
-
-
-def measured(rng: np.random.Generator, place_mm: FloatArray, error_mm: float = MACHINE_MM) -> FloatArray:
-    """The points that an instrument shows of places, each of which the machine reaches with an error of its own."""
-    return in_own_frame(place_mm + rng.normal(0.0, error_mm, place_mm.shape)) + rng.normal(0, NOISE_MM, place_mm.shape)
+from tests.support.points_at_rest import MACHINE_MM, NOISE_MM, in_own_frame, measured, random_places
 
 
 def assigned(expected_mm: FloatArray, points_mm: FloatArray) -> Assignment:
@@ -40,7 +28,7 @@ def refused(expected_mm: FloatArray, points_mm: FloatArray) -> NoAssignment:
 @pytest.mark.parametrize(("first", "count"), [(0, 40), (0, 25), (7, 25), (15, 25), (39 - 4, 5)])
 def test_instrument_that_began_later_or_ended_earlier(seed: int, first: int, count: int) -> None:
     rng = np.random.default_rng(seed)
-    expected_mm = places(rng, 40)
+    expected_mm = random_places(rng, 40)
     result = assigned(expected_mm, measured(rng, expected_mm[first : first + count]))
     assert result.dwell.tolist() == list(range(first, first + count))
     assert result.rms_mm == pytest.approx(np.sqrt(2) * np.hypot(MACHINE_MM, NOISE_MM), rel=0.6)
@@ -50,7 +38,7 @@ def test_instrument_that_began_later_or_ended_earlier(seed: int, first: int, cou
 @pytest.mark.parametrize("seed", range(5))
 def test_repeats_missing_and_extra_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    expected_mm = places(rng, 40)
+    expected_mm = random_places(rng, 40)
     wanted = np.delete(np.repeat(np.arange(40), np.where(np.arange(40) % 5 == 2, 3, 1)), [30])
     missing = int(np.setdiff1d(np.arange(40), wanted)[0]) if len(np.setdiff1d(np.arange(40), wanted)) else -1
     points_mm = in_own_frame(expected_mm[wanted]) + rng.normal(0, NOISE_MM, (len(wanted), 3))
@@ -65,7 +53,7 @@ def test_the_same_place_later_is_the_later_dwell() -> None:
     rng = np.random.default_rng(2)
     route = rng.integers(0, 8, 60)
     route = route[np.insert(np.diff(route) != 0, 0, True)]
-    expected_mm = places(rng, 8)[route]
+    expected_mm = random_places(rng, 8)[route]
     skipped = np.delete(np.arange(len(route)), 11)
     result = assigned(expected_mm, in_own_frame(expected_mm[skipped]) + rng.normal(0, NOISE_MM, (len(skipped), 3)))
     assert result.dwell.tolist() == skipped.tolist()
@@ -81,7 +69,7 @@ def test_a_raster_whose_steps_are_all_alike() -> None:
 
 def test_one_motion_again_and_again_is_refused_unless_all_of_it_was_measured() -> None:
     rng = np.random.default_rng(4)
-    cycle_mm = places(rng, 10)
+    cycle_mm = random_places(rng, 10)
     expected_mm = np.tile(cycle_mm, (4, 1))
     no = refused(expected_mm, measured(rng, expected_mm[:20]))
     assert "two assignments fit equally well" in no.why
@@ -91,10 +79,10 @@ def test_one_motion_again_and_again_is_refused_unless_all_of_it_was_measured() -
 
 def test_other_points_are_refused_and_the_place_named() -> None:
     rng = np.random.default_rng(5)
-    expected_mm = places(rng, 40)
-    assert "no order of the dwells" in refused(expected_mm, places(rng, 30)).why
+    expected_mm = random_places(rng, 40)
+    assert "no order of the dwells" in refused(expected_mm, random_places(rng, 30)).why
     points_mm = measured(rng, expected_mm)
-    points_mm[25:] = places(rng, 15)
+    points_mm[25:] = random_places(rng, 15)
     no = refused(expected_mm, points_mm)
     assert "15 of 40 points fit no dwell" in no.why
     assert (no.point, no.dwell) == (25, 25)
@@ -102,14 +90,14 @@ def test_other_points_are_refused_and_the_place_named() -> None:
 
 def test_an_instrument_that_began_before_the_recording_and_ended_after_it() -> None:
     rng = np.random.default_rng(5)
-    place_mm = places(rng, 40)
+    place_mm = random_places(rng, 40)
     result = assigned(place_mm[9:33], measured(rng, place_mm))
     assert result.dwell.tolist() == [-1] * 9 + list(range(24)) + [-1] * 7
 
 
 def test_a_wrong_unit_and_a_mirror_are_named() -> None:
     rng = np.random.default_rng(6)
-    expected_mm = places(rng, 30)
+    expected_mm = random_places(rng, 30)
     points_mm = measured(rng, expected_mm)
     assert "inches read as mm?" in refused(expected_mm, points_mm / 25.4).value
     assert "m read as mm?" in refused(expected_mm, points_mm / 1000).value
@@ -118,7 +106,7 @@ def test_a_wrong_unit_and_a_mirror_are_named() -> None:
 
 def test_a_machine_cannot_be_that_wrong() -> None:
     rng = np.random.default_rng(7)
-    expected_mm = places(rng, 30)
+    expected_mm = random_places(rng, 30)
     assert assigned(expected_mm, measured(rng, expected_mm, 0.3)).count == 30
     no = refused(expected_mm, measured(rng, expected_mm, 3.0))
     assert "1 mm or less" in no.allowed
@@ -150,7 +138,7 @@ def test_lengths_along_a_link() -> None:
 
 def test_distances_know_no_frame() -> None:
     rng = np.random.default_rng(9)
-    place_mm = places(rng, 12)
+    place_mm = random_places(rng, 12)
     assert distances_rms_mm(place_mm, in_own_frame(place_mm)) < 1e-9
     np.testing.assert_allclose(lay_over(in_own_frame(place_mm), place_mm)(in_own_frame(place_mm)), place_mm, atol=1e-9)
     assert not is_spread(place_mm[:2])
@@ -161,7 +149,7 @@ def test_any_measurement_is_joined_rightly_or_refused() -> None:
     joined = 0
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        expected_mm = places(rng, int(rng.integers(6, 60)))
+        expected_mm = random_places(rng, int(rng.integers(6, 60)))
         if seed % 2:
             route = rng.integers(0, max(4, len(expected_mm) // 3), len(expected_mm))
             expected_mm = expected_mm[route[np.insert(np.diff(route) != 0, 0, True)]]
@@ -173,7 +161,7 @@ def test_any_measurement_is_joined_rightly_or_refused() -> None:
         points_mm = in_own_frame((expected_mm + error_mm)[wanted]) + rng.normal(0, NOISE_MM, (len(wanted), 3))
         if rng.random() < 0.3:
             strange = int(rng.integers(0, len(wanted)))
-            points_mm = np.insert(points_mm, strange, places(rng, 1), axis=0)
+            points_mm = np.insert(points_mm, strange, random_places(rng, 1), axis=0)
             wanted = np.insert(wanted, strange, -1)
         result = assign_by_order(expected_mm, points_mm, np.nan)
         if isinstance(result, Assignment):
