@@ -205,9 +205,17 @@ class LineThread:
     def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
         with self._faults_of(gauge, line):
             before_s = line.last_request_s
-            self._order.asked(self._clock.monotonic())
+            start_s = self._clock.monotonic()
+            self._order.asked(start_s)
+            twice = gauge.fresh(start_s) and self._order.asks_twice()
+            if twice:
+                gauge.driver.read(line)
+                start_s = self._clock.monotonic()
+                self._order.asked(start_s)
             readings = gauge.read(line)
             now_s = self._clock.monotonic()
+            if twice:
+                self._order.answered_again(now_s - start_s)
             self._back_off.succeeded()
             # a device that speaks unasked has no late replies
             asked_s = line.last_request_s
@@ -224,15 +232,22 @@ class LineThread:
             return
         # what came just before a request was dropped: the reply before it may have been another one's
         dropped = line.unexpected_bytes - self._dropped_before
+        in_step = self._order.in_step
         listen_s = self._order.listen_s(self._clock.monotonic() - line.last_request_s)
         came = line.drain(listen_s)
         if came or dropped:
-            if listen_s < self._settings.timeout_s:
-                line.drain()
             seen = shown(came) if came else f"{dropped} bytes"
             self._discard_waiting(f"{seen} came that nobody asked for: replies may belong to other requests")
+            if self._order.asks_twice():
+                line.drain(self._order.pause_s())
+                return
+            longer_s = self._order.listen_s(0.0)
+            if listen_s < longer_s:
+                line.drain(longer_s)
         self._order.kept_silent()
         waiting, self._waiting = self._waiting, []
+        if not in_step:  # a reply may have come late, and another not at all: from the next round on they count
+            return
         for gauge, readings, duration_s in waiting:
             with self._faults_of(gauge, line):
                 self._order.answered(duration_s)
@@ -283,8 +298,8 @@ class LineThread:
         elif not self._order.guarded and not absent:
             line.drain()
         gauge.fail(quality, detail, failed_s)
-        if len(self.gauges) == 1 and gauge.failures == 1:
-            gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed or has had its time
+        if len(self.gauges) == 1 and gauge.fresh(failed_s):
+            gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed
 
 
 class Acquisition:

@@ -153,8 +153,12 @@ class PolledGauge:
         self._note(quality, detail)
         self._log_change()
 
+    def fresh(self, now_s: float) -> bool:
+        """Whether the values of its last good poll may still be used at the monotonic time `now_s` (s)."""
+        return now_s - self.last_ok_s <= self._stale_after_s
+
     def resume(self) -> None:
-        """End a rest, since the line has been opened anew."""
+        """End a rest."""
         self.rests_until_s = -math.inf
 
     def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:

@@ -6,8 +6,14 @@ that of the next one, and so on: every gauge has the value of the one before, an
 gives it away is that one reply more than wanted is under way after the last request. So the readings of a round wait
 until any answer to the last request would be there, since devices hardly take longer than they ever do; where
 something comes, none of them counts. After a missed reply, that silence is longer than the longest time between two
-requests since then: if every reply is late from now on, they come at the intervals of their requests. What this
-cannot see is a late reply and, in the same round behind it, one that is lost for good.
+requests since then: if every reply is late from now on, they come at the intervals of their requests. The round that
+ends with it does not count either, since another reply may have been lost. What this cannot see is a reply of an
+earlier round that comes while another is lost for good.
+
+A line with one gauge need not listen for so long. The first answer after a missed reply is thrown away, and the gauge
+is asked again at once: no two requests before were so close, so that an answer which comes as quickly as ever, with
+nothing behind it, belongs to the second of them. Where something comes behind it, the same is tried once more. A gauge
+that misses two replies in a row, or is late by a quarter of a second, is back before its reading is stale.
 """
 
 from __future__ import annotations
@@ -16,6 +22,8 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from compd.gauge import Gauge, replies_tell_whose
 
@@ -33,6 +41,10 @@ LATEST_REPLY_S = 10.0
 # After a missed reply the line is listened to for at most so long, s: requests are as far apart at most, but for gauges
 # that are asked seldom.
 LONGEST_LISTEN_S = 2.0
+# Part of the answers that come quickly: the others waited for the device, or for this computer.
+NEARLY_EVERY = 0.9
+# Requests are close together where the next one follows within so many times the time of a quick answer.
+CLOSE = 2.0
 # By how much more two late replies may be apart than their requests, s.
 JITTER_S = 10e-3
 
@@ -52,11 +64,18 @@ class ReplyOrder:
         self._in_step = False
         self._asked_s = math.nan  # when the last request was made
         self._apart_s = 0.0  # the longest time between two requests since the line was in step
+        self._closest_s = math.inf  # and the shortest
+        self._quick = False  # whether a gauge that was asked again at once has answered as quickly as ever
 
     @property
     def guarded(self) -> bool:
         """Whether a late reply is found by one that is too many, and not by what stands in it."""
         return self._several or self._one
+
+    @property
+    def in_step(self) -> bool:
+        """Whether no reply to an earlier request can be under way any more, even where one was lost."""
+        return self._in_step or self._quick
 
     def in_doubt(self, now_s: float) -> bool:
         """Whether a reading must wait until the line has been silent for that long."""
@@ -67,22 +86,43 @@ class ReplyOrder:
 
         passed_s : since that request, s.
         """
+        if self._quick:
+            return self._quickly_s()
         if not self._in_step and self._apart_s > 0.0:
             return min(self._apart_s + JITTER_S, LONGEST_LISTEN_S)
         if not self._in_step or len(self._durations_s) < self._fewest_polls:
             return self._timeout_s
         return min(self._timeout_s, max(SLOWER * max(self._durations_s) - passed_s, 0.0) + LATER_S)
 
+    def asks_twice(self) -> bool:
+        """Whether the next answer is to be thrown away and the gauge asked again at once, after a `pause_s`."""
+        if not self._one or self._in_step or len(self._durations_s) < self._fewest_polls:
+            return False
+        return self.pause_s() < min(self._closest_s, self._timeout_s)
+
+    def pause_s(self) -> float:
+        """Time (s) after which the next request is not close to the last one."""
+        return CLOSE * self._quickly_s()
+
+    def answered_again(self, duration_s: float) -> None:
+        """The second of two requests that were close together was answered within `duration_s`, s."""
+        self._quick = duration_s <= self._quickly_s()
+
+    def _quickly_s(self) -> float:
+        """Time (s) within which an answer comes as quickly as nearly every one."""
+        return SLOWER * float(np.quantile(self._durations_s, NEARLY_EVERY)) + LATER_S
+
     def asked(self, now_s: float) -> None:
         """A request is made now."""
         if not self._in_step and not math.isnan(self._asked_s):
             self._apart_s = max(self._apart_s, now_s - self._asked_s)
+            self._closest_s = min(self._closest_s, now_s - self._asked_s)
         self._asked_s = now_s
 
     def opened(self, now_s: float) -> None:
         """The line is new: what it was asked before, and when, is not known."""
         self.missed(now_s)
-        self._asked_s, self._apart_s = math.nan, 0.0
+        self._asked_s, self._apart_s, self._closest_s = math.nan, 0.0, 0.0
 
     def answered(self, duration_s: float) -> None:
         """A request was answered; `duration_s`: from then to the reply's last byte, s."""
@@ -95,7 +135,9 @@ class ReplyOrder:
         """
         self._in_doubt_until_s = now_s + LATEST_REPLY_S
         self._in_step = self._in_step and absent
+        self._quick = False
 
     def kept_silent(self) -> None:
         """After an answer nothing more came for `listen_s`: no reply is under way any more."""
-        self._in_step, self._apart_s = True, 0.0
+        self._in_step, self._quick = True, False
+        self._apart_s, self._closest_s = 0.0, math.inf

@@ -145,17 +145,29 @@ def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
-        scripted.clock.now_s += 0.01
         if polls <= 3:
+            scripted.clock.now_s += 0.1
             raise LineFault(Quality.TIMEOUT, "no byte")
-        if polls == 50:
-            scripted.thread.stop()
+        scripted.clock.now_s += 0.01
         return [good(float(polls), scripted.clock.now_s)]
 
-    scripted = ScriptedThread(Scripted(poll))
+    def other() -> list[Reading]:
+        scripted.clock.now_s += 0.01
+        if scripted.clock.now_s > 102.0:
+            scripted.thread.stop()
+        return [good(1.0, scripted.clock.now_s)]
+
+    scripted = ScriptedThread(Scripted(poll), Scripted(other))
     scripted.run()
-    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == pytest.approx([0.2, 0.4]), "then at once"
-    assert scripted.clock.now_s < 102.0
+    times_s = [reading.time_s for name, reading in scripted.latest.history if name == "g0.c0" and reading.ok]
+    assert times_s[0] == pytest.approx(100.0 + 3 * 0.1 + 0.1 + 0.2 + 0.4, abs=0.06), "a rest after each miss"
+    assert times_s[-1] - times_s[0] == pytest.approx(0.02 * (len(times_s) - 1)), "then at once"
+
+
+def test_a_gauge_with_a_line_of_its_own_rests_only_once_its_reading_is_stale() -> None:
+    scripted = polls_with_faults(None, *[LineFault(Quality.TIMEOUT, "no byte")] * 7)
+    rests_s = [wait for wait in scripted.clock.waits_s if wait >= 0.05]
+    assert rests_s == pytest.approx([0.9, 0.9]), "after five misses, of 0.1 s each, it goes on as if it had rested"
 
 
 def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
@@ -208,12 +220,12 @@ def test_a_good_reading_outlives_a_fault_of_the_wire(quality: Quality) -> None:
 
 def test_a_good_reading_goes_when_it_is_stale() -> None:
     missing = LineFault(Quality.TIMEOUT, "no byte")
-    scripted = polls_with_faults(None, *[missing] * 4)
+    scripted = polls_with_faults(None, *[missing] * 7)
     (_, last), (_, first_missing), *_ = scripted.latest.history
     assert (last.quality, first_missing.quality) == (OK, Quality.TIMEOUT)
     assert first_missing.time_s - last.time_s > STALE_AFTER_S
-    assert scripted.thread.gauges[0].faults[Quality.TIMEOUT] == 4
-    assert len(scripted.latest.history) < 5, "the first of them took nothing away"
+    assert scripted.thread.gauges[0].faults[Quality.TIMEOUT] == 7
+    assert len(scripted.latest.history) < 8, "the first of them took nothing away"
 
 
 @pytest.mark.parametrize("quality", [Quality.DEVICE_ERROR, Quality.SILENT, Quality.SENSOR_FAULT, Quality.LINE_LOST])
