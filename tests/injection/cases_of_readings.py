@@ -16,6 +16,8 @@ from tests.injection.case import INVALID, SUBSTITUTED, Case, Way
 ONE_READING = "One reading"
 FROM_NOW_ON = "From now on"
 COMES_BACK = "A gauge that comes back"
+# How long a gauge that was without power for 2 s is watched then, s: its line is opened again 3.5 s after it was lost.
+REOPENED_S = 3.0
 
 READINGS: tuple[Case, ...] = (
     # --- one reading
@@ -154,6 +156,7 @@ READINGS: tuple[Case, ...] = (
         INVALID,
         "scale 1",
         sample=True,
+        watched_s=REOPENED_S,
     ),
     Case(
         "joint-back-off",
@@ -164,6 +167,7 @@ READINGS: tuple[Case, ...] = (
         Way.ACCEPTED,
         SUBSTITUTED,
         "joints.1",
+        watched_s=REOPENED_S,
     ),
     Case(
         "frame-back-off",
@@ -174,6 +178,7 @@ READINGS: tuple[Case, ...] = (
         Way.ACCEPTED,
         SUBSTITUTED,
         "t1",
+        watched_s=REOPENED_S,
     ),
     Case(
         "scale-unplugged",

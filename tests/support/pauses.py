@@ -54,8 +54,8 @@ class Pauses:
 def again_after_a_pause(run: Callable[[], None]) -> None:
     """Call `run`, and once more where it fails while the computer itself has paused; three times at most.
 
-    What runs a simulated machine beside its daemon in real time loses the gauges while neither runs, and the daemon does
-    not believe them afterwards. Without a pause, the first failure counts.
+    What runs a simulated machine beside its daemon in real time loses the gauges while neither runs, and the daemon
+    does not believe them afterwards. Without a pause, the first failure counts.
     """
     pauses = Pauses()
     with pauses.watched():
