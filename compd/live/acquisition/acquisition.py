@@ -205,17 +205,8 @@ class LineThread:
     def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
         with self._faults_of(gauge, line):
             before_s = line.last_request_s
-            start_s = self._clock.monotonic()
-            self._order.asked(start_s)
-            twice = gauge.fresh(start_s) and self._order.asks_twice()
-            if twice:
-                gauge.driver.read(line)
-                start_s = self._clock.monotonic()
-                self._order.asked(start_s)
-            readings = gauge.read(line)
+            readings = self._ask(gauge, line)
             now_s = self._clock.monotonic()
-            if twice:
-                self._order.answered_again(now_s - start_s)
             self._back_off.succeeded()
             # a device that speaks unasked has no late replies
             asked_s = line.last_request_s
@@ -225,6 +216,19 @@ class LineThread:
                 if asked_s > before_s:
                     self._order.answered(now_s - asked_s)
                 gauge.put(readings, now_s)
+
+    def _ask(self, gauge: PolledGauge, line: OpenLine) -> Sequence[Reading]:
+        """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""
+        now_s = self._clock.monotonic()
+        self._order.asked(now_s)
+        if not (gauge.fresh(now_s) and self._order.asks_twice()):
+            return gauge.read(line)
+        gauge.driver.read(line)
+        again_s = self._clock.monotonic()
+        self._order.asked(again_s)
+        readings = gauge.read(line)
+        self._order.answered_again(self._clock.monotonic() - again_s)
+        return readings
 
     def _publish_waiting(self, line: OpenLine) -> None:
         """Publish the readings that wait, if nothing more comes. Raises LineFault (LINE_LOST)."""

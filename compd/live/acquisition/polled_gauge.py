@@ -50,7 +50,7 @@ class PolledGauge:
 
     Attributes
     ----------
-    polls, ok : how often it was asked, and how often every channel had a value.
+    polls, ok : how often it was asked, but for answers that were thrown away; how often every channel had a value.
     faults : in how many polls a channel or the whole gauge had each quality.
     quality, detail : of the last poll.
     last_ok_s : monotonic time (s) of the last poll in which every channel had a value; nan before.
@@ -154,8 +154,8 @@ class PolledGauge:
         self._log_change()
 
     def fresh(self, now_s: float) -> bool:
-        """Whether the values of its last good poll may still be used at the monotonic time `now_s` (s)."""
-        return now_s - self.last_ok_s <= self._stale_after_s
+        """Whether a value that it has published may still be used at the monotonic time `now_s` (s)."""
+        return any(self._is_fresh(reading, now_s) for reading in self._published)
 
     def resume(self) -> None:
         """End a rest."""
@@ -164,10 +164,13 @@ class PolledGauge:
     def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
         """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
         last = self._published[place]
-        if reading.quality in MAY_PASS and last.ok and now_s - last.time_s <= self._stale_after_s:
+        if reading.quality in MAY_PASS and self._is_fresh(last, now_s):
             return True
         self._publish(place, reading)
         return False
+
+    def _is_fresh(self, reading: Reading, now_s: float) -> bool:
+        return reading.ok and now_s - reading.time_s <= self._stale_after_s
 
     def _publish(self, place: int, reading: Reading) -> None:
         self._published[place] = reading

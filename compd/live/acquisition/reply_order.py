@@ -12,8 +12,8 @@ earlier round that comes while another is lost for good.
 
 A line with one gauge need not listen for so long. The first answer after a missed reply is thrown away, and the gauge
 is asked again at once: no two requests before were so close, so that an answer which comes as quickly as ever, with
-nothing behind it, belongs to the second of them. Where something comes behind it, the same is tried once more. A gauge
-that misses two replies in a row, or is late by a quarter of a second, is back before its reading is stale.
+nothing behind it, belongs to the second of them. Where something comes behind it, the same is tried once more. With
+a timeout of 0.15 s, a gauge that misses two replies in a row, or is late by 0.25 s, is back within 0.5 s.
 """
 
 from __future__ import annotations

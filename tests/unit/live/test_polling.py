@@ -12,7 +12,7 @@ import pytest
 import structlog
 
 from compd.clock import Clock, MonotonicClock
-from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
+from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad, good
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.service.message_keys import LineStatusKeys
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
@@ -168,6 +168,24 @@ def test_a_gauge_with_a_line_of_its_own_rests_only_once_its_reading_is_stale() -
     scripted = polls_with_faults(None, *[LineFault(Quality.TIMEOUT, "no byte")] * 7)
     rests_s = [wait for wait in scripted.clock.waits_s if wait >= 0.05]
     assert rests_s == pytest.approx([0.9, 0.9]), "after five misses, of 0.1 s each, it goes on as if it had rested"
+
+
+def test_a_channel_that_is_always_faulty_does_not_make_its_neighbours_rest() -> None:
+    polls = 0
+
+    def poll() -> list[Reading]:
+        nonlocal polls
+        polls += 1
+        scripted.clock.now_s += 0.1
+        if polls == 10:
+            scripted.thread.stop()
+        if polls % 2 == 0:
+            raise LineFault(Quality.TIMEOUT, "no byte")
+        return [good(1.0, scripted.clock.now_s), bad(scripted.clock.now_s, Quality.SENSOR_FAULT)]
+
+    scripted = ScriptedThread(Scripted(poll, channels=2))
+    scripted.run()
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == []
 
 
 def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
