@@ -257,6 +257,36 @@ class Client:
         """
         return self._ask({"class": "STATUS"}, "STATUS")
 
+    def machine(self) -> Message:
+        """Ask for MACHINE.
+
+        Returns
+        -------
+        dict
+            The machine's geometry, limits and wiring. They change only with `version["config_hash"]`.
+
+        Raises
+        ------
+        DaemonError
+            Where the daemon has gone, or is too old to know the request.
+        """
+        return self._ask({"class": "MACHINE"}, "MACHINE")
+
+    def budget(self) -> Message:
+        """Ask for BUDGET: how far each cause has moved the tip, by the newest setpoint.
+
+        Returns
+        -------
+        dict
+            `valid` and, where it is, `tip_um` (by cause, in x, y, z of {M}) and where the moving platform is.
+
+        Raises
+        ------
+        DaemonError
+            Where the daemon has gone, or is too old to know the request.
+        """
+        return self._ask({"class": "BUDGET"}, "BUDGET")
+
     def zero(self, replace: bool = False) -> Message:
         """Take machine zero, with the machine at rest at its zero position. Unix socket only; takes about a second.
 

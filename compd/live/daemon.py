@@ -37,9 +37,11 @@ from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import LoopProcess
 from compd.live.processes.service_process import ServiceProcess, StateLog
+from compd.live.service.budget_message import BudgetMessage
 from compd.live.service.last_readings import LastReadings
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
+from compd.live.service.machine_message import machine_message
 from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
@@ -169,6 +171,8 @@ class Daemon:
                 keys,
                 self.commands,
                 report.message,
+                machine_message(configuration, self._wires),
+                BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
                 zero_capture.start,
                 ReadingsMessage(self._wires, self.latest.channels),
                 model_switch.start,
@@ -248,11 +252,6 @@ class Daemon:
             zero = self.commands.zero
             return zero.readings_mm if isinstance(zero, MachineZero) else None
 
-        def setpoint_line() -> bytes | None:
-            count = self.setpoints.count
-            content = self.setpoints.get(count - 1) if count else None
-            return None if content is None else SentSetpoint.unpack(content).line
-
         return Votes(
             configuration.votes,
             self.trust,
@@ -260,8 +259,14 @@ class Daemon:
             self._wires.quantity_channels,
             self.latest,
             zero_mm,
-            setpoint_line,
+            self._newest_setpoint,
         )
+
+    def _newest_setpoint(self) -> bytes | None:
+        """The SETPOINT line of the loop's last cycle; None before the first."""
+        count = self.setpoints.count
+        content = self.setpoints.get(count - 1) if count else None
+        return None if content is None else SentSetpoint.unpack(content).line
 
     def _trust(self, before: Daemon | None) -> TrustMemory:
         """What is known of the length gauges: that of the daemon whose place this one takes, where it has the same."""

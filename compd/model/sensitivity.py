@@ -28,7 +28,7 @@ from compd.arrays import FloatArray
 from compd.model.deltas import port_size, split_by_port
 from compd.model.effect import Effect, Port
 from compd.model.frame import solve_frame
-from compd.model.kinematics import closure_at
+from compd.model.kinematics import Mechanism, Pose, closure_at
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 
@@ -60,8 +60,8 @@ def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Por
 
         sensitivities(model, rows, ["scale"])["scale"].tip
     """
-    inverse = _pose_by_closure(model, rows)
-    tip_by_pose = _tip_by_pose(model, rows)
+    inverse = _pose_by_closure(model.mechanism(rows.base_joints_M_mm), rows.origin_M_mm, rows.rotation_M_P)
+    tip_by_pose = _tip_by_pose(model, rows.tip_M_mm - rows.origin_M_mm, rows.rotation_M_P)
     by_port: dict[Port, Sensitivity] = {}
     for port in ports:
         size = port_size(port, rows)
@@ -94,6 +94,17 @@ def effect_sensitivity(
         sum((sensitivity[i] @ values for sensitivity, values in parts), start=np.zeros(())) for i in range(3)
     )
     return Sensitivity(tip, rotation, link_length)
+
+
+def tip_by_links(model: MachineModel, base_joints_M_mm: FloatArray, pose: Pose, tip_M_mm: FloatArray) -> FloatArray:
+    """Derivatives (N, 3, n), mm per mm, of the tip by the lengths of the links: how far a longer link moves it.
+
+    base_joints_M_mm : (N, n, 3).  pose : of N rows.  tip_M_mm : (N, 3), where the tool touches.
+    With the tool on the plate the derivatives are those of the touched place in {P}. Rows without a pose are nan.
+    """
+    inverse = _pose_by_closure(model.mechanism(base_joints_M_mm), pose.origin_M_mm, pose.rotation_M_P)
+    tip_by_pose = _tip_by_pose(model, tip_M_mm - pose.origin_M_mm, pose.rotation_M_P)
+    return np.asarray(tip_by_pose @ inverse[:, :, : model.links])
 
 
 def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
@@ -133,9 +144,9 @@ def _central_difference(stepped_mm: FloatArray, count: int) -> FloatArray:
     return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * DIFFERENCE_STEP_MM), 0, 2))
 
 
-def _pose_by_closure(model: MachineModel, rows: Observations) -> FloatArray:
+def _pose_by_closure(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
     """J^-1 (N, 6, 6): displacement and rotation of the platform by n link lengths and k offsets of revolute axes."""
-    closure = closure_at(model.mechanism(rows.base_joints_M_mm), rows.origin_M_mm, rows.rotation_M_P)
+    closure = closure_at(mechanism, origin_M_mm, rotation_M_P)
     lengths = np.concatenate([closure.length_by_displacement, closure.length_by_rotation_mm], axis=2)
     offsets = np.concatenate([closure.offset_by_displacement, closure.offset_by_rotation_mm], axis=2)
     J = np.concatenate([lengths, offsets], axis=1)
@@ -145,18 +156,19 @@ def _pose_by_closure(model: MachineModel, rows: Observations) -> FloatArray:
     return inverse
 
 
-def _tip_by_pose(model: MachineModel, rows: Observations) -> FloatArray:
+def _tip_by_pose(model: MachineModel, arm_M_mm: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
     """(N, 3, 6): the tip by displacement v and rotation w of the platform.
 
-    Tool on the platform: v + w x r in {M}, with r from the origin of {P} to the tip. Tool on the plate: the place on
-    the work moves the other way, -R^T (v + w x r) in {P}.
+    arm_M_mm : (N, 3), r, from the origin of {P} to the tip.
+    Tool on the platform: v + w x r in {M}. Tool on the plate: the place on the work moves the other way,
+    -R^T (v + w x r) in {P}.
     """
-    x, y, z = (rows.tip_M_mm - rows.origin_M_mm).T
+    x, y, z = arm_M_mm.T
     nought = np.zeros_like(x)
     by_rotation = np.stack([nought, z, -y, -z, nought, x, y, -x, nought], axis=1).reshape(-1, 3, 3)  # w x r
     tip_M = np.concatenate([np.broadcast_to(np.eye(3), by_rotation.shape), by_rotation], axis=2)
     if model.arrangement.on_plate:
-        return np.asarray(-rows.rotation_M_P.transpose(0, 2, 1) @ tip_M)
+        return np.asarray(-rotation_M_P.transpose(0, 2, 1) @ tip_M)
     return tip_M
 
 

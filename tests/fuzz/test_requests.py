@@ -63,6 +63,8 @@ def requests(tip: str, rotation: bool) -> Requests:
             TargetKeys(tip, rotation),  # type: ignore[arg-type]
             commands,
             lambda: {"class": "STATUS"},
+            {"class": "MACHINE"},
+            lambda: {"class": "BUDGET"},
             lambda *_: None,
             switch_model=lambda *_: None,
         )

@@ -131,6 +131,8 @@ class Service:
                 target_keys,
                 self.commands,
                 self.status,
+                {"class": "MACHINE"},
+                lambda: {"class": "BUDGET"},
                 lambda replace, answer: self.zeros.append((replace, answer)),
                 switch_model=lambda *arguments: self.models.append(arguments),
                 accept=self.accept,

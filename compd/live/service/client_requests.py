@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from compd.live.service.client_session import ClientSession, Stream
-from compd.live.service.message_keys import Keys, SentMessage, StatusKeys, VersionKeys
+from compd.live.service.message_keys import BudgetKeys, Keys, MachineKeys, SentMessage, StatusKeys, VersionKeys
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError, line, unknown_key
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater
@@ -160,3 +160,23 @@ class VersionRequest(Request):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         return context.version
+
+
+class MachineRequest(Request):
+    """Asks for the machine's geometry, limits and wiring. They change only with the configuration."""
+
+    wire_name = "MACHINE"
+    reply = MachineKeys
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        return context.machine
+
+
+class BudgetRequest(Request):
+    """Asks how far each cause has moved the tip, and where the moving platform is, by the newest setpoint."""
+
+    wire_name = "BUDGET"
+    reply = BudgetKeys
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        return line(context.budget())

@@ -8,6 +8,7 @@ import struct
 from collections import deque
 from contextlib import suppress
 from enum import Enum, auto
+from typing import Any
 
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
 
@@ -147,6 +148,15 @@ class ClientSession:
     def has_unsent(self) -> bool:
         """Whether bytes wait until the system takes them."""
         return bool(self._unsent)
+
+    def summary(self, controller: bool) -> dict[str, Any]:
+        """Who it is, for STATUS; `controller`: whether its target counts."""
+        summary: dict[str, Any] = {"name": self.name, "connected_s": round(self.connected_s, 3), "controller": controller}
+        if self.local:
+            summary["user"] = self.user
+        if self.due_s < math.inf:
+            summary["watches"] = self.stream.name.lower()
+        return summary
 
     def close(self) -> None:
         """Close the connection."""

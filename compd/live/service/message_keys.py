@@ -249,10 +249,21 @@ class ProcessStatusKeys(Keys):
     last_end: str | None = Field(default=None, description="how the last one ended; absent where none has")
 
 
+class ConnectedClientKeys(Keys):
+    """One client."""
+
+    name: str = Field(description='"unix", or its address and port')
+    user: int | None = Field(default=None, description="over the Unix socket, the number of its user")
+    connected_s: float = Field(description="since when, s on the daemon's monotonic clock")
+    controller: bool = Field(description="whether its `TARGET` counts")
+    watches: Literal["setpoints", "readings"] | None = Field(default=None, description="absent where it watches none")
+
+
 class PublisherStatusKeys(Keys):
     """The sockets."""
 
     clients: int = Field(description="clients that are connected")
+    connected: list[ConnectedClientKeys] = Field(description="who they are, the longest connected first")
     dropped_clients: int = Field(description="clients that were too far behind")
     dropped_setpoints: int = Field(description="setpoints that the publisher was too late for")
     packets_sent: int | None = Field(default=None, description="where UDP is configured")
@@ -291,6 +302,74 @@ class ChannelStatusKeys(Keys):
     age_s: float | None = Field(default=None, description="age of its reading, s")
     value: float | None = Field(default=None, description="raw value, before sign and machine zero, in its unit")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
+
+
+class WiredChannelKeys(Keys):
+    """What one channel measures."""
+
+    kind: Literal["scale", "joint", "frame", "quantity"] = Field(description="of what is measured")
+    channel: str = Field(description='"gauge.channel", as in READINGS and STATUS')
+    sign: Literal[1, -1] = Field(description="-1 where the display falls as the length grows")
+    stale_after_s: float = Field(description="a reading older than this is stale, s")
+    link: int | None = Field(default=None, description="of a scale or a joint: the link, counted from 1")
+    role: Literal["S", "Ra", "Rb", "B"] | None = Field(default=None, description="of a joint, as in the configuration")
+    distance: str | None = Field(default=None, description="of the frame: t1 to t3, u1 to u6")
+    name: str | None = Field(default=None, description="of a quantity, with its unit")
+
+
+class MachineLoopKeys(Keys):
+    """The loop, as in the section `loop` of the configuration."""
+
+    rate_hz: float = Field(description="cycles per second")
+    stale_after_s: float = Field(description="a reading older than this is stale, unless its gauge says otherwise, s")
+    on_stale: Literal["hold", "fade", "degrade", "stop"] = Field(description="what happens without a comparator")
+    hold_s: float = Field(description="for how long at most, s")
+
+
+class MachineLimitKeys(Keys):
+    """Of the correction of each link, as in the section `limits` of the configuration."""
+
+    correction_mm: float = Field(description="largest, to either side, mm")
+    slew_mm_per_s: float = Field(description="fastest change, mm/s")
+    on_limit: Literal["clamp", "refuse"] = Field(description="what happens beyond them")
+
+
+class MachineKeys(SentMessage):
+    """Answers MACHINE: what a client needs to draw the machine and to know its limits."""
+
+    wire_name = "MACHINE"
+    machine: str = Field(description="the machine's name in the configuration")
+    config_hash: str = Field(description="hash of the whole configuration, hexadecimal; another one: ask again")
+    geometry: dict[str, Any] = Field(description="the section `geometry` of the configuration, with the same keys")
+    limits: MachineLimitKeys = Field(description="what a correction may be")
+    loop: MachineLoopKeys = Field(description="how the loop runs")
+    wiring: list[WiredChannelKeys] = Field(description="what each channel measures: scales, joints, frame, quantities")
+
+
+class PlatformKeys(Keys):
+    """The moving platform."""
+
+    origin_M_mm: Vector = Field(description="origin of {P} in {M}, mm")
+    rotation_M_rad: Vector = Field(description="rotation vector of {P} in {M}, rad")
+    joints_M_mm: list[Vector] = Field(description="the platform joint of each link, in {M}, mm")
+
+
+class BudgetKeys(SentMessage):
+    """Answers BUDGET. Where `valid` is false there is no number."""
+
+    wire_name = "BUDGET"
+    valid: bool = Field(description="whether the newest setpoint is")
+    reason: str = Field(description='why its state is not `ok`; "" when it is')
+    seq: int | None = Field(default=None, description="number of the cycle; absent before the first")
+    time_s: float | None = Field(default=None, description="of the setpoint, s on the daemon's monotonic clock")
+    state: State | None = Field(default=None, description="of the setpoint")
+    tip_um: dict[str, Vector] | None = Field(
+        default=None,
+        description="how far each cause has moved the tip, in x, y, z of {M}, um: `joints`, `frame`, then each effect "
+        "by its id; to first order, before the limits. With the tool on the plate: the touched place, in {P}",
+    )
+    base_joints_M_mm: list[Vector] | None = Field(default=None, description="the base joint of each link, in {M}, mm")
+    platform: PlatformKeys | None = Field(default=None, description="where the moving platform is")
 
 
 class StatusKeys(VersionKeys):

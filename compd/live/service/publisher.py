@@ -110,8 +110,11 @@ class Publisher:
 
     def summary(self) -> dict[str, Any]:
         """Clients now, and clients and setpoints dropped so far, for STATUS."""
+        controller = self._requests.context.controller
+        sessions = sorted(self._sessions, key=lambda session: session.connected_s)
         return {
-            "clients": len(self._sessions),
+            "clients": len(sessions),
+            "connected": [session.summary(session is controller) for session in sessions],
             "dropped_clients": self.dropped_clients,
             "dropped_setpoints": self._setpoints.dropped + self._cycles.dropped,
         }

@@ -51,6 +51,8 @@ class RequestContext:
         target_keys: TargetKeys,
         commands: Commands,
         status: Callable[[], Mapping[str, Any]],
+        machine: Mapping[str, Any],
+        budget: Callable[[], Mapping[str, Any]],
         take_zero: Callable[[bool, SendLater], None],
         readings: ReadingsMessage | None = None,
         switch_model: Callable[[str, bool, int, SendLater], None] | None = None,
@@ -60,7 +62,7 @@ class RequestContext:
         access: TcpAccess | None = None,
         clock: Clock | None = None,
     ) -> None:
-        """`version`: the VERSION message; `status`: makes the STATUS message; `readings`: makes READINGS messages;
+        """`version`, `machine`: these messages; `status`, `budget`: make theirs; `readings`: makes READINGS messages;
         `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
 
         `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (file, shadow,
@@ -73,6 +75,8 @@ class RequestContext:
         self.target_keys = target_keys
         self.commands = commands
         self.status = status
+        self.machine = line(machine)
+        self.budget = budget
         self.take_zero = take_zero
         self.readings = readings
         self.switch_model = switch_model

@@ -65,7 +65,10 @@ def test_answers_of_a_running_daemon(tmp_path):
         sent(client.zero())
         assert sent(client.model())["applied"] == {"effects": []}
         assert sent(client.model(str(file), shadow=True))["shadow"]["file"] == str(file)
+        assert sent(client.machine())["wiring"][0]["kind"] == "scale"
+        assert sent(client.budget())["state"]
         status = client.status()
+        assert [connected["controller"] for connected in status["publisher"]["connected"]] == [False]
         assert status["model"]["shadow"]["effects"] == ["link_zero"]
         status["lines"] = {}  # no real ones here: test_acquisition holds those to their model
         sent(status)
@@ -91,4 +94,5 @@ def test_every_message_and_part_is_described():
 
 def test_no_message_of_the_protocol_is_lost():
     kept = {"WATCH", "RELEASE", "STATUS", "VERSION", "ZERO", "MODEL", "ERROR", "SETPOINT", "READINGS"}
+    kept |= {"MACHINE", "BUDGET"}
     assert kept <= set(SENT_MESSAGES)

@@ -1,0 +1,80 @@
+"""The BUDGET message: where the newest setpoint has the moving platform, and how far each cause has moved the tip.
+
+A SETPOINT has its sources link by link, which is what the loop computes with. Here they are carried to the tip, to
+first order, with the derivatives of the tip by the lengths of the links. It is computed when a client asks, in the
+process that serves clients: the loop has nothing to do with it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector, to_outer
+from compd.model.kinematics import Pose, forward_kinematics
+from compd.model.machine import MachineModel
+from compd.model.sensitivity import tip_by_links
+from compd.model.solve_status import Reason
+from compd.units import UM_PER_MM
+
+# 0.1 nm, as uncertainties in a SETPOINT.
+_DECIMALS_UM = 4
+_DECIMALS_MM = 7
+_DECIMALS_RAD = 10
+
+
+class BudgetMessage:
+    """Makes the BUDGET message of one machine; on the publisher's thread."""
+
+    def __init__(self, machine: MachineModel, newest: Callable[[], bytes | None]) -> None:
+        """`newest`: the SETPOINT line of the last cycle; None before the first."""
+        self._machine = machine
+        self._newest = newest
+        frame = machine.frame
+        supports_B = frame.zero_rotation_M_B.T @ (frame.zero_supports_M_mm - frame.zero_origin_M_mm).T
+        self._base_joints_B_mm = supports_B.T[frame.support_of_joint] + frame.joint_offsets_B_mm
+
+    def message(self) -> dict[str, Any]:
+        """The message as plain data; what the setpoint does not have is left out."""
+        line = self._newest()
+        if line is None:
+            return {"class": "BUDGET", "valid": False, "reason": "there is no setpoint yet"}
+        setpoint = json.loads(line)
+        message = {"class": "BUDGET", **{key: setpoint[key] for key in ("seq", "time_s", "valid", "state", "reason")}}
+        return message | self._values(setpoint) if setpoint["valid"] else message
+
+    def _values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
+        base_joints, pose = self._pose(setpoint)
+        if pose.reason[0] != Reason.OK:
+            return {}
+        tip_M_mm = np.array([setpoint["tip_M_mm"]])
+        by_link = tip_by_links(self._machine, base_joints, pose, tip_M_mm)[0]
+        tip_um = {
+            cause: (-UM_PER_MM * (by_link @ np.array(links_mm))).round(_DECIMALS_UM).tolist()
+            for cause, links_mm in setpoint["sources_mm"].items()
+        }
+        return {
+            "tip_um": tip_um,
+            "base_joints_M_mm": base_joints[0].round(_DECIMALS_MM).tolist(),
+            "platform": {
+                "origin_M_mm": pose.origin_M_mm[0].round(_DECIMALS_MM).tolist(),
+                "rotation_M_rad": rotation_vector(pose.rotation_M_P[0]).round(_DECIMALS_RAD).tolist(),
+                "joints_M_mm": to_outer(pose.rotation_M_P[0], pose.origin_M_mm[0], self._machine.platform_joints_P_mm)
+                .round(_DECIMALS_MM)
+                .tolist(),
+            },
+        }
+
+    def _pose(self, setpoint: Mapping[str, Any]) -> tuple[FloatArray, Pose]:
+        """Base joints (1, n, 3) in {M}, each carried along by the base platform as a whole, and the platform."""
+        frame = setpoint["frame"]
+        rotation = compose(rotation_matrix(np.array(frame["rotation_M_rad"])), self._machine.frame.zero_rotation_M_B)
+        base_joints = to_outer(rotation, np.array(frame["origin_M_mm"]), self._base_joints_B_mm)[None]
+        zero = self._machine.zero
+        mechanism = self._machine.mechanism(base_joints)
+        lengths = np.array([setpoint["link_length_mm"]])
+        return base_joints, forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)

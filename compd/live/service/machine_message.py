@@ -1,0 +1,39 @@
+"""The MACHINE message: what a client needs to draw the machine and to know its limits, without its configuration file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from compd.configuration import Configuration
+from compd.live.loop.wiring import MachineWires, Wire
+
+
+def machine_message(configuration: Configuration, wires: MachineWires) -> dict[str, Any]:
+    """The message as plain data: the sections of the configuration as a person wrote them, and the wiring resolved."""
+    return {
+        "class": "MACHINE",
+        "machine": configuration.machine,
+        "config_hash": configuration.config_hash,
+        "geometry": configuration.geometry.model_dump(mode="json", exclude_none=True),
+        "limits": configuration.limits.model_dump(mode="json"),
+        "loop": configuration.loop.model_dump(mode="json", include={"rate_hz", "stale_after_s", "on_stale", "hold_s"}),
+        "wiring": _wiring(configuration, wires),
+    }
+
+
+def _wiring(configuration: Configuration, wires: MachineWires) -> list[dict[str, Any]]:
+    """Every wired channel, in the order of STATUS: scales, joints, frame, quantities."""
+    wiring = configuration.wiring
+    scales = sorted(wiring.scale, key=lambda entry: entry.link)
+    places: list[Mapping[str, Any]] = [
+        *({"kind": "scale", "link": entry.link} for entry in scales),
+        *({"kind": "joint", "link": entry.link, "role": entry.role} for entry in wiring.joint),
+        *({"kind": "frame", "distance": wire.meaning.removeprefix("frame ")} for wire in wires.frame.wires),
+        *({"kind": "quantity", "name": name} for name in wires.quantity_names),
+    ]
+    return [{**place, **_wire(wire)} for place, wire in zip(places, wires.all_wires, strict=True)]
+
+
+def _wire(wire: Wire) -> dict[str, Any]:
+    return {"channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
