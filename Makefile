@@ -4,11 +4,12 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
+	@echo "make live    the same machine live in the browser, until Ctrl-C"
 	@echo "make test    the tests; two hidden causes are found on wires among them (below 10 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
@@ -35,6 +36,9 @@ $(STAMP): pyproject.toml
 
 demo: $(STAMP)
 	@$(BIN)/compd demo
+
+live: $(STAMP)
+	@$(BIN)/compd demo --live
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. Each takes a
 # third of a processor: four at a time leave two processors enough for everything to be in time.

@@ -16,10 +16,15 @@ def demo(
     seconds: Annotated[float, typer.Option(min=5, help="How long it runs.")] = 20.0,
     page: Annotated[Path, typer.Option(help="Where the page with the pictures goes.")] = Path("out/demo.html"),
     seed: Annotated[int, typer.Option(help="Weather, joints and targets follow from it.")] = 1,
+    live: Annotated[bool, typer.Option("--live", help="Show the machine in the browser instead, until Ctrl-C.")] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="With --live: where the page is; 0: any free port.")] = 7760,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show what compensation gains."""
+    if live:
+        _show_live(config, seed, port)
+        return
     from rich.console import Console
-    from rich.live import Live
+    from rich.live import Live as LiveText
 
     from compd.configuration import load
     from compd.configuration.shipped import shipped_configuration
@@ -36,13 +41,41 @@ def demo(
         f"each speaking its own protocol on a real pty or TCP port; weather {SPEEDUP:g} times faster than real."
     )
     console.print("Starting the simulated machine and the daemon (the very first start compiles the kernels) ...")
-    with Live(console=console, refresh_per_second=8) as live:
+    with LiveText(console=console, refresh_per_second=8) as text:
 
         def show(session: DemoSession, elapsed_s: float, setpoint: dict[str, Any]) -> None:
-            live.update(progress(session, elapsed_s, seconds, setpoint))
+            text.update(progress(session, elapsed_s, seconds, setpoint))
 
         session = run_demo(configuration, seconds, seed, show)
     console.print(summarise(session))
     console.print(verdict(session))
     write_demo_page(page, session)
     console.print(f"The same as pictures: {page}")
+
+
+def _show_live(config: Path | None, seed: int, port: int) -> None:
+    from compd.configuration import load
+    from compd.configuration.shipped import shipped_configuration
+    from compd.demo.live import SPEEDUP, run_live
+    from compd.page.guard import Token, hashed, new_token
+    from compd.page.run import run_page
+
+    configuration = load(config or shipped_configuration("tripod-cmm.yaml"))
+    token = new_token()
+    typer.echo(
+        f"{configuration.machine}, simulated; its weather {SPEEDUP:g} times faster than real. "
+        "Starting it and the daemon (the very first start compiles the kernels) ..."
+    )
+    tokens = [Token("this computer", "owner", hashed(token))]
+
+    def serve(unix_socket: str) -> None:
+        run_page(
+            unix_socket,
+            Path("recordings").absolute(),
+            "127.0.0.1",
+            port,
+            tokens,
+            lambda where: typer.echo(f"open http://{where}/?token={token} (Ctrl-C ends all three)"),
+        )
+
+    run_live(configuration, seed, serve)

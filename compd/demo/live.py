@@ -1,0 +1,44 @@
+"""The simulated machine, the daemon and the page, until Ctrl-C: `make live`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from compd.client import connect
+from compd.configuration import Configuration
+from compd.demo.processes import Command, run_commands
+from compd.demo.session import wait_for_gauges
+
+# An hour of warming up in three minutes: what moves can be seen to move.
+SPEEDUP = 20.0
+# The machine stands at machine zero for so long, s: zero is taken in it.
+ZERO_HOLD_S = 30.0
+ANSWER_TIMEOUT_S = 15.0
+
+
+def run_live(configuration: Configuration, seed: int, serve: Callable[[str], None]) -> None:
+    """Start the simulated machine and its daemon, take machine zero, and `serve`; stop both when that returns.
+
+    serve : called with the daemon's Unix socket; returns when a person has had enough.
+    Raises DaemonError where one does not start.
+    """
+    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
+        directory = Path(temporary)
+        options = ["--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", str(ZERO_HOLD_S)]
+        commands = [
+            Command(
+                ["simulate", str(configuration.path), "--directory", temporary, *options],
+                ready=directory / "control.sock",
+            ),
+            Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
+        ]
+        with run_commands(commands, log=directory / "output.log"):
+            with (
+                connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer,
+                connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon,
+            ):
+                wait_for_gauges(observer, daemon.watch(10.0))
+                observer.zero()
+            serve(str(directory / "compd.sock"))

@@ -1,0 +1,135 @@
+"""The page's connection to the daemon: the newest message of each class, and whether the daemon is there at all.
+
+One connection watches READINGS, another asks for STATUS and BUDGET. Both are made again by themselves; meanwhile
+`connected` is False and there are no messages, so that nobody shows what was.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import structlog
+
+Message = dict[str, Any]
+
+READINGS_HZ = 20.0
+BUDGET_EVERY_S = 0.2
+STATUS_EVERY_S = 1.0
+# Without a message for so long, s, the daemon is not there: it sends one in every cycle, whatever its state.
+SILENT_AFTER_S = 2.0
+_AGAIN_AFTER_S = 1.0
+_LONGEST_LINE_BYTES = 4 * 1024 * 1024
+
+_log = structlog.get_logger()
+
+
+@dataclass
+class DaemonLink:
+    """The newest messages of the daemon at `path`, its Unix socket; used by the event loop's thread alone.
+
+    Attributes
+    ----------
+    connected : whether the messages below are of a daemon that is there.
+    reason : why it is not.
+    machine, columns : MACHINE, and the `columns` of WATCH.
+    readings, status, budget : the newest of each; None before the first.
+    news : notified with every READINGS, and when the daemon comes or goes.
+    """
+
+    path: str
+    connected: bool = False
+    reason: str = "not connected yet"
+    version: Message | None = None
+    machine: Message | None = None
+    columns: list[Message] = field(default_factory=list)
+    readings: Message | None = None
+    status: Message | None = None
+    budget: Message | None = None
+    news: asyncio.Condition = field(default_factory=asyncio.Condition)
+
+    async def run(self) -> None:
+        """Keep the link, until cancelled."""
+        while True:
+            try:
+                await self._serve()
+            except* (OSError, ValueError, TimeoutError, EOFError) as errors:
+                error = errors.exceptions[0]
+                await self._gone(str(error) or type(error).__name__)
+            await asyncio.sleep(_AGAIN_AFTER_S)
+
+    async def _serve(self) -> None:
+        """Take messages until the connection ends."""
+        async with _Connection(self.path) as stream, _Connection(self.path) as asked:
+            self.version = stream.greeting
+            self.machine = await asked.ask({"class": "MACHINE"})
+            watching = await stream.ask({"class": "WATCH", "what": "readings", "rate_hz": READINGS_HZ})
+            self.columns = watching["columns"]
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._take_readings(stream))
+                tasks.create_task(self._ask_again_and_again(asked))
+
+    async def _take_readings(self, stream: _Connection) -> None:
+        while True:
+            message = await asyncio.wait_for(stream.read(), SILENT_AFTER_S)
+            async with self.news:
+                self.readings = message
+                if not self.connected:
+                    _log.info("the daemon is there", path=self.path)
+                self.connected, self.reason = True, ""
+                self.news.notify_all()
+
+    async def _ask_again_and_again(self, asked: _Connection) -> None:
+        loop = asyncio.get_running_loop()
+        status_due_s = loop.time()
+        while True:
+            self.budget = await asked.ask({"class": "BUDGET"})
+            if loop.time() >= status_due_s:
+                self.status = await asked.ask({"class": "STATUS"})
+                status_due_s = loop.time() + STATUS_EVERY_S
+            await asyncio.sleep(BUDGET_EVERY_S)
+
+    async def _gone(self, reason: str) -> None:
+        async with self.news:
+            if self.connected:
+                _log.warning("the daemon is gone", path=self.path, reason=reason)
+            self.connected, self.reason = False, reason
+            self.readings = self.status = self.budget = None
+            self.news.notify_all()
+
+
+class _Connection:
+    """Lines of JSON to and from the daemon."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self.greeting: Message = {}
+
+    async def __aenter__(self) -> _Connection:
+        self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
+        self.greeting = await self.read()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._writer.close()
+        with suppress(OSError):
+            await self._writer.wait_closed()
+
+    async def read(self) -> Message:
+        """The next message. Raises EOFError at the end."""
+        line = await self._reader.readline()
+        if not line.endswith(b"\n"):
+            raise EOFError("it closed the connection")
+        message: Message = json.loads(line)
+        return message
+
+    async def ask(self, request: Message) -> Message:
+        """The answer to a request. Raises ValueError where the daemon refuses it."""
+        self._writer.write(json.dumps(request).encode() + b"\n")
+        answer = await asyncio.wait_for(self.read(), SILENT_AFTER_S)
+        if answer["class"] == "ERROR":
+            raise ValueError(f"the daemon refuses {request['class']}: {answer['text']}")
+        return answer

@@ -1,0 +1,89 @@
+"""The last hour of the machine, so that a page that opens now shows what has been."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.live.loop.states import state_named
+
+Message = Mapping[str, Any]
+
+# One row a second of an hour, and ten of the last minute.
+COARSE_S, COARSE_HZ = 3600.0, 1.0
+FINE_S, FINE_HZ = 60.0, 10.0
+# In the place of a state's code.
+UNKNOWN_STATE = -1.0
+
+
+class Ring:
+    """The newest rows of a table of numbers, one every `1 / rate_hz` seconds."""
+
+    def __init__(self, span_s: float, rate_hz: float, columns: int) -> None:
+        rows = round(span_s * rate_hz)
+        self._every_s = 1 / rate_hz
+        self._rows = np.full((rows, columns), np.nan, dtype=np.float32)
+        self._times_s = np.full(rows, np.nan)
+        self._count = 0
+        self._due_s = -math.inf
+
+    def note(self, time_s: float, row: Sequence[float]) -> None:
+        """Put a row of `time_s` (s) in the place of the oldest, if one is due."""
+        # a quarter of the interval keeps the pace of rows that come at the same rate
+        if time_s < self._due_s - self._every_s / 4:
+            return
+        self._due_s = max(self._due_s + self._every_s, time_s + self._every_s / 2)
+        place = self._count % len(self._times_s)
+        self._times_s[place], self._rows[place] = time_s, row
+        self._count += 1
+
+    def table(self) -> tuple[FloatArray, FloatArray]:
+        """Times (N,) and rows (N, columns), the oldest first."""
+        kept = min(self._count, len(self._times_s))
+        order = (self._count - kept + np.arange(kept)) % len(self._times_s)
+        return self._times_s[order], self._rows[order]
+
+
+class History:
+    """Numbers of the last hour, by the names in `columns`.
+
+    `state` is the state's code; every number is nan while the daemon was not there, and all but the state are while the
+    setpoint was not valid.
+    """
+
+    def __init__(self, links: int) -> None:
+        self.columns = (
+            "state",
+            *(f"correction_{k}_um" for k in range(1, links + 1)),
+            *("tip_x_mm", "tip_y_mm", "tip_z_mm"),
+            *("moved_x_um", "moved_y_um", "moved_z_um"),
+        )
+        self._coarse = Ring(COARSE_S, COARSE_HZ, len(self.columns))
+        self._fine = Ring(FINE_S, FINE_HZ, len(self.columns))
+
+    def note(self, time_s: float, setpoint: Message | None, budget: Message | None) -> None:
+        """Take a row at `time_s` (s) where one is due; `setpoint` is None while the daemon is not there."""
+        row = self._row(setpoint, budget)
+        self._coarse.note(time_s, row)
+        self._fine.note(time_s, row)
+
+    def tables(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Times and rows of the hour, `coarse`, and of the last minute, `fine`."""
+        return {"coarse": self._coarse.table(), "fine": self._fine.table()}
+
+    def _row(self, setpoint: Message | None, budget: Message | None) -> list[float]:
+        row = [math.nan] * len(self.columns)
+        if setpoint is None:
+            return row
+        state = state_named(setpoint["state"])
+        row[0] = UNKNOWN_STATE if state is None else float(state.code)
+        if setpoint["valid"]:
+            row[1:-6] = [value * 1e3 for value in setpoint["correction_mm"]]
+            row[-6:-3] = setpoint["tip_M_mm"]
+            if budget is not None and "tip_um" in budget:
+                row[-3:] = np.sum(list(budget["tip_um"].values()), axis=0).tolist()
+        return row

@@ -1,0 +1,145 @@
+"""What a person may order from the page: what each order will do, in numbers, and doing it.
+
+An order is shown first: its consequence for this machine now, and the command line that does the same. It is done for
+a browser that is armed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compd.client import Client, connect
+from compd.errors import DaemonError
+from compd.gauge import Quality
+from compd.page.daemon_link import DaemonLink
+from compd.units import UM_PER_MM
+
+# Reading a model file takes a second; an effect of a person's own may import what it likes.
+_TIMEOUT_S = 30.0
+
+
+@dataclass(frozen=True)
+class Consequence:
+    """What an order will do. possible : whether it can be given now. text : in words and numbers. command : the same
+    as a command line."""
+
+    possible: bool
+    text: str
+    command: str
+
+
+class Orders:
+    """The orders by name: each has a consequence, and is done."""
+
+    def __init__(self, link: DaemonLink) -> None:
+        self._link = link
+        self._consequences: Mapping[str, Callable[[str], Consequence]] = {
+            "zero": self._zero,
+            "accept": self._accept,
+            "shadow": self._shadow,
+            "adopt": self._adopt,
+            "no-model": self._no_model,
+        }
+        self._calls: Mapping[str, Callable[[Client, str], Mapping[str, Any]]] = {
+            "zero": lambda client, subject: client.zero(replace=subject == "replace"),
+            "accept": lambda client, subject: client.accept(subject),
+            "shadow": lambda client, subject: client.model(subject, shadow=True),
+            "adopt": lambda client, subject: client.model(subject),
+            "no-model": lambda client, subject: client.model(""),
+        }
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._calls
+
+    def consequence(self, name: str, subject: str) -> Consequence:
+        """Of the order `name` for a gauge (`accept`) or a model file (`shadow`, `adopt`)."""
+        if not self._link.connected:
+            return Consequence(False, f"The daemon is not there: {self._link.reason}.", "")
+        return self._consequences[name](subject)
+
+    async def do(self, name: str, subject: str) -> Mapping[str, Any]:
+        """Give the order to the daemon; its answer. Raises DaemonError."""
+        return await asyncio.to_thread(self._ask, name, subject)
+
+    def _ask(self, name: str, subject: str) -> Mapping[str, Any]:
+        with connect(self._link.path, _TIMEOUT_S) as client:
+            return self._calls[name](client, subject)
+
+    def _command(self, *words: str) -> str:
+        return shlex.join(["compd", *words])
+
+    def _zero(self, subject: str) -> Consequence:
+        status, machine = self._link.status, self._link.machine
+        command = self._command("zero", self._link.path)
+        if status is None or machine is None:
+            return Consequence(False, "The daemon has not told its status yet.", command)
+        gauges = sum(wire["kind"] != "quantity" for wire in machine["wiring"])
+        text = f"{gauges} gauges are averaged for one second; the machine must stand still at its zero position."
+        if status["zero"]["taken"]:
+            text += f" The zero of {status['zero']['taken_at']} is kept as machine-zero.json.old."
+        if largest := self._largest_um():
+            text += f" The correction, now up to {largest:.1f} um, begins at zero again."
+        return Consequence(True, text, command)
+
+    def _accept(self, subject: str) -> Consequence:
+        status = self._link.status or {"gauges": []}
+        waiting = [gauge for gauge in status["gauges"] if gauge["quality"] == Quality.DISTRUSTED]
+        chosen = [g for g in waiting if subject in ("all", g["channel"], g["channel"].partition(".")[0])]
+        command = self._command("accept", subject, "--daemon", self._link.path)
+        if not chosen:
+            return Consequence(False, "Every gauge is believed." if not waiting else "This gauge is believed.", command)
+        lines = [f"{gauge.get('measures', gauge['channel'])}: {gauge.get('detail', '')}" for gauge in chosen]
+        text = "What it shows from now on is taken as it is. Look at the gauge, and reference it, first. "
+        return Consequence(True, text + "; ".join(lines), command)
+
+    def _shadow(self, subject: str) -> Consequence:
+        command = self._command("shadow", subject or "--none", "--daemon", self._link.path)
+        if not subject:
+            return Consequence(True, "No model runs beside the applied one any more.", command)
+        if not Path(subject).is_file():
+            return Consequence(False, f"{subject} is no file.", command)
+        return Consequence(True, "It is computed beside the applied model; nothing of it reaches the machine.", command)
+
+    def _adopt(self, subject: str) -> Consequence:
+        """Of the model that runs as a shadow: its correction is known."""
+        command = self._command("adopt", subject, "--daemon", self._link.path)
+        setpoint = (self._link.readings or {}).get("setpoint", {})
+        shadow = setpoint.get("shadow", {})
+        if "correction_mm" not in shadow:
+            why = shadow.get("reason") or "no model runs as a shadow"
+            return Consequence(False, f"Let the model run as a shadow first, so that its effect is known: {why}.", command)
+        asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
+        return Consequence(True, self._change(asked_mm, shadow["correction_mm"]), command)
+
+    def _no_model(self, subject: str) -> Consequence:
+        command = self._command("adopt", "--none", "--daemon", self._link.path)
+        sources = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
+        if sources is None:
+            return Consequence(True, "The machine is computed without effects.", command)
+        asked_mm = [sum(parts) for parts in zip(*sources.values(), strict=True)]
+        bare_mm = [sum(parts) for parts in zip(sources["joints"], sources["frame"], strict=True)]
+        return Consequence(True, self._change(asked_mm, bare_mm), command)
+
+    def _change(self, before_mm: list[float], after_mm: list[float]) -> str:
+        changes_um = [UM_PER_MM * (after - before) for before, after in zip(before_mm, after_mm, strict=True)]
+        link = max(range(len(changes_um)), key=lambda k: abs(changes_um[k]))
+        limits = (self._link.machine or {}).get("limits", {})
+        text = f"The correction changes by {changes_um[link]:+.1f} um at link {link + 1}, and less at the others."
+        if slew := limits.get("slew_mm_per_s"):
+            text += f" It slews for {abs(changes_um[link]) / UM_PER_MM / slew:.1f} s."
+        return text
+
+    def _largest_um(self) -> float:
+        setpoint = (self._link.readings or {}).get("setpoint", {})
+        return max((abs(value) * UM_PER_MM for value in setpoint.get("correction_mm", ())), default=0.0)
+
+
+def explained(error: DaemonError) -> str:
+    """A refusal of the daemon in one line, for the page."""
+    problem = error.problems[0]
+    return "; ".join(filter(None, (problem.what, problem.next_step)))

@@ -1,0 +1,112 @@
+"""Recordings of this machine: those in a directory, and `compd record` started and ended from the page."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import re
+import shlex
+import signal
+import sys
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+# Of a recording: letters and digits, so that it is a file's name on every system and never a path.
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_END_WITHIN_S = 10.0
+
+
+@dataclass
+class Running:
+    """A `compd record` that runs. started_s : Unix time."""
+
+    name: str
+    command: str
+    started_s: float
+    process: asyncio.subprocess.Process
+
+
+class Recordings:
+    """Those in `directory`; used by the event loop's thread alone."""
+
+    def __init__(self, directory: Path, socket: str) -> None:
+        self.directory = directory
+        self._socket = socket
+        self.running: Running | None = None
+        self.last_words = ""
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Every part of every recording, the newest first."""
+        found = []
+        for path in self.directory.glob("*.csv"):
+            stat = path.stat()
+            found.append(
+                {
+                    "name": path.stem,
+                    "bytes": stat.st_size,
+                    "changed": datetime.fromtimestamp(stat.st_mtime, UTC).isoformat(timespec="seconds"),
+                    "sidecar": path.with_suffix(".yaml").is_file(),
+                }
+            )
+        return sorted(found, key=lambda part: str(part["changed"]), reverse=True)
+
+    def command(self, name: str, burst_s: float | None) -> list[str]:
+        """The command line that records."""
+        words = ["compd", "record", str(self.directory / name), "--daemon", self._socket]
+        return words if burst_s is None else [*words, "--burst", f"{burst_s:g}"]
+
+    async def start(self, name: str, burst_s: float | None) -> str:
+        """Record; why not, or "" where it has begun."""
+        if not NAME.fullmatch(name):
+            return "a name has letters, digits, - and _, at most 64 of them"
+        if self.running is not None:
+            return f"{self.running.name} is being recorded already"
+        if any(self.directory.glob(f"{name}-*.csv")):
+            return f"{name} is there already"
+        self.directory.mkdir(parents=True, exist_ok=True)
+        words = self.command(name, burst_s)
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            *words,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        now_s = datetime.now(UTC).timestamp()
+        self.running, self.last_words = Running(name, shlex.join(words), now_s, process), ""
+        self._watching = asyncio.create_task(self._watch(self.running))
+        return ""
+
+    async def stop(self) -> None:
+        """End the recording, as Ctrl-C does, and wait until its files are whole."""
+        if (running := self.running) is not None:
+            running.process.send_signal(signal.SIGINT)
+            async with asyncio.timeout(_END_WITHIN_S):
+                await self._watching
+
+    def archive(self, name: str) -> bytes | None:
+        """A part with its sidecar and what a replay needs, as a zip file; None where there is no such part."""
+        paths = self._files_of(name)
+        if not paths:
+            return None
+        data = io.BytesIO()
+        with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in paths:
+                archive.write(path, path.name)
+        return data.getvalue()
+
+    def _files_of(self, name: str) -> Sequence[Path]:
+        if not NAME.fullmatch(name) or not (self.directory / f"{name}.csv").is_file():
+            return []
+        return sorted(path for path in self.directory.glob(f"{name}.*") if path.is_file())
+
+    async def _watch(self, running: Running) -> None:
+        _, errors = await running.process.communicate()
+        if running.process.returncode:
+            self.last_words = errors.decode(errors="replace").strip()[-500:]
+        self.running = None

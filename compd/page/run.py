@@ -1,0 +1,61 @@
+"""The page's process: the tokens, the address, and uvicorn."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import uvicorn
+
+from compd.errors import DaemonError, Problem
+from compd.page.daemon_link import DaemonLink
+from compd.page.guard import Guard, Token
+from compd.page.recordings import Recordings
+from compd.page.server import Page, make_app
+
+# Bytes that the system keeps for a browser that does not read: a few seconds of events, and no minute of old ones.
+SEND_BUFFER_BYTES = 32 * 1024
+
+
+def run_page(
+    unix_socket: str,
+    recordings: Path,
+    host: str,
+    port: int,
+    tokens: Sequence[Token],
+    started: Callable[[str], None],
+) -> None:
+    """Serve until SIGTERM or Ctrl-C.
+
+    unix_socket : the daemon's.  recordings : directory of the recordings.
+    started : called with "host:port", once browsers can connect.
+    Raises DaemonError where the port is taken.
+    """
+    listener = _listener(host, port)
+    port = listener.getsockname()[1]
+    names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [host]
+    page = Page(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
+    guarded = Guard(make_app(page), tokens, [f"{name}:{port}" for name in names])
+    config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
+    started(f"{host}:{port}")
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)  # connections take it over
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        raise DaemonError(
+            Problem(
+                where=f"{host}:{port}",
+                what=f"cannot listen: {error.strerror}",
+                next_step="give another --port, or end the page that runs there",
+            )
+        ) from error
+    listener.listen()
+    return listener

@@ -1,0 +1,57 @@
+// State and reason in words, on top of everything; what is not the present is grey.
+import { ago, signed } from "./format.js";
+import { appearance } from "./states.js";
+
+const at = (id) => document.getElementById(id);
+let shown = "";
+
+function describe(page, behind_s) {
+  const live = page.live;
+  if (!live || behind_s > 1.5) {
+    const text = live ? `no news from the page's server for ${ago(behind_s)}` : "waiting for the page's server";
+    return { state: "gone", tone: "gone", sign: "⚡", name: "NOT CONNECTED", reason: text };
+  }
+  if (behind_s) return { state: "late", tone: "gone", sign: "⏲", name: "LATE", reason: `what comes is ${ago(behind_s)} old` };
+  if (!live.connected || !live.setpoint) {
+    return { state: "gone", tone: "gone", sign: "⚡", name: "NO DAEMON", reason: live.reason || "it has told nothing yet" };
+  }
+  const [tone, sign] = appearance(live.setpoint.state);
+  const name = live.setpoint.state.replace("_", " ").toUpperCase();
+  return { state: live.setpoint.state, tone, sign, name, reason: live.setpoint.reason };
+}
+
+function write(id, text) {
+  const target = at(id);
+  if (target.textContent !== text) target.textContent = text;
+}
+
+export function showBanner(page, behind_s) {
+  const told = describe(page, behind_s);
+  const key = told.state + told.tone;
+  if (key !== shown) {
+    shown = key;
+    document.body.dataset.state = told.state;
+    document.body.dataset.tone = told.tone;
+  }
+  write("sign", told.sign);
+  write("state", told.name);
+  write("reason", told.reason);
+  const setpoint = told.tone === "gone" ? null : page.live.setpoint;
+  write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
+  write("tip", setpoint?.valid ? tipText(setpoint) : "");
+  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}` : "");
+  const own = page.slow?.browsers ?? [];
+  const armed = own.filter((browser) => browser.armed_s > 0);
+  write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");
+  const left_s = Math.max(0, (page.armed_until ?? 0) - performance.now() / 1000);
+  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "owner" ? "looking" : "view only");
+  at("role").classList.toggle("armed", left_s > 0);
+}
+
+function tipText(setpoint) {
+  const axes = ["x", "y", "z"].map((axis, k) => {
+    const u = setpoint.u_tip_um ? ` ± ${(2 * setpoint.u_tip_um[k]).toFixed(1)} µm` : "";
+    return `${axis} ${signed(setpoint.tip_M_mm[k], 4)}${u}`;
+  });
+  return axes.join("   ");
+}

@@ -1,0 +1,129 @@
+// The last hour: its states as a tape, and what has moved the tip; a click goes there, and what is shown stands still.
+import { element, ink, prepared, signed } from "./format.js";
+import { appearance, COLOURS, NAMES } from "./states.js";
+
+const HOUR_S = 3600;
+const DRAW_EVERY_MS = 1000;
+
+export class Hour {
+  constructor(tape, place, scrub, page) {
+    Object.assign(this, { tape, place, scrub, page, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
+    tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
+  }
+
+  // Fetch what has been, and go on from there.
+  async begin() {
+    const response = await fetch("history");
+    if (!response.ok) return;
+    const data = await response.arrayBuffer();
+    const end = new Uint8Array(data).indexOf(10);
+    const header = JSON.parse(new TextDecoder().decode(data.slice(0, end)));
+    this.columns = header.columns;
+    let start = end + 1;
+    for (const { name, rows } of header.tables) {
+      const times = new Float64Array(data.slice(start, start + 8 * rows));
+      start += 8 * rows;
+      const values = new Float32Array(data.slice(start, start + 4 * rows * this.columns.length));
+      start += 4 * rows * this.columns.length;
+      if (name !== "coarse") continue;
+      this.times = [...times];
+      this.rows = this.times.map((_, k) => values.slice(k * this.columns.length, (k + 1) * this.columns.length));
+    }
+    this.draw(true);
+  }
+
+  // A row a second, as the server keeps them.
+  note({ unix_s, setpoint, budget }) {
+    if (!this.columns.length || unix_s < (this.times.at(-1) ?? 0) + 0.95) return;
+    const row = new Float32Array(this.columns.length).fill(NaN);
+    if (setpoint) {
+      row[0] = NAMES.indexOf(setpoint.state);
+      if (setpoint.valid) {
+        const moved = [0, 1, 2].map((axis) => Object.values(budget ?? {}).reduce((sum, vector) => sum + vector[axis], 0));
+        row.set([...setpoint.correction_mm.map((value) => value * 1000), ...setpoint.tip_M_mm, ...(budget ? moved : [])], 1);
+      }
+    }
+    this.times.push(unix_s);
+    this.rows.push(row);
+    while (this.times[0] < unix_s - HOUR_S) {
+      this.times.shift();
+      this.rows.shift();
+    }
+    this.draw();
+  }
+
+  get end_s() {
+    return this.times.at(-1) ?? 0;
+  }
+
+  timeAt(x) {
+    return this.end_s - HOUR_S * (1 - x / this.tape.clientWidth);
+  }
+
+  draw(now = false) {
+    if (!now && (performance.now() - this.drawn_ms < DRAW_EVERY_MS || document.hidden)) return;
+    this.drawn_ms = performance.now();
+    const { context, width, height } = prepared(this.tape);
+    context.fillStyle = "#8c959f33";
+    context.fillRect(0, 0, width, height);
+    const pixel = width / HOUR_S;
+    this.rows.forEach((row, k) => {
+      const state = Number.isNaN(row[0]) ? null : NAMES[row[0]];
+      const tone = state === null ? "gone" : appearance(state)[0];
+      context.fillStyle = COLOURS[tone];
+      // what is not good is never thinner than two pixels
+      const wide = Math.max(pixel * 1.05, tone === "good" ? 0.5 : 2);
+      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, tone === "good" ? 6 : 0, wide, tone === "good" ? height - 12 : height);
+    });
+    if (this.at_s !== null) {
+      context.fillStyle = ink("--ink");
+      context.fillRect(width - (this.end_s - this.at_s) * pixel - 1, 0, 2, height);
+    }
+    this.drawChart();
+  }
+
+  drawChart() {
+    const first = this.columns.indexOf("moved_x_um");
+    if (first < 0) return;
+    const data = [this.times, ...[0, 1, 2].map((axis) => this.rows.map((row) => (Number.isNaN(row[first + axis]) ? null : row[first + axis])))];
+    if (!this.chart) {
+      const axis = { stroke: () => ink("--soft"), grid: { stroke: () => ink("--rule"), width: 1 }, ticks: { show: false }, font: "11px system-ui" };
+      this.chart = new window.uPlot({
+        width: this.place.clientWidth || 400,
+        height: 130,
+        legend: { show: false },
+        cursor: { drag: { x: false, y: false } },
+        scales: { x: { range: () => [this.end_s - HOUR_S, this.end_s] } },
+        axes: [axis, { ...axis, size: 44 }],
+        series: [{}, ...[["x", "#0072b2"], ["y", "#e69f00"], ["z", "#cc79a7"]].map(([label, stroke]) => ({ label, stroke, width: 1.5, points: { show: false }, spanGaps: false }))],
+      }, data, this.place);
+      this.place.append(element("p", { class: "note" }, "what has moved the tip, µm: x blue, y orange, z purple"));
+      new ResizeObserver(() => this.chart.setSize({ width: this.place.clientWidth, height: 130 })).observe(this.place);
+    } else this.chart.setData(data);
+  }
+
+  // Show the second that is nearest to `time_s`, and stand still.
+  go(time_s) {
+    if (!this.times.length) return;
+    let k = this.times.findIndex((time) => time >= time_s);
+    if (k < 0) k = this.times.length - 1;
+    this.at_s = this.times[k];
+    const row = this.rows[k];
+    const links = this.columns.filter((name) => name.startsWith("correction_")).length;
+    const state = Number.isNaN(row[0]) ? "no daemon" : NAMES[row[0]] ?? "unknown";
+    const numbers = Number.isNaN(row[1]) ? "" : `; corrections ${[...row.slice(1, 1 + links)].map((um) => signed(um)).join(", ")} µm; tip moved ${[...row.slice(-3)].map((um) => signed(um)).join(", ")} µm`;
+    this.scrub.textContent = `${new Date(this.at_s * 1000).toLocaleTimeString()}: ${state}${numbers}`;
+    document.dispatchEvent(new CustomEvent("freeze", { detail: { frozen: true, at_s: this.at_s } }));
+    this.draw(true);
+  }
+
+  step(seconds) {
+    this.go((this.at_s ?? this.end_s) + seconds);
+  }
+
+  follow() {
+    this.at_s = null;
+    this.scrub.textContent = "Click to go there; arrows scrub, space goes on.";
+    this.draw(true);
+  }
+}

@@ -1,0 +1,127 @@
+// One strip for each link: the correction of the last minute with its limits, the number, and what it is made of.
+import { scaleFor, stack } from "./budget.js";
+import { element, ink, signed } from "./format.js";
+
+const SPAN_S = 60;
+// Charts are drawn so often, ms: a line moves by a pixel a tenth of a second at most.
+const DRAW_EVERY_MS = 100;
+
+export class Links {
+  constructor(place, page) {
+    this.place = place;
+    this.page = page;
+    this.times = [];
+    this.corrections = [];
+    this.scale_um = 1;
+    this.drawn_ms = 0;
+  }
+
+  begin(machine) {
+    const count = machine.geometry.kinematics === "hexapod_6ups" ? 6 : 3;
+    this.limit_um = machine.limits.correction_mm * 1000;
+    this.times = [];
+    this.corrections = Array.from({ length: count }, () => []);
+    this.charts?.forEach((chart) => chart.destroy());
+    this.rows = this.corrections.map((_, link) => this.row(link, count));
+    this.place.replaceChildren(...this.rows.map(({ row }) => row));
+    this.charts = this.rows.map(({ plot }) => this.chart(plot, count));
+    new ResizeObserver(() => this.charts.forEach((chart, k) => chart.setSize({ width: this.rows[k].plot.clientWidth, height: chart.height }))).observe(this.place);
+  }
+
+  row(link, count) {
+    const number = element("b");
+    const sources = element("small");
+    const plot = element("div");
+    const bar = element("div", { class: "bar" });
+    const label = element("div", { class: "number" }, number, sources);
+    const row = element("div", { class: "strip", onclick: () => this.select(link + 1) }, label, plot, bar);
+    row.title = `link ${link + 1}`;
+    plot.style.height = `${count === 6 ? 46 : 92}px`;
+    return { row, number, sources, plot, bar };
+  }
+
+  chart(place, count) {
+    const limit = () => this.limit_um;
+    const options = {
+      width: place.clientWidth || 300,
+      height: count === 6 ? 46 : 92,
+      cursor: { show: false },
+      legend: { show: false },
+      scales: { x: { time: false, range: (_, __, max) => [max - SPAN_S, max] }, y: { range: (_, low, high) => this.range(low, high) } },
+      axes: [{ show: false }, { size: 44, stroke: () => ink("--soft"), grid: { stroke: () => ink("--rule"), width: 1 }, ticks: { show: false }, space: 24, font: "11px system-ui" }],
+      series: [{}, { stroke: "#0072b2", width: 1.5, points: { show: false } }],
+      hooks: {
+        draw: [(chart) => {
+          for (const edge of [limit(), -limit()]) {
+            const { min, max } = chart.scales.y;
+            if (edge < min || edge > max) continue;
+            const y = chart.valToPos(edge, "y", true);
+            chart.ctx.fillStyle = "#d55e00";
+            chart.ctx.fillRect(chart.bbox.left, y - 1, chart.bbox.width, 2);
+          }
+        }],
+      },
+    };
+    return new window.uPlot(options, [[], []], place);
+  }
+
+  // At least 1 µm high, and steady while the line stays inside.
+  range(low, high) {
+    if (!Number.isFinite(low)) return [-1, 1];
+    const middle = (low + high) / 2;
+    const half = Math.max((high - low) * 0.6, 0.5);
+    return [middle - half, middle + half];
+  }
+
+  select(link) {
+    this.page.selected = this.page.selected === link ? 0 : link;
+    this.rows?.forEach(({ row }, k) => row.classList.toggle("selected", k + 1 === this.page.selected));
+  }
+
+  // Every event that was not late, frozen or not: the lines go on behind.
+  note({ setpoint }) {
+    if (!setpoint || !this.charts) return;
+    const now_s = setpoint.time_s;
+    if (now_s < this.times.at(-1)) this.times.length = this.corrections.forEach((line) => (line.length = 0)) ?? 0;
+    this.times.push(now_s);
+    this.corrections.forEach((line, k) => line.push(setpoint.valid ? setpoint.correction_mm[k] * 1000 : null));
+    let old = 0;
+    while (this.times[old] < now_s - SPAN_S) old++;
+    if (old > 100) {
+      this.times.splice(0, old);
+      this.corrections.forEach((line) => line.splice(0, old));
+    }
+  }
+
+  show({ setpoint }) {
+    const now_ms = performance.now();
+    if (now_ms - this.drawn_ms >= DRAW_EVERY_MS && !document.hidden) {
+      this.drawn_ms = now_ms;
+      this.charts.forEach((chart, k) => chart.setData([this.times, this.corrections[k]]));
+    }
+    if (!setpoint.valid) {
+      this.rows.forEach(({ number, sources, bar }) => {
+        number.textContent = "–";
+        sources.textContent = "not valid";
+        bar.replaceChildren();
+      });
+      return;
+    }
+    const causes = Object.values(setpoint.sources_mm);
+    const wanted = scaleFor(Math.max(...setpoint.correction_mm.map((_, k) => causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0)), 0.5));
+    if (wanted > this.scale_um || wanted < this.scale_um / 4) this.scale_um = wanted;
+    const shadow = setpoint.shadow?.correction_mm;
+    this.rows.forEach(({ number, sources, bar }, k) => {
+      number.textContent = signed(setpoint.correction_mm[k] * 1000);
+      sources.textContent = `link ${k + 1}${shadow ? `, shadow ${signed(shadow[k] * 1000)}` : ""}`;
+      stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
+      if (shadow) {
+        const outline = element("i", { class: "shadow", title: "the shadow model" });
+        const value = Math.max(-50, Math.min(50, (50 * shadow[k] * 1000) / this.scale_um));
+        outline.style.left = `${50 + Math.min(0, value)}%`;
+        outline.style.width = `${Math.abs(value)}%`;
+        bar.append(outline);
+      }
+    });
+  }
+}

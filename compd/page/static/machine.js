@@ -1,0 +1,178 @@
+// The machine in three dimensions on a plain canvas, with the errors drawn many times larger than they are.
+import { ink, prepared, signed } from "./format.js";
+
+const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
+const TRAIL_S = 10;
+const VIEWS = { f: [0, 0], s: [Math.PI / 2, 0], t: [0, Math.PI / 2 - 1e-3] };
+
+// Blue below nothing, grey at nothing, vermilion above.
+export function diverging(share) {
+  const [from, to] = [[139, 148, 158], share < 0 ? [0, 114, 178] : [213, 94, 0]];
+  const part = Math.min(1, Math.abs(share));
+  return `rgb(${from.map((value, k) => Math.round(value + (to[k] - value) * part)).join()})`;
+}
+
+export class Machine {
+  constructor(canvas, colours, page) {
+    Object.assign(this, { canvas, colours, page, turn: 0.5, tilt: 0.25, zoom: 1, trail: [], largest_um: 1, parts: [], scene: null });
+    const slider = document.getElementById("exaggeration");
+    const say = () => {
+      this.times = slider.value === "0" ? 1 : Math.round(10 ** slider.value);
+      document.getElementById("exaggeration-text").textContent = `× ${this.times}`;
+      this.draw();
+    };
+    slider.addEventListener("input", say);
+    say();
+    this.bind();
+  }
+
+  bind() {
+    const canvas = this.canvas;
+    let held = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      held = [event.clientX, event.clientY];
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (held) {
+        this.turn -= (event.clientX - held[0]) * 0.01;
+        this.tilt = Math.max(-1.5, Math.min(1.57, this.tilt + (event.clientY - held[1]) * 0.01));
+        held = [event.clientX, event.clientY];
+        this.draw();
+      } else this.hover(event.offsetX, event.offsetY);
+    });
+    canvas.addEventListener("pointerup", () => (held = null));
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom = Math.max(0.3, Math.min(8, this.zoom * Math.exp(-event.deltaY * 0.001)));
+      this.draw();
+    }, { passive: false });
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  begin(machine) {
+    this.trail = [];
+    this.frame = Object.fromEntries(machine.wiring.map((wire, k) => [wire.distance, k]).filter(([distance]) => distance));
+  }
+
+  view(key) {
+    [this.turn, this.tilt] = VIEWS[key];
+    this.draw();
+  }
+
+  show({ scene, setpoint, values }) {
+    this.scene = scene;
+    if (scene) {
+      this.corrections_um = setpoint.correction_mm.map((value) => value * 1000);
+      this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, values[k] === null ? null : values[k] * 1000]));
+      const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), 0.1);
+      if (!document.getElementById("lock").checked) this.largest_um = largest;
+      this.trail.push([setpoint.time_s, scene.tip]);
+      while (this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();
+    }
+    this.draw();
+  }
+
+  // From {M} to the canvas: turned about z, tilted, and as large as fits.
+  projector(width, height) {
+    const points = [...this.scene.plate, ...this.scene.supports, ...this.scene.platform, this.scene.tip];
+    const centre = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
+    const radius = Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - centre[k]))));
+    const scale = (0.46 * Math.min(width, height) * this.zoom) / radius;
+    const [ct, st, ci, si] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
+    return (point) => {
+      const [x, y, z] = point.map((value, k) => value - centre[k]);
+      const [right, away] = [ct * x + st * y, -st * x + ct * y];
+      return [width / 2 + scale * right, height / 2 - scale * (ci * z + si * away)];
+    };
+  }
+
+  draw() {
+    const { context, width, height } = prepared(this.canvas);
+    this.parts = [];
+    if (!this.scene) {
+      context.fillStyle = ink("--soft");
+      context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
+      return;
+    }
+    const place = this.projector(width, height);
+    const { plate, supports, base, platform, tip, supports_moved_um, tip_moved_um } = this.scene;
+    const ghost = (point, moved_um) => point.map((value, k) => value - (moved_um[k] * this.times) / 1000);
+    const line = (points, colour, thick, dash = []) => {
+      context.beginPath();
+      points.map(place).forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+      context.strokeStyle = colour;
+      context.lineWidth = thick;
+      context.setLineDash(dash);
+      context.stroke();
+      context.setLineDash([]);
+    };
+    const fill = (points, colour) => {
+      context.beginPath();
+      points.map(place).forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+      context.closePath();
+      context.fillStyle = colour;
+      context.fill();
+    };
+    fill(plate, "#8c959f33");
+    line([...plate, plate[0]], ink("--soft"), 1);
+    const old = { supports: supports.map((point, k) => ghost(point, supports_moved_um[k])), platform: platform.map((point) => ghost(point, tip_moved_um)), tip: ghost(tip, tip_moved_um) };
+    const faint = "#8c959f99";
+    line([...old.supports, old.supports[0]], faint, 1, [4, 4]);
+    line([...old.platform, old.platform[0]], faint, 1, [4, 4]);
+    old.platform.forEach((point) => line([point, old.tip], faint, 1, [4, 4]));
+    for (const [name, [from, i, to, k]] of Object.entries(RODS)) {
+      const um = this.rods_um?.[name];
+      const ends = [this.scene[from][i], this.scene[to][k]];
+      line(ends, um === null || um === undefined ? "#8c959f55" : diverging(um / this.largest_um), 2);
+      this.parts.push({ ends: ends.map(place), text: `rod ${name}: ${signed(um)} µm since machine zero` });
+    }
+    fill(supports, "#8c959f22");
+    fill(platform, "#009e7355");
+    line([...platform, platform[0]], "#009e73", 2);
+    platform.forEach((point) => line([point, tip], "#009e73", 1));
+    base.forEach((point, k) => {
+      const ends = [point, platform[k]];
+      if (this.page.selected === k + 1) line(ends, ink("--ink"), 9);
+      line(ends, diverging(this.corrections_um[k] / this.largest_um), 5);
+      this.parts.push({ ends: ends.map(place), text: `link ${k + 1}: correction ${signed(this.corrections_um[k])} µm, ${Math.hypot(...point.map((value, axis) => value - platform[k][axis])).toFixed(3)} mm long` });
+      const [x, y] = place(point);
+      context.fillStyle = ink("--ink");
+      context.font = "bold 12px system-ui";
+      context.fillText(String(k + 1), x + 8, y - 6);
+    });
+    line(this.trail.map(([, point]) => point), "#0072b2", 1.5);
+    const [x, y] = place(tip);
+    context.beginPath();
+    context.arc(x, y, 4, 0, 7);
+    context.fillStyle = ink("--ink");
+    context.fill();
+    this.drawColours();
+  }
+
+  drawColours() {
+    const { context, width, height } = prepared(this.colours);
+    for (let x = 0; x < width; x++) {
+      context.fillStyle = diverging((2 * x) / width - 1);
+      context.fillRect(x, 0, 1, height - 14);
+    }
+    context.fillStyle = ink("--soft");
+    context.font = "11px system-ui";
+    context.fillText(`−${this.largest_um.toFixed(1)}`, 0, height - 2);
+    context.textAlign = "center";
+    context.fillText("0 µm", width / 2, height - 2);
+    context.textAlign = "right";
+    context.fillText(`+${this.largest_um.toFixed(1)}`, width, height - 2);
+    context.textAlign = "left";
+  }
+
+  // The numbers of the part that is pointed at.
+  hover(x, y) {
+    const distance = ({ ends: [[ax, ay], [bx, by]] }) => {
+      const along = Math.max(0, Math.min(1, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2 || 1)));
+      return Math.hypot(x - ax - along * (bx - ax), y - ay - along * (by - ay));
+    };
+    const nearest = this.parts.map((part) => ({ part, away: distance(part) })).sort((a, b) => a.away - b.away)[0];
+    document.getElementById("part").textContent = nearest && nearest.away < 12 ? nearest.part.text : "Point at a link or a rod.";
+  }
+}

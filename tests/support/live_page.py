@@ -1,0 +1,120 @@
+"""The page in a real browser: a simulated machine, its daemon, `compd page`, and Chromium without the rest of the world."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from compd.client import connect
+from compd.demo.processes import Command, run_commands
+from compd.demo.session import wait_for_gauges
+from compd.simulation.wires.control_client import ControlClient
+from tests.support.paths import CONFIG
+from tests.support.simulated import run_directory
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
+# No name is resolved but this computer's own: what the page wants from elsewhere fails, and is seen.
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+]
+ZERO_HOLD_S = 600.0
+ANSWER_TIMEOUT_S = 15.0
+
+
+@dataclass
+class LivePage:
+    """A page that is served. address : with its token. machine : the simulated machine's own control."""
+
+    address: str
+    directory: Path
+    recordings: Path
+    machine: ControlClient
+    asked: list[str] = field(default_factory=list)
+
+    @property
+    def socket(self) -> str:
+        return str(self.directory / "compd.sock")
+
+
+@contextmanager
+def served(*options: str, name: str = "tripod-cmm.yaml", model: Path | None = None) -> Iterator[LivePage]:
+    """A machine with its zero taken, at rest at machine zero, and its page; `options`: of `compd page`."""
+    with run_directory() as directory:
+        simulate = ["simulate", str(CONFIG / name), "--directory", str(directory), "--zero-hold", str(ZERO_HOLD_S)]
+        commands = [
+            Command(simulate, ready=directory / "control.sock"),
+            Command(["run", str(directory / name)], ready=directory / "compd.sock"),
+        ]
+        with run_commands(commands, log=directory / "output.log"):
+            with connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer:
+                with connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon:
+                    wait_for_gauges(observer, daemon.watch(10.0))
+                observer.zero()
+                if model is not None:
+                    observer.model(str(model))
+            recordings = directory / "recordings"
+            with (
+                ControlClient(directory / "control.sock") as machine,
+                page_process(directory / "compd.sock", recordings, *options) as address,
+            ):
+                yield LivePage(address, directory, recordings, machine)
+
+
+@contextmanager
+def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator[str]:
+    """`compd page` on a free port; the address that it prints."""
+    words = ["page", str(unix_socket), "--port", "0", "--recordings", str(recordings), *options]
+    process = subprocess.Popen([sys.executable, "-m", "compd", *words], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        address = process.stdout.readline().removeprefix("open ").strip()
+        assert address.startswith("http://"), address
+        yield address
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait(10.0)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Chromium, driven by Playwright."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        try:
+            yield chromium
+        finally:
+            chromium.close()
+
+
+@contextmanager
+def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
+    """The page in a new window, once it shows a state; fails where it wanted anything from elsewhere, or its scripts
+    failed."""
+    context = chromium.new_context(**{"viewport": {"width": 1440, "height": 1000}, **options})
+    tab = context.new_page()
+    asked: list[str] = []
+    failures: list[str] = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.on("pageerror", lambda error: failures.append(str(error)))
+    tab.on("console", lambda message: failures.append(message.text) if message.type == "error" else None)
+    try:
+        tab.goto(page.address)
+        tab.wait_for_function("window.compd?.live?.setpoint && document.body.dataset.tone !== 'gone'")
+        yield tab
+        origin = page.address.partition("?")[0]
+        assert [url for url in asked if not url.startswith(origin)] == []
+        assert failures == []
+    finally:
+        context.close()
