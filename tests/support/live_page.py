@@ -29,6 +29,7 @@ FLAGS = [
 ]
 ZERO_HOLD_S = 600.0
 ANSWER_TIMEOUT_S = 15.0
+_LOOK_EVERY_S = 0.05
 
 
 @dataclass
@@ -82,7 +83,7 @@ def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator
         yield address
     finally:
         process.send_signal(signal.SIGTERM)
-        process.wait(10.0)
+        process.communicate(timeout=10.0)
 
 
 @contextmanager
@@ -111,10 +112,20 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
     tab.on("console", lambda message: failures.append(message.text) if message.type == "error" else None)
     try:
         tab.goto(page.address)
-        tab.wait_for_function("window.compd?.live?.setpoint && document.body.dataset.tone !== 'gone'")
+        until(tab, "window.compd?.live?.setpoint && document.body.dataset.tone !== 'gone'")
         yield tab
         origin = page.address.partition("?")[0]
         assert [url for url in asked if not url.startswith(origin)] == []
-        assert failures == []
+        # a request that is refused is an error on the console, too
+        assert [failure for failure in failures if "status of 4" not in failure] == []
     finally:
         context.close()
+
+
+def until(tab: Any, expression: str, within_s: float = 30.0) -> None:
+    """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)"""
+    for _ in range(round(within_s / _LOOK_EVERY_S)):
+        if tab.evaluate(expression):
+            return
+        tab.wait_for_timeout(1e3 * _LOOK_EVERY_S)
+    raise AssertionError(f"not within {within_s:g} s: {expression}")

@@ -48,14 +48,14 @@ export class Budget {
 
   show({ budget, setpoint }) {
     const causes = budget ? Object.keys(budget) : [];
-    const key = causes.join();
+    const key = `${causes.join()} ${Boolean(setpoint.u_tip_um)}`;
     if (key !== this.causes) {
       this.causes = key;
       this.legend.replaceChildren(...causes.map((cause, k) => {
         const patch = element("i");
         patch.style.background = causeColour(k);
         return element("span", {}, patch, cause.replaceAll("_", " "));
-      }), element("span", {}, "— uncertainty, 95 %"));
+      }), element("span", {}, setpoint.u_tip_um ? "— uncertainty, 95 %" : "uncertainty not known: a gauge declares no noise_um"));
     }
     const vectors = causes.map((cause) => budget[cause]);
     const sums = [0, 1, 2].map((axis) => vectors.map((vector) => Math.abs(vector[axis])).reduce((a, b) => a + b, 0));

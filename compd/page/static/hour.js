@@ -3,11 +3,12 @@ import { element, ink, prepared, signed } from "./format.js";
 import { appearance, COLOURS, NAMES } from "./states.js";
 
 const HOUR_S = 3600;
+const clock = (time_s, seconds = true) => new Date(time_s * 1000).toTimeString().slice(0, seconds ? 8 : 5);
 const DRAW_EVERY_MS = 1000;
 
 export class Hour {
-  constructor(tape, place, scrub, page) {
-    Object.assign(this, { tape, place, scrub, page, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
+  constructor(tape, place, scrub, links) {
+    Object.assign(this, { tape, place, scrub, links, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
     tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
   }
 
@@ -25,9 +26,9 @@ export class Hour {
       start += 8 * rows;
       const values = new Float32Array(data.slice(start, start + 4 * rows * this.columns.length));
       start += 4 * rows * this.columns.length;
-      if (name !== "coarse") continue;
-      this.times = [...times];
-      this.rows = this.times.map((_, k) => values.slice(k * this.columns.length, (k + 1) * this.columns.length));
+      const table = [...times].map((_, k) => values.slice(k * this.columns.length, (k + 1) * this.columns.length));
+      if (name === "coarse") [this.times, this.rows] = [[...times], table];
+      else this.links.recall([...times], table.map((row) => this.corrections(row)));
     }
     this.draw(true);
   }
@@ -50,6 +51,10 @@ export class Hour {
       this.rows.shift();
     }
     this.draw();
+  }
+
+  corrections(row) {
+    return [...row.slice(1, 1 + this.columns.filter((name) => name.startsWith("correction_")).length)];
   }
 
   get end_s() {
@@ -94,7 +99,7 @@ export class Hour {
         legend: { show: false },
         cursor: { drag: { x: false, y: false } },
         scales: { x: { range: () => [this.end_s - HOUR_S, this.end_s] } },
-        axes: [axis, { ...axis, size: 44 }],
+        axes: [{ ...axis, values: (_, times) => times.map((time) => clock(time, false)) }, { ...axis, size: 44 }],
         series: [{}, ...[["x", "#0072b2"], ["y", "#e69f00"], ["z", "#cc79a7"]].map(([label, stroke]) => ({ label, stroke, width: 1.5, points: { show: false }, spanGaps: false }))],
       }, data, this.place);
       this.place.append(element("p", { class: "note" }, "what has moved the tip, µm: x blue, y orange, z purple"));
@@ -109,10 +114,11 @@ export class Hour {
     if (k < 0) k = this.times.length - 1;
     this.at_s = this.times[k];
     const row = this.rows[k];
-    const links = this.columns.filter((name) => name.startsWith("correction_")).length;
+    const corrections = this.corrections(row);
     const state = Number.isNaN(row[0]) ? "no daemon" : NAMES[row[0]] ?? "unknown";
-    const numbers = Number.isNaN(row[1]) ? "" : `; corrections ${[...row.slice(1, 1 + links)].map((um) => signed(um)).join(", ")} µm; tip moved ${[...row.slice(-3)].map((um) => signed(um)).join(", ")} µm`;
-    this.scrub.textContent = `${new Date(this.at_s * 1000).toLocaleTimeString()}: ${state}${numbers}`;
+    const numbers = Number.isNaN(row[1]) ? "" : `; corrections ${corrections.map((um) => signed(um)).join(", ")} µm; tip moved ${[...row.slice(-3)].map((um) => signed(um)).join(", ")} µm`;
+    this.scrub.textContent = `${clock(this.at_s)}: ${state}${numbers}`;
+    this.links.past(corrections);
     document.dispatchEvent(new CustomEvent("freeze", { detail: { frozen: true, at_s: this.at_s } }));
     this.draw(true);
   }

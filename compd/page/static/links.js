@@ -36,7 +36,7 @@ export class Links {
     const label = element("div", { class: "number" }, number, sources);
     const row = element("div", { class: "strip", onclick: () => this.select(link + 1) }, label, plot, bar);
     row.title = `link ${link + 1}`;
-    plot.style.height = `${count === 6 ? 46 : 92}px`;
+    plot.style.height = `${count === 6 ? 54 : 108}px`;
     return { row, number, sources, plot, bar };
   }
 
@@ -44,7 +44,7 @@ export class Links {
     const limit = () => this.limit_um;
     const options = {
       width: place.clientWidth || 300,
-      height: count === 6 ? 46 : 92,
+      height: count === 6 ? 54 : 108,
       cursor: { show: false },
       legend: { show: false },
       scales: { x: { time: false, range: (_, __, max) => [max - SPAN_S, max] }, y: { range: (_, low, high) => this.range(low, high) } },
@@ -79,10 +79,8 @@ export class Links {
   }
 
   // Every event that was not late, frozen or not: the lines go on behind.
-  note({ setpoint }) {
+  note({ setpoint, unix_s: now_s }) {
     if (!setpoint || !this.charts) return;
-    const now_s = setpoint.time_s;
-    if (now_s < this.times.at(-1)) this.times.length = this.corrections.forEach((line) => (line.length = 0)) ?? 0;
     this.times.push(now_s);
     this.corrections.forEach((line, k) => line.push(setpoint.valid ? setpoint.correction_mm[k] * 1000 : null));
     let old = 0;
@@ -91,6 +89,24 @@ export class Links {
       this.times.splice(0, old);
       this.corrections.forEach((line) => line.splice(0, old));
     }
+  }
+
+  // The minute before the page was opened: times and, for each, the corrections of the links, nan where there were none.
+  recall(times, corrections_um) {
+    if (!this.charts) return;
+    const first_s = this.times[0] ?? Infinity;
+    const earlier = times.map((_, k) => k).filter((k) => times[k] < first_s);
+    this.times = [...earlier.map((k) => times[k]), ...this.times];
+    this.corrections = this.corrections.map((line, link) => [...earlier.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link])), ...line]);
+  }
+
+  // The numbers of a moment that has been, while the page is frozen.
+  past(corrections_um) {
+    this.rows?.forEach(({ number, sources, bar }, k) => {
+      number.textContent = signed(corrections_um[k]);
+      sources.textContent = `link ${k + 1}, then`;
+      bar.replaceChildren();
+    });
   }
 
   show({ setpoint }) {
@@ -113,7 +129,7 @@ export class Links {
     const shadow = setpoint.shadow?.correction_mm;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
-      sources.textContent = `link ${k + 1}${shadow ? `, shadow ${signed(shadow[k] * 1000)}` : ""}`;
+      sources.textContent = `link ${k + 1}${shadow ? `, shadow ${signed(shadow[k] * 1000)}` : ` of ±${this.limit_um.toFixed(0)}`}`;
       stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
       if (shadow) {
         const outline = element("i", { class: "shadow", title: "the shadow model" });

@@ -78,7 +78,7 @@ export class Machine {
     const points = [...this.scene.plate, ...this.scene.supports, ...this.scene.platform, this.scene.tip];
     const centre = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
     const radius = Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - centre[k]))));
-    const scale = (0.46 * Math.min(width, height) * this.zoom) / radius;
+    const scale = (0.55 * Math.min(width, height) * this.zoom) / radius;
     const [ct, st, ci, si] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
     return (point) => {
       const [x, y, z] = point.map((value, k) => value - centre[k]);

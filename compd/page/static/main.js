@@ -19,7 +19,7 @@ const machine = new Machine(at("scene"), at("colours"), page);
 const links = new Links(at("strips"), page);
 const budget = new Budget(at("budget"), page);
 const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), page);
-const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), page);
+const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
 
 function begin(told) {
   page.machine = told;
@@ -70,7 +70,7 @@ function listen() {
 export function freeze(frozen, at_s) {
   page.frozen = frozen;
   at("frozen").hidden = !frozen;
-  if (frozen) at("frozen-at").textContent = new Date(at_s * 1000).toLocaleTimeString();
+  if (frozen) at("frozen-at").textContent = new Date(at_s * 1000).toTimeString().slice(0, 8);
   else hour.follow();
 }
 
