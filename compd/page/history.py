@@ -45,7 +45,7 @@ class Ring:
         """Times (N,) and rows (N, columns), the oldest first."""
         kept = min(self._count, len(self._times_s))
         order = (self._count - kept + np.arange(kept)) % len(self._times_s)
-        return self._times_s[order], self._rows[order]
+        return self._times_s[order], self._rows[order].astype(np.float64)
 
 
 class History:

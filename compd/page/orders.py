@@ -112,7 +112,9 @@ class Orders:
         shadow = setpoint.get("shadow", {})
         if "correction_mm" not in shadow:
             why = shadow.get("reason") or "no model runs as a shadow"
-            return Consequence(False, f"Let the model run as a shadow first, so that its effect is known: {why}.", command)
+            return Consequence(
+                False, f"Let the model run as a shadow first, so that its effect is known: {why}.", command
+            )
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
         return Consequence(True, self._change(asked_mm, shadow["correction_mm"]), command)
 

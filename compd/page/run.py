@@ -12,7 +12,7 @@ from compd.errors import DaemonError, Problem
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token
 from compd.page.recordings import Recordings
-from compd.page.server import Page, make_app
+from compd.page.server import Server
 
 # Bytes that the system keeps for a browser that does not read: a few seconds of events, and no minute of old ones.
 SEND_BUFFER_BYTES = 32 * 1024
@@ -35,8 +35,8 @@ def run_page(
     listener = _listener(host, port)
     port = listener.getsockname()[1]
     names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [host]
-    page = Page(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
-    guarded = Guard(make_app(page), tokens, [f"{name}:{port}" for name in names])
+    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
+    guarded = Guard(server.app(), tokens, [f"{name}:{port}" for name in names])
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
     started(f"{host}:{port}")
     uvicorn.Server(config).run(sockets=[listener])

@@ -1,4 +1,4 @@
-"""The page in a real browser: a simulated machine, its daemon, `compd page`, and Chromium without the rest of the world."""
+"""The page in a real browser: a simulated machine, its daemon, `compd page`, and Chromium that reaches nothing else."""
 
 from __future__ import annotations
 

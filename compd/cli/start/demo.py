@@ -16,8 +16,12 @@ def demo(
     seconds: Annotated[float, typer.Option(min=5, help="How long it runs.")] = 20.0,
     page: Annotated[Path, typer.Option(help="Where the page with the pictures goes.")] = Path("out/demo.html"),
     seed: Annotated[int, typer.Option(help="Weather, joints and targets follow from it.")] = 1,
-    live: Annotated[bool, typer.Option("--live", help="Show the machine in the browser instead, until Ctrl-C.")] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="With --live: where the page is; 0: any free port.")] = 7760,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the machine in the browser instead, until Ctrl-C.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="With --live: where the page is; 0: any free port.")
+    ] = 7760,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show what compensation gains."""
     if live:

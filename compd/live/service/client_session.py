@@ -151,7 +151,11 @@ class ClientSession:
 
     def summary(self, controller: bool) -> dict[str, Any]:
         """Who it is, for STATUS; `controller`: whether its target counts."""
-        summary: dict[str, Any] = {"name": self.name, "connected_s": round(self.connected_s, 3), "controller": controller}
+        summary: dict[str, Any] = {
+            "name": self.name,
+            "connected_s": round(self.connected_s, 3),
+            "controller": controller,
+        }
         if self.local:
             summary["user"] = self.user
         if self.due_s < math.inf:

@@ -1,4 +1,4 @@
-"""The MACHINE message: what a client needs to draw the machine and to know its limits, without its configuration file."""
+"""The MACHINE message: what a client needs to draw the machine and to know its limits, without the configuration."""
 
 from __future__ import annotations
 

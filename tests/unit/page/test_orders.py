@@ -38,7 +38,12 @@ def test_zero_names_the_gauges_the_old_zero_and_what_becomes_of_the_correction(l
 def test_accept_names_the_gauges_that_wait_and_why(link):
     assert not Orders(link).consequence("accept", "all").possible
     link.status["gauges"] = [
-        {"channel": "scale_1.position", "quality": "distrusted", "measures": "scale 1", "detail": "came back 5.000 mm away"},
+        {
+            "channel": "scale_1.position",
+            "quality": "distrusted",
+            "measures": "scale 1",
+            "detail": "came back 5.000 mm away",
+        },
         {"channel": "scale_2.position", "quality": "ok", "measures": "scale 2"},
     ]
     told = Orders(link).consequence("accept", "all")

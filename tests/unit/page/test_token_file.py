@@ -35,7 +35,7 @@ def test_a_file_that_is_none_is_named(tmp_path, text):
     path = tmp_path / "tokens.yaml"
     path.write_text(text)
     path.chmod(0o600)
-    with pytest.raises(ConfigurationError, match="tokens.yaml"):
+    with pytest.raises(ConfigurationError, match=r"tokens\.yaml"):
         read_tokens(path)
 
 

@@ -1,0 +1,128 @@
+"""What every browser gets: live events ten times a second and slow ones once, made once for all of them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Mapping
+from typing import Any
+
+from compd.page.browsers import Browser, Browsers
+from compd.page.daemon_link import DaemonLink
+from compd.page.history import History
+from compd.page.recordings import Recordings
+from compd.page.scene import Scene
+
+LIVE_HZ = 10.0
+SLOW_EVERY_S = 1.0
+
+Event = Mapping[str, Any]
+
+
+class Broadcast:
+    """The events; used by the event loop's thread alone.
+
+    Attributes
+    ----------
+    history : of the machine; None before the daemon has told what machine it is.
+    """
+
+    def __init__(self, link: DaemonLink, browsers: Browsers, recordings: Recordings) -> None:
+        self._link = link
+        self._browsers = browsers
+        self._recordings = recordings
+        self.history: History | None = None
+        self._scene: Scene | None = None
+        self._machine: Any = None
+        self._live = self._slow = b""
+        self._slow_count = 0
+        self._made = asyncio.Condition()
+
+    async def run(self) -> None:
+        """Make events, until cancelled."""
+        loop = asyncio.get_running_loop()
+        due_s = slow_due_s = loop.time()
+        while True:
+            self._note_machine()
+            if self.history is not None:
+                readings = self._link.readings
+                self.history.note(time.time(), None if readings is None else readings["setpoint"], self._link.budget)
+            async with self._made:
+                self._live = encoded("live", self._live_event())
+                if due_s >= slow_due_s:
+                    slow_due_s += SLOW_EVERY_S
+                    self._slow = encoded("slow", self._slow_event())
+                    self._slow_count += 1
+                self._made.notify_all()
+            due_s = max(due_s + 1 / LIVE_HZ, loop.time())
+            await asyncio.sleep(due_s - loop.time())
+
+    async def events(self, browser: Browser) -> AsyncIterator[bytes]:
+        """The events of one browser, until it goes. Each is the newest: a browser that is slow gets fewer."""
+        try:
+            yield encoded("hello", {"id": browser.id, "role": browser.role, "machine": self._machine})
+            machine, slow_count = self._machine, -1
+            while True:
+                async with self._made:
+                    await self._made.wait()
+                if self._machine is not machine:
+                    machine = self._machine
+                    yield encoded("machine", {"machine": machine})
+                if self._slow_count != slow_count:
+                    slow_count = self._slow_count
+                    yield self._slow
+                yield self._live
+        finally:
+            self._browsers.disconnect(browser)
+
+    def _note_machine(self) -> None:
+        machine = self._link.machine
+        if machine is None or machine == self._machine:
+            return
+        self._machine, self._scene = machine, Scene(machine)
+        self.history = History(sum(wire["kind"] == "scale" for wire in machine["wiring"]))
+
+    def _live_event(self) -> Event:
+        """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is."""
+        link = self._link
+        event: dict[str, Any] = {"made": time.monotonic(), "unix_s": time.time()}
+        event |= {"connected": link.connected, "reason": link.reason}
+        if link.connected and link.readings is not None and self._scene is not None:
+            setpoint = link.readings["setpoint"]
+            event["setpoint"] = setpoint
+            event["values"] = values_since_zero(link.readings, link.columns)
+            event["budget"] = (link.budget or {}).get("tip_um")
+            event["scene"] = self._scene.points(setpoint, link.budget)
+        return event
+
+    def _slow_event(self) -> Event:
+        """Status, browsers and the recording that runs."""
+        running = self._recordings.running
+        return {
+            "status": self._link.status,
+            "browsers": self._browsers.summary(),
+            "recording": None if running is None else {"name": running.name, "started": running.started_s},
+            "last_words": self._recordings.last_words,
+        }
+
+
+def values_since_zero(readings: Event, columns: list[dict[str, Any]]) -> list[float | None]:
+    """What each wired channel shows, in the order of MACHINE's wiring: lengths in mm since machine zero.
+
+    None where there is no value, or no machine zero to count from.
+    """
+    zero = readings.get("zero", {}).get("readings_mm", {})
+    values: list[float | None] = []
+    for column in columns:
+        value = readings["readings"][column["channel"]].get("value")
+        if value is not None and "sign" in column:
+            at_zero = zero.get(column["channel"])
+            value = None if at_zero is None else column["sign"] * (value - at_zero)
+        values.append(value)
+    return values
+
+
+def encoded(name: str, data: Event) -> bytes:
+    """An event as it is sent (server-sent events, WHATWG HTML, section 9.2)."""
+    return f"event: {name}\ndata: {json.dumps(data, separators=(',', ':'))}\n\n".encode()
