@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Mapping
 from typing import Any
 
+from compd.gauge import Quality
 from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.history import History
@@ -91,7 +92,7 @@ class Broadcast:
         if link.connected and link.readings is not None and self._scene is not None:
             setpoint = link.readings["setpoint"]
             event["setpoint"] = setpoint
-            event["values"] = values_since_zero(link.readings, link.columns)
+            event["gauges"] = gauges(link.readings, link.columns)
             event["budget"] = (link.budget or {}).get("tip_um")
             event["scene"] = self._scene.points(setpoint, link.budget)
         return event
@@ -107,20 +108,32 @@ class Broadcast:
         }
 
 
-def values_since_zero(readings: Event, columns: list[dict[str, Any]]) -> list[float | None]:
-    """What each wired channel shows, in the order of MACHINE's wiring: lengths in mm since machine zero.
+def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What each wired channel shows in the cycle of a READINGS message, in the order of MACHINE's wiring.
 
-    None where there is no value, or no machine zero to count from.
+    `value` : a length in mm since machine zero, or another quantity in its unit; absent where there is none, or no
+    machine zero to count from.  `age_s` : of a value.  `fault` : why there is none, or why it must not be used.
     """
     zero = readings.get("zero", {}).get("readings_mm", {})
-    values: list[float | None] = []
+    shown: list[dict[str, Any]] = []
     for column in columns:
-        value = readings["readings"][column["channel"]].get("value")
-        if value is not None and "sign" in column:
-            at_zero = zero.get(column["channel"])
-            value = None if at_zero is None else column["sign"] * (value - at_zero)
-        values.append(value)
-    return values
+        reading = readings["readings"][column["channel"]]
+        gauge: dict[str, Any] = {}
+        if "value" in reading:
+            value, age_s = reading["value"], readings["time_s"] - reading["time_s"]
+            gauge["age_s"] = round(age_s, 4)
+            if age_s > column["stale_after_s"]:
+                gauge["fault"] = Quality.STALE
+            if "sign" not in column:
+                gauge["value"] = value
+            elif column["channel"] in zero:
+                gauge["value"] = round(column["sign"] * (value - zero[column["channel"]]), 7)
+        else:
+            gauge["fault"] = reading["quality"]
+            if "detail" in reading:
+                gauge["detail"] = reading["detail"]
+        shown.append(gauge)
+    return shown
 
 
 def encoded(name: str, data: Event) -> bytes:

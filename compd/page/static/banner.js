@@ -39,7 +39,7 @@ export function showBanner(page, behind_s) {
   const setpoint = told.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint) : "");
-  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; uncertainty not known"}` : "");
+  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");

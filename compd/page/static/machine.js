@@ -60,11 +60,11 @@ export class Machine {
     this.draw();
   }
 
-  show({ scene, setpoint, values }) {
+  show({ scene, setpoint, gauges }) {
     this.scene = scene;
     if (scene) {
       this.corrections_um = setpoint.correction_mm.map((value) => value * 1000);
-      this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, values[k] === null ? null : values[k] * 1000]));
+      this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, gauges[k].fault || gauges[k].value === undefined ? null : gauges[k].value * 1000]));
       const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), 0.1);
       if (!document.getElementById("lock").checked) this.largest_um = largest;
       this.trail.push([setpoint.time_s, scene.tip]);

@@ -63,7 +63,7 @@ function listen() {
     drawer.show(told);
     if (page.frozen || !told.status) return;
     showTiming(at("timing"), told.status);
-    gauges.status(told.status);
+    gauges.count(told.status);
   });
 }
 

@@ -6,17 +6,17 @@ from tests.support.live_page import CHROMIUM, browser, opened, served
 
 
 @pytest.fixture(scope="package")
-def live():
+def chromium():
     if not CHROMIUM:
         pytest.skip("Chromium is not there; on Debian: apt-get install chromium")
-    with served() as page:
-        yield page
+    with browser() as started:
+        yield started
 
 
 @pytest.fixture(scope="package")
-def chromium(live):
-    with browser() as started:
-        yield started
+def live(chromium):
+    with served() as page:
+        yield page
 
 
 @pytest.fixture

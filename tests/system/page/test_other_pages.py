@@ -1,0 +1,40 @@
+"""Pages of other machines, of people who may look only, and of a daemon that goes away."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from compd.client import connect
+from tests.support.live_page import opened, served, until
+
+pytestmark = pytest.mark.timeout(180)
+
+
+def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(chromium):
+    with served("--read-only") as page, opened(chromium, page) as tab:
+        until(tab, "document.getElementById('role').textContent === 'view only'")
+        tab.keyboard.press("o")
+        until(tab, "document.getElementById('arm').disabled")
+        told = tab.evaluate(
+            "Promise.all([['arm', {id: compd.id}], ['orders/zero', {id: compd.id}], ['recordings', {name: 'a'}]].map("
+            "([path, keys]) => fetch(path, {method: 'POST', body: JSON.stringify(keys)}).then((r) => r.status)))"
+        )
+        assert told == [403, 403, 403]
+        tab.keyboard.press("Escape")
+        with connect(page.socket) as daemon:
+            processes = daemon.status()["processes"]
+        os.kill(processes["supervisor"]["pid"], signal.SIGTERM)
+        until(tab, "document.body.dataset.state === 'gone'")
+        assert tab.locator("#state").inner_text() == "NO DAEMON"
+        assert tab.locator("#tip").inner_text() == "", "no number of what was"
+
+
+def test_a_hexapod_has_six_links(chromium):
+    with served(name="hexapod.yaml") as page, opened(chromium, page) as tab:
+        until(tab, "document.querySelectorAll('.strip .number b').length === 6")
+        until(tab, "compd.live.scene && compd.live.scene.base.length === 6")
+        tab.keyboard.press("6")
+        assert tab.locator(".strip.selected").count() == 1

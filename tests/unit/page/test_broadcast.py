@@ -1,0 +1,37 @@
+"""What a browser is told of the gauges."""
+
+from __future__ import annotations
+
+import pytest
+
+from compd.page.broadcast import gauges
+
+COLUMNS = [
+    {"column": "scale_1_mm", "channel": "scale_1.position", "sign": -1, "stale_after_s": 0.5},
+    {"column": "temperature_room_degC", "channel": "cabinet.room", "stale_after_s": 5.0},
+]
+ZERO = {"readings_mm": {"scale_1.position": 10.0}}
+
+
+def shown(scale, room, **more):
+    readings = {"scale_1.position": scale, "cabinet.room": room}
+    return gauges({"time_s": 100.0, "readings": readings, **more}, COLUMNS)
+
+
+def test_a_length_counts_from_machine_zero_and_a_temperature_is_as_it_is():
+    scale, room = shown({"value": 12.5, "time_s": 99.9}, {"value": 20.25, "time_s": 98.0}, zero=ZERO)
+    assert scale == {"value": -2.5, "age_s": pytest.approx(0.1)}
+    assert room == {"value": 20.25, "age_s": 2.0}
+
+
+def test_without_a_machine_zero_a_length_has_no_value():
+    scale, _ = shown({"value": 12.5, "time_s": 99.9}, {"value": 20.25, "time_s": 98.0})
+    assert "value" not in scale
+    assert "fault" not in scale
+
+
+def test_a_fault_has_no_value_and_an_old_reading_is_stale():
+    lost = {"quality": "timeout", "detail": "no byte", "time_s": 99.9}
+    scale, room = shown(lost, {"value": 20.25, "time_s": 94.0}, zero=ZERO)
+    assert scale == {"fault": "timeout", "detail": "no byte"}
+    assert room["fault"] == "stale"
