@@ -10,12 +10,15 @@ from compd.client import connect
 from compd.configuration import Configuration
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
+from compd.errors import DaemonError
 
 # An hour of warming up in three minutes: what moves can be seen to move.
 SPEEDUP = 20.0
 # The machine stands at machine zero for so long, s: zero is taken in it.
 ZERO_HOLD_S = 30.0
 ANSWER_TIMEOUT_S = 15.0
+WATCH_HZ = 10.0
+ZERO_TRIES = 3
 
 
 def run_live(configuration: Configuration, seed: int, serve: Callable[[str], None]) -> None:
@@ -35,10 +38,19 @@ def run_live(configuration: Configuration, seed: int, serve: Callable[[str], Non
             Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
         ]
         with run_commands(commands, log=directory / "output.log"):
-            with (
-                connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer,
-                connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon,
-            ):
-                wait_for_gauges(observer, daemon.watch(10.0))
-                observer.zero()
+            take_zero(directory / "compd.sock")
             serve(str(directory / "compd.sock"))
+
+
+def take_zero(unix_socket: Path) -> None:
+    """Take machine zero of a daemon, as soon as every gauge is good. Raises DaemonError where it is refused thrice."""
+    with connect(unix_socket, ANSWER_TIMEOUT_S) as observer, connect(unix_socket, ANSWER_TIMEOUT_S) as daemon:
+        setpoints = daemon.watch(WATCH_HZ)
+        for tries_left in reversed(range(ZERO_TRIES)):
+            wait_for_gauges(observer, setpoints)
+            try:
+                observer.zero()
+                return
+            except DaemonError:  # a gauge was late just then
+                if not tries_left:
+                    raise

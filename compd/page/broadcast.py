@@ -13,7 +13,7 @@ from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.history import History
 from compd.page.recordings import Recordings
-from compd.page.scene import Scene
+from compd.page.scene import scene
 
 LIVE_HZ = 10.0
 SLOW_EVERY_S = 1.0
@@ -34,11 +34,11 @@ class Broadcast:
         self._browsers = browsers
         self._recordings = recordings
         self.history: History | None = None
-        self._scene: Scene | None = None
         self._machine: Any = None
         self._live = self._slow = b""
         self._slow_count = 0
         self._made = asyncio.Condition()
+        self._ended = False
 
     async def run(self) -> None:
         """Make events, until cancelled."""
@@ -59,12 +59,16 @@ class Broadcast:
             due_s = max(due_s + 1 / LIVE_HZ, loop.time())
             await asyncio.sleep(due_s - loop.time())
 
+    def end(self) -> None:
+        """End every browser's events within a tick, so that the server can stop; called from a signal's handler too."""
+        self._ended = True
+
     async def events(self, browser: Browser) -> AsyncIterator[bytes]:
         """The events of one browser, until it goes. Each is the newest: a browser that is slow gets fewer."""
         try:
             yield encoded("hello", {"id": browser.id, "role": browser.role, "machine": self._machine})
             machine, slow_count = self._machine, -1
-            while True:
+            while not self._ended:
                 async with self._made:
                     await self._made.wait()
                 if self._machine is not machine:
@@ -81,7 +85,7 @@ class Broadcast:
         machine = self._link.machine
         if machine is None or machine == self._machine:
             return
-        self._machine, self._scene = machine, Scene(machine)
+        self._machine = machine
         self.history = History(sum(wire["kind"] == "scale" for wire in machine["wiring"]))
 
     def _live_event(self) -> Event:
@@ -89,12 +93,12 @@ class Broadcast:
         link = self._link
         event: dict[str, Any] = {"made": time.monotonic(), "unix_s": time.time()}
         event |= {"connected": link.connected, "reason": link.reason}
-        if link.connected and link.readings is not None and self._scene is not None:
+        if link.connected and link.readings is not None and self._machine is not None:
             setpoint = link.readings["setpoint"]
             event["setpoint"] = setpoint
             event["gauges"] = gauges(link.readings, link.columns)
             event["budget"] = (link.budget or {}).get("tip_um")
-            event["scene"] = self._scene.points(setpoint, link.budget)
+            event["scene"] = scene(self._machine, setpoint, link.budget)
         return event
 
     def _slow_event(self) -> Event:

@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.live.loop.states import state_named
+from compd.page.scene import moved_um
 
 Message = Mapping[str, Any]
 
@@ -85,5 +86,5 @@ class History:
             row[1:-6] = [value * 1e3 for value in setpoint["correction_mm"]]
             row[-6:-3] = setpoint["tip_M_mm"]
             if budget is not None and "tip_um" in budget:
-                row[-3:] = np.sum(list(budget["tip_um"].values()), axis=0).tolist()
+                row[-3:] = moved_um(budget)
         return row

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
@@ -39,7 +40,20 @@ def run_page(
     guarded = Guard(server.app(), tokens, [f"{name}:{port}" for name in names])
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
     started(f"{host}:{port}")
-    uvicorn.Server(config).run(sockets=[listener])
+    _Uvicorn(config, server.end).run(sockets=[listener])
+
+
+class _Uvicorn(uvicorn.Server):
+    """Ends the streams of events before it waits for its connections."""
+
+    def __init__(self, config: uvicorn.Config, end: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._end = end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """At SIGTERM or SIGINT."""
+        self._end()
+        super().handle_exit(sig, frame)
 
 
 def _listener(host: str, port: int) -> socket.socket:

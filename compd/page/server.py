@@ -54,6 +54,10 @@ class Server:
         ]
         return Starlette(routes=routes, lifespan=self._lifespan)
 
+    def end(self) -> None:
+        """Let the browsers' streams end."""
+        self._broadcast.end()
+
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]

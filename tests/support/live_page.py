@@ -6,15 +6,14 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compd.client import connect
+from compd.demo.live import take_zero
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
 from compd.simulation.wires.control_client import ControlClient
 from tests.support.paths import CONFIG
 from tests.support.simulated import run_directory
@@ -27,20 +26,20 @@ FLAGS = [
     "--disable-background-networking",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]
-ZERO_HOLD_S = 600.0
-ANSWER_TIMEOUT_S = 15.0
+# The machine stands at machine zero until it is driven.
+AT_REST = ("--zero-hold", "600")
 _LOOK_EVERY_S = 0.05
 
 
 @dataclass
 class LivePage:
-    """A page that is served. address : with its token. machine : the simulated machine's own control."""
+    """A page that is served. address : with its token. pid : of its process. machine : the simulation's control."""
 
     address: str
+    pid: int
     directory: Path
     recordings: Path
     machine: ControlClient
-    asked: list[str] = field(default_factory=list)
 
     @property
     def socket(self) -> str:
@@ -48,39 +47,36 @@ class LivePage:
 
 
 @contextmanager
-def served(*options: str, name: str = "tripod-cmm.yaml", model: Path | None = None) -> Iterator[LivePage]:
-    """A machine with its zero taken, at rest at machine zero, and its page; `options`: of `compd page`."""
+def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST) -> Iterator[LivePage]:
+    """A machine with its zero taken, and its page; `options`: of `compd page`, `simulate`: of `compd simulate`."""
     with run_directory() as directory:
-        simulate = ["simulate", str(CONFIG / name), "--directory", str(directory), "--zero-hold", str(ZERO_HOLD_S)]
         commands = [
-            Command(simulate, ready=directory / "control.sock"),
+            Command(
+                ["simulate", str(CONFIG / name), "--directory", str(directory), *simulate],
+                ready=directory / "control.sock",
+            ),
             Command(["run", str(directory / name)], ready=directory / "compd.sock"),
         ]
         with run_commands(commands, log=directory / "output.log"):
-            with connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as observer:
-                with connect(directory / "compd.sock", ANSWER_TIMEOUT_S) as daemon:
-                    wait_for_gauges(observer, daemon.watch(10.0))
-                observer.zero()
-                if model is not None:
-                    observer.model(str(model))
+            take_zero(directory / "compd.sock")
             recordings = directory / "recordings"
             with (
                 ControlClient(directory / "control.sock") as machine,
-                page_process(directory / "compd.sock", recordings, *options) as address,
+                page_process(directory / "compd.sock", recordings, *options) as (address, pid),
             ):
-                yield LivePage(address, directory, recordings, machine)
+                yield LivePage(address, pid, directory, recordings, machine)
 
 
 @contextmanager
-def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator[str]:
-    """`compd page` on a free port; the address that it prints."""
+def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator[tuple[str, int]]:
+    """`compd page` on a free port; the address that it prints, and the number of its process."""
     words = ["page", str(unix_socket), "--port", "0", "--recordings", str(recordings), *options]
     process = subprocess.Popen([sys.executable, "-m", "compd", *words], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
         address = process.stdout.readline().removeprefix("open ").strip()
         assert address.startswith("http://"), address
-        yield address
+        yield address, process.pid
     finally:
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=10.0)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector, to_outer
+from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
 from compd.model.kinematics import Pose, forward_kinematics
 from compd.model.machine import MachineModel
 from compd.model.sensitivity import tip_by_links
@@ -35,8 +35,8 @@ class BudgetMessage:
         self._machine = machine
         self._newest = newest
         frame = machine.frame
-        supports_B = frame.zero_rotation_M_B.T @ (frame.zero_supports_M_mm - frame.zero_origin_M_mm).T
-        self._base_joints_B_mm = supports_B.T[frame.support_of_joint] + frame.joint_offsets_B_mm
+        self._supports_B_mm = to_inner(frame.zero_rotation_M_B, frame.zero_origin_M_mm, frame.zero_supports_M_mm)
+        self._base_joints_B_mm = self._supports_B_mm[frame.support_of_joint] + frame.joint_offsets_B_mm
 
     def message(self) -> dict[str, Any]:
         """The message as plain data; what the setpoint does not have is left out."""
@@ -48,17 +48,16 @@ class BudgetMessage:
         return message | self._values(setpoint) if setpoint["valid"] else message
 
     def _values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
-        base_joints, pose = self._pose(setpoint)
+        supports, base_joints, pose = self._pose(setpoint)
         if pose.reason[0] != Reason.OK:
             return {}
         tip_M_mm = np.array([setpoint["tip_M_mm"]])
         by_link = tip_by_links(self._machine, base_joints, pose, tip_M_mm)[0]
-        tip_um = {
-            cause: (-UM_PER_MM * (by_link @ np.array(links_mm))).round(_DECIMALS_UM).tolist()
-            for cause, links_mm in setpoint["sources_mm"].items()
-        }
+        tip_um = {cause: _um(-by_link @ np.array(links_mm)) for cause, links_mm in setpoint["sources_mm"].items()}
         return {
             "tip_um": tip_um,
+            "supports_M_mm": supports.round(_DECIMALS_MM).tolist(),
+            "supports_moved_um": _um(supports - self._machine.frame.zero_supports_M_mm),
             "base_joints_M_mm": base_joints[0].round(_DECIMALS_MM).tolist(),
             "platform": {
                 "origin_M_mm": pose.origin_M_mm[0].round(_DECIMALS_MM).tolist(),
@@ -69,12 +68,21 @@ class BudgetMessage:
             },
         }
 
-    def _pose(self, setpoint: Mapping[str, Any]) -> tuple[FloatArray, Pose]:
-        """Base joints (1, n, 3) in {M}, each carried along by the base platform as a whole, and the platform."""
+    def _pose(self, setpoint: Mapping[str, Any]) -> tuple[FloatArray, FloatArray, Pose]:
+        """Supports (3, 3) and base joints (1, n, 3) in {M}, carried along by the base platform as a whole, and the
+        moving platform."""
         frame = setpoint["frame"]
         rotation = compose(rotation_matrix(np.array(frame["rotation_M_rad"])), self._machine.frame.zero_rotation_M_B)
-        base_joints = to_outer(rotation, np.array(frame["origin_M_mm"]), self._base_joints_B_mm)[None]
+        origin_M_mm = np.array(frame["origin_M_mm"])
+        supports = to_outer(rotation, origin_M_mm, self._supports_B_mm)
+        base_joints = to_outer(rotation, origin_M_mm, self._base_joints_B_mm)[None]
         zero = self._machine.zero
         mechanism = self._machine.mechanism(base_joints)
         lengths = np.array([setpoint["link_length_mm"]])
-        return base_joints, forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)
+        pose = forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)
+        return supports, base_joints, pose
+
+
+def _um(lengths_mm: FloatArray) -> Any:
+    """As rounded lists in um."""
+    return (UM_PER_MM * lengths_mm).round(_DECIMALS_UM).tolist()

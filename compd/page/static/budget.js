@@ -42,8 +42,9 @@ export class Budget {
       return { bar, number, row: element("div", { class: "axis" }, element("b", {}, axis), bar, number) };
     });
     this.legend = element("div", { class: "legend" });
+    this.scale = element("p", { class: "note" });
     this.causes = "";
-    this.place.replaceChildren(...this.rows.map(({ row }) => row), this.legend);
+    this.place.replaceChildren(...this.rows.map(({ row }) => row), this.legend, this.scale);
   }
 
   show({ budget, setpoint }) {
@@ -77,7 +78,8 @@ export class Budget {
         whisker.style.width = `${(100 * u) / this.scale_um}%`;
         bar.append(whisker);
       }
-      number.textContent = `${signed(sum)} ${Number.isFinite(u) ? `± ${u.toFixed(1)}` : ""} of ${this.scale_um}`;
+      number.textContent = `${signed(sum)}${Number.isFinite(u) ? ` ± ${u.toFixed(1)}` : ""} µm`;
     });
+    this.scale.textContent = `bars end at ±${this.scale_um} µm`;
   }
 }

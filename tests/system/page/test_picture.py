@@ -1,0 +1,54 @@
+"""The picture of the page in README and docs is a screenshot of the page as it is now.
+
+`COMPD_PICTURE=1 pytest tests/system/page/test_picture.py` makes it anew; otherwise it must be of these very files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+
+import pytest
+
+from compd.page.server import STATIC
+from tests.support.live_page import opened, served, until
+from tests.support.paths import ROOT
+
+PICTURE = ROOT / "docs" / "pictures" / "live-page.png"
+# What the picture was made of, beside it.
+MADE_OF = PICTURE.with_suffix(".made-of.txt")
+# The machine warms up for so long before the picture, s; its weather is 60 times faster than real.
+SHOWN_AFTER_S = 70.0
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def page_files() -> str:
+    """Hash of all that the browser gets."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in STATIC.rglob("*") if path.is_file()):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def test_the_picture_is_of_the_page_as_it_is(chromium):
+    if os.environ.get("COMPD_PICTURE"):
+        with (
+            served("--read-only", simulate=("--speedup", "60", "--zero-hold", "20")) as page,
+            opened(chromium, page, viewport={"width": 1440, "height": 960}) as tab,
+        ):
+            tab.wait_for_timeout(1e3 * SHOWN_AFTER_S)
+            until(tab, "document.getElementById('state').textContent === 'OK'")
+            tab.screenshot(path=str(PICTURE))
+        MADE_OF.write_text(page_files() + "\n", encoding="utf-8")
+    assert MADE_OF.read_text(encoding="utf-8").strip() == page_files(), (
+        "the page has changed: COMPD_PICTURE=1 pytest tests/system/page/test_picture.py"
+    )
+    width, height = (int.from_bytes(PICTURE.read_bytes()[place : place + 4], "big") for place in (16, 20))
+    assert (width, height) == (1440, 960)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/how-to/look-at-the-machine-live.md"])
+def test_the_picture_is_shown(page):
+    assert re.search(r"!\[[^\]]+\]\([^)]*live-page\.png\)", (ROOT / page).read_text(encoding="utf-8"))
