@@ -37,7 +37,8 @@ class Ring:
         # a quarter of the interval keeps the pace of rows that come at the same rate
         if time_s < self._due_s - self._every_s / 4:
             return
-        self._due_s = max(self._due_s + self._every_s, time_s + self._every_s / 2)
+        on_time = time_s - self._due_s < self._every_s / 2
+        self._due_s = (self._due_s if on_time else time_s) + self._every_s
         place = self._count % len(self._times_s)
         self._times_s[place], self._rows[place] = time_s, row
         self._count += 1

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+import shlex
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
@@ -25,6 +28,9 @@ from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
 
 STATIC = Path(__file__).parent / "static"
+# At 1 kHz an hour is some gigabytes.
+LONGEST_BURST_S = 3600.0
+LONGEST_BODY_BYTES = 8192
 _LOOKS_ONLY = "this browser may look only"
 
 
@@ -79,7 +85,7 @@ class Server:
         return Response(packed(self._broadcast.history), media_type="application/octet-stream")
 
     async def _arm(self, request: Request) -> Response:
-        keys = await request.json()
+        keys = await _keys(request)
         if not keys.get("arm", True):
             self._browsers.disarm(str(keys.get("id")))
             return JSONResponse({"armed_s": 0})
@@ -95,7 +101,7 @@ class Server:
         return JSONResponse({"possible": told.possible, "text": told.text, "command": told.command})
 
     async def _order(self, request: Request) -> Response:
-        name, keys = request.path_params["name"], await request.json()
+        name, keys = request.path_params["name"], await _keys(request)
         if name not in self._orders:
             return _refused("there is no such order", 404)
         if self._browsers.armed(str(keys.get("id"))) is None:
@@ -107,16 +113,25 @@ class Server:
         return JSONResponse({"answer": answer})
 
     async def _list_recordings(self, request: Request) -> Response:
-        return JSONResponse({"directory": str(self._recordings.directory), "parts": self._recordings.listed()})
+        return JSONResponse(
+            {
+                "directory": str(self._recordings.directory),
+                "parts": self._recordings.listed(),
+                "command": shlex.join(self._recordings.command("NAME", None)),
+            }
+        )
 
     async def _record(self, request: Request) -> Response:
-        keys = await request.json()
+        keys = await _keys(request)
         if request.scope["token"].role != "owner":
             return _refused(_LOOKS_ONLY, 403)
         if keys.get("stop"):
             await self._recordings.stop()
             return JSONResponse({})
-        problem = await self._recordings.start(str(keys.get("name", "")), keys.get("burst_s"))
+        burst_s = keys.get("burst_s")
+        if burst_s is not None and not (isinstance(burst_s, int | float) and 0 < burst_s <= LONGEST_BURST_S):
+            return _refused(f"a burst lasts up to {LONGEST_BURST_S:g} s", 400)
+        problem = await self._recordings.start(str(keys.get("name", "")), burst_s)
         return _refused(problem, 409) if problem else JSONResponse({})
 
     async def _download(self, request: Request) -> Response:
@@ -126,6 +141,22 @@ class Server:
             return _refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
+
+
+async def _keys(request: Request) -> Mapping[str, Any]:
+    """The JSON object in a request's body. Raises HTTPException (400, 413) for anything else."""
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LONGEST_BODY_BYTES:
+            raise HTTPException(413, "an order is short")
+    try:
+        keys = json.loads(body)
+    except ValueError:
+        keys = None
+    if not isinstance(keys, dict):
+        raise HTTPException(400, "the body is one JSON object")
+    return keys
 
 
 def packed(history: History | None) -> bytes:

@@ -37,6 +37,7 @@ export class Drawer {
     this.parts = element("tbody");
     this.where = element("p", { class: "note" });
     this.recorded = element("p", { class: "note" });
+    this.command = element("code", { class: "command" });
     this.place.replaceChildren(
       element("div", { class: "row" }, element("h2", {}, "Orders"), button("Close (Esc)", () => this.toggle())),
       element("p", { class: "note" }, "The page only looks until you arm it. Everybody who looks sees who is armed."),
@@ -52,6 +53,7 @@ export class Drawer {
       element("div", { class: "row" }, this.name, this.record, button("Burst of 5 s", () => this.begin(5), { id: "burst" })),
       this.recorded,
       this.where,
+      this.command,
       element("table", {}, this.parts),
     );
   }
@@ -66,6 +68,7 @@ export class Drawer {
 
   // First step: what the order will do.
   async ask(name, subject) {
+    if (!this.open) this.toggle();
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
     const told = await response.json();
     this.say("");
@@ -111,6 +114,7 @@ export class Drawer {
   async list() {
     const told = await (await fetch("recordings")).json();
     this.where.textContent = `in ${told.directory}`;
+    this.command.textContent = told.command;
     this.parts.replaceChildren(
       ...told.parts.map((part) =>
         element("tr", {}, element("td", {}, element("a", { href: `recordings/${part.name}`, download: true }, part.name)), element("td", { class: "number" }, `${(part.bytes / 1e6).toFixed(2)} MB`), element("td", {}, new Date(part.changed).toLocaleString())),

@@ -5,9 +5,10 @@ import { ago, element } from "./format.js";
 const WRITE_EVERY_MS = 500;
 
 export class Gauges {
-  constructor(place, summary) {
+  constructor(place, summary, drawer) {
     this.place = place;
     this.summary = summary;
+    this.drawer = drawer;
     this.open = false;
     this.faults = {};
   }
@@ -28,6 +29,7 @@ export class Gauges {
     this.open = !this.open;
     this.button.textContent = this.open ? "fold" : "show all";
     this.written_ms = -WRITE_EVERY_MS;
+    if (this.told) this.show(this.told);
   }
 
   // Faults of each gauge since the daemon's start, from STATUS.
@@ -36,7 +38,9 @@ export class Gauges {
     this.faults = Object.fromEntries(polled.map(([name, told]) => [name, Object.values(told.faults).reduce((a, b) => a + b, 0)]));
   }
 
-  show({ gauges: told }) {
+  show(event) {
+    this.told = event;
+    const told = event.gauges;
     if (performance.now() - this.written_ms < WRITE_EVERY_MS) return;
     this.written_ms = performance.now();
     const gauges = this.wiring.map((wire, k) => ({ ...wire, ...told[k], share: (told[k].age_s ?? Infinity) / wire.stale_after_s }));
@@ -53,6 +57,7 @@ export class Gauges {
     const fill = element("i");
     fill.style.width = `${100 * Math.min(1, gauge.share)}%`;
     const unit = gauge.kind === "quantity" ? "" : " mm";
+    const accept = gauge.fault === "distrusted" ? [" ", element("button", { type: "button", onclick: () => this.drawer.ask("accept", gauge.channel) }, "Accept …")] : [];
     const quality = gauge.fault ? `${gauge.fault.replaceAll("_", " ")}${gauge.detail ? `: ${gauge.detail}` : ""}` : "ok";
     return element(
       "tr",
@@ -61,7 +66,7 @@ export class Gauges {
       element("td", { class: "name" }, gauge.channel),
       element("td", { class: "number value" }, gauge.value === undefined ? "–" : gauge.value.toFixed(gauge.kind === "quantity" ? 2 : 4) + unit),
       element("td", { class: "name" }, element("span", { class: gauge.fault ? "age old" : "age" }, fill), gauge.age_s === undefined ? "" : ` ${ago(gauge.age_s)}`),
-      element("td", { class: "quality", title: quality }, quality),
+      element("td", { class: "quality", title: quality }, ...accept, quality),
       element("td", { class: "number" }, String(this.faults[gauge.channel.split(".")[0]] ?? "")),
     );
   }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zipfile
 
 import pytest
 
@@ -18,7 +19,7 @@ def text(tab, selector):
 def test_the_banner_has_state_tip_and_who_looks(tab, live):
     until(tab, "document.getElementById('state').textContent === 'OK'")
     assert text(tab, "#machine-name") == "tripod-cmm"
-    assert re.match(r"x .\d.* mm", text(tab, "#tip"))
+    until(tab, r"/^x .\d.* mm$/.test(document.getElementById('tip').textContent)")
     assert "oldest gauge" in text(tab, "#age")
     until(tab, "document.getElementById('connected').textContent.includes('looking')")
 
@@ -96,13 +97,16 @@ def test_a_recording_is_made_and_downloaded(tab, live):
     tab.locator("input[aria-label='Name of the recording']").fill("from-the-page")
     tab.locator("#record").click()
     until(tab, "document.getElementById('record').textContent.startsWith('Stop')")
-    tab.wait_for_timeout(2500)
+    part = live.recordings / "from-the-page-0001.csv"
+    while not (part.exists() and part.stat().st_size > 1000):
+        tab.wait_for_timeout(100)
     tab.locator("#record").click()
     tab.wait_for_selector("#drawer td a")
     with tab.expect_download() as download:
         tab.locator("#drawer td a").first.click()
     assert download.value.suggested_filename == "from-the-page-0001.zip"
-    assert (live.recordings / "from-the-page-0001.csv").stat().st_size > 1000
+    with zipfile.ZipFile(download.value.path()) as archive:
+        assert {"from-the-page-0001.csv", "from-the-page-0001.yaml"} <= set(archive.namelist())
 
 
 def test_a_lost_gauge_is_on_top_and_the_state_says_so(tab, live):

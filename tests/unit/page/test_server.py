@@ -1,0 +1,103 @@
+"""The routes, without a daemon: what is refused, and how."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from compd.page.daemon_link import DaemonLink
+from compd.page.guard import Guard, Token, hashed
+from compd.page.history import History
+from compd.page.recordings import Recordings
+from compd.page.server import LONGEST_BODY_BYTES, Server, packed
+
+HOST = "127.0.0.1:7760"
+OWN = {"Origin": f"http://{HOST}"}
+
+
+@pytest.fixture
+def open_page(tmp_path):
+    """A client with a token of the role that a test asks for."""
+
+    def open_as(role):
+        recordings = Recordings(tmp_path / "recordings", "/no/socket")
+        server = Server(DaemonLink("/no/socket"), recordings)
+        guarded = Guard(server.app(), [Token("a person", role, hashed("x"))], [HOST])
+        client = TestClient(guarded, base_url=f"http://{HOST}")
+        client.get("/", params={"token": "x"})
+        return client
+
+    return open_as
+
+
+@pytest.mark.parametrize("path", ["/", "/static/main.js", "/static/page.css", "/static/vendor/uPlot-1.6.32.min.js"])
+def test_what_a_browser_loads_is_there(open_page, path):
+    assert open_page("view").get(path).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path", ["/static/../server.py", "/static/%2e%2e/server.py", "/recordings/../../etc", "/nothing"]
+)
+def test_nothing_else_is(open_page, path):
+    assert open_page("owner").get(path).status_code in (404, 405)
+
+
+@pytest.mark.parametrize("path", ["/arm", "/orders/zero", "/recordings"])
+@pytest.mark.parametrize("body", [b"", b"{", b"[]", b"3", b"\xff", b'"' + b"x" * LONGEST_BODY_BYTES])
+def test_a_body_that_is_no_order_is_refused(open_page, path, body):
+    assert open_page("owner").post(path, content=body, headers=OWN).status_code in (400, 413)
+
+
+def test_orders_of_a_browser_that_is_not_there_or_not_armed_are_refused(open_page):
+    client = open_page("owner")
+    for keys in ({}, {"id": ""}, {"id": "guessed"}):
+        assert client.post("/arm", json=keys, headers=OWN).status_code == 403
+        assert client.post("/orders/zero", json=keys, headers=OWN).status_code == 403
+    assert client.post("/orders/format-the-disk", json={}, headers=OWN).status_code == 404
+
+
+def test_without_a_daemon_an_order_says_so(open_page):
+    told = open_page("view").get("/orders/zero").json()
+    assert not told["possible"]
+    assert "not there" in told["text"]
+
+
+@pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "x" * 65, "a b", "-option"])
+def test_a_name_that_could_be_a_path_is_no_recording(open_page, name):
+    answer = open_page("owner").post("/recordings", json={"name": name}, headers=OWN)
+    assert answer.status_code == 409
+    assert "letters" in answer.json()["reason"]
+    assert open_page("owner").get(f"/recordings/{name or '.'}").status_code in (200, 404, 405)
+
+
+@pytest.mark.parametrize("burst_s", [0, -1, "5", 1e9, []])
+def test_a_burst_has_a_length(open_page, burst_s):
+    answer = open_page("owner").post("/recordings", json={"name": "a", "burst_s": burst_s}, headers=OWN)
+    assert answer.status_code == 400
+
+
+def test_who_may_look_only_records_nothing(open_page):
+    assert open_page("view").post("/recordings", json={"name": "a"}, headers=OWN).status_code == 403
+
+
+def test_the_history_can_be_read_back():
+    history = History(3)
+    setpoint = {"state": "ok", "valid": True, "correction_mm": [1e-3, 0.0, 0.0], "tip_M_mm": [1.0, 2.0, 3.0]}
+    for k in range(300):
+        history.note(100.0 + k / 10, setpoint, None)
+    header, _, data = packed(history).partition(b"\n")
+    told = json.loads(header)
+    start = 0
+    for table in told["tables"]:
+        times = np.frombuffer(data, "<f8", table["rows"], start)
+        start += 8 * table["rows"]
+        count = table["rows"] * len(told["columns"])
+        rows = np.frombuffer(data, "<f4", count, start).reshape(table["rows"], -1)
+        start += 4 * count
+        assert times[0] == 100.0
+        assert rows[-1, 1] == 1.0
+    assert start == len(data)
+    assert [table["rows"] for table in told["tables"]] == [30, 300]
