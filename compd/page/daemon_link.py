@@ -58,8 +58,13 @@ class DaemonLink:
                 await self._serve()
             except* (OSError, ValueError, TimeoutError, EOFError) as errors:
                 error = errors.exceptions[0]
-                await self._gone(str(error) or type(error).__name__)
+                await self._gone(self._why(error))
             await asyncio.sleep(_AGAIN_AFTER_S)
+
+    def _why(self, error: Exception) -> str:
+        if isinstance(error, OSError) and not self.connected:
+            return f"no daemon answers at {self.path}: {error.strerror or type(error).__name__}"
+        return str(error) or type(error).__name__
 
     async def _serve(self) -> None:
         """Take messages until the connection ends."""

@@ -57,12 +57,13 @@ def new_token() -> str:
 class Guard:
     """ASGI middleware: lets through who has a token, and adds the headers that bind the browser to this server."""
 
-    def __init__(self, app: ASGIApp, tokens: Sequence[Token], hosts: Sequence[str]) -> None:
-        """`hosts`: the names and ports, as "127.0.0.1:7760", by which this server is reached."""
+    def __init__(self, app: ASGIApp, tokens: Sequence[Token], origins: Sequence[str], port: int) -> None:
+        """`origins`: by which browsers reach this server, as "http://127.0.0.1:7760". `port`: where it listens."""
         self._app = app
         self._tokens = tuple(tokens)
-        self._hosts = frozenset(hosts)
-        self._cookie = COOKIE + hosts[0].rpartition(":")[2]
+        self._origins = frozenset(origins)
+        self._hosts = frozenset(urlsplit(origin).netloc for origin in origins)
+        self._cookie = f"{COOKIE}{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -82,14 +83,14 @@ class Guard:
             return PlainTextResponse(f"this server is not {host!r}; it is {', '.join(sorted(self._hosts))}", 400)
         if connection.scope["method"] not in ("GET", "HEAD"):
             origin = headers.get("origin", "")
-            if urlsplit(origin).netloc != host:
+            if origin not in self._origins or urlsplit(origin).netloc != host:
                 return PlainTextResponse("orders come from this server's own pages only", 403)
         given = connection.query_params.get("token")
         if given is not None:
             if self._known(given) is None:
                 return PlainTextResponse(_NEEDS_TOKEN, 403)
             response = RedirectResponse(connection.url.path, 303)
-            secure = connection.url.scheme == "https"
+            secure = f"https://{host}" in self._origins
             response.set_cookie(self._cookie, given, httponly=True, samesite="strict", secure=secure)
             return response
         token = self._known(connection.cookies.get(self._cookie, ""))

@@ -17,6 +17,8 @@ from compd.page.server import Server
 
 # Bytes that the system keeps for a browser that does not read: a few seconds of events, and no minute of old ones.
 SEND_BUFFER_BYTES = 32 * 1024
+LOOPBACK_NAMES = ("127.0.0.1", "localhost")
+_HTTP_PORT = 80
 
 
 def run_page(
@@ -26,21 +28,31 @@ def run_page(
     port: int,
     tokens: Sequence[Token],
     started: Callable[[str], None],
+    behind: str | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C.
 
     unix_socket : the daemon's.  recordings : directory of the recordings.
-    started : called with "host:port", once browsers can connect.
+    started : called with the origin, as "http://127.0.0.1:7760", once browsers can connect.
+    behind : origin of a proxy with TLS in front of this server, as "https://machine.example"; only it is used then.
     Raises DaemonError where the port is taken.
     """
     listener = _listener(host, port)
     port = listener.getsockname()[1]
-    names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [host]
+    origins = (
+        [behind] if behind else [origin(name, port) for name in (LOOPBACK_NAMES if host in LOOPBACK_NAMES else [host])]
+    )
     server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
-    guarded = Guard(server.app(), tokens, [f"{name}:{port}" for name in names])
+    guarded = Guard(server.app(), tokens, origins, port)
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
-    started(f"{host}:{port}")
+    started(origins[0])
     _Uvicorn(config, server.end).run(sockets=[listener])
+
+
+def origin(host: str, port: int) -> str:
+    """As a browser writes it (RFC 6454, section 6.1): IPv6 in brackets, without the port that goes without saying."""
+    name = f"[{host}]" if ":" in host else host
+    return f"http://{name}" + (f":{port}" if port != _HTTP_PORT else "")
 
 
 class _Uvicorn(uvicorn.Server):

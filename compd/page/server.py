@@ -79,7 +79,8 @@ class Server:
     async def _live(self, request: Request) -> Response:
         token: Token = request.scope["token"]
         browser = self._browsers.connect(token.name, request.client.host if request.client else "", token.role)
-        return StreamingResponse(self._broadcast.events(browser), media_type="text/event-stream")
+        unbuffered = {"X-Accel-Buffering": "no"}  # asks a proxy to pass events on at once
+        return StreamingResponse(self._broadcast.events(browser), headers=unbuffered, media_type="text/event-stream")
 
     async def _history(self, request: Request) -> Response:
         return Response(packed(self._broadcast.history), media_type="application/octet-stream")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import urlsplit
 
 import typer
 
@@ -18,6 +19,10 @@ def page(
     listen: Annotated[
         str | None,
         typer.Option(metavar="HOST", help="Name or address of this computer, for browsers on others; needs --tokens."),
+    ] = None,
+    behind: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Address of a proxy with TLS in front, https://NAME; needs --tokens."),
     ] = None,
     tokens: Annotated[
         Path | None, typer.Option(help="A file with the tokens of people and screens; see --new-token.")
@@ -43,20 +48,32 @@ def page(
         typer.echo(add_token(_needed(tokens, "--new-token"), new_token))
         return
     own = make_token()
-    if listen is None:
+    alone = listen is None and behind is None
+    if alone:
         known = [Token("this computer", "view" if read_only else "owner", hashed(own))]
     else:
         known = [
             Token(token.name, "view", token.sha256) if read_only else token
-            for token in read_tokens(_needed(tokens, "--listen"))
+            for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen"))
         ]
 
-    def started(where: str) -> None:
-        typer.echo(f"open http://{where}/" + (f"?token={own}" if listen is None else "?token=YOUR-TOKEN"))
-        if listen is not None:
-            typer.echo("put a proxy with TLS in front: tokens pass in the clear otherwise", err=True)
+    def started(origin: str) -> None:
+        typer.echo(f"open {origin}/?token={own if alone else 'YOUR-TOKEN'}")
+        if listen is not None and behind is None:
+            typer.echo("put a proxy with TLS in front (--behind): tokens pass in the clear otherwise", err=True)
 
-    run_page(unix_address(address), recordings.absolute(), listen or "127.0.0.1", port, known, started)
+    host = listen or "127.0.0.1"
+    run_page(unix_address(address), recordings.absolute(), host, port, known, started, _origin(behind))
+
+
+def _origin(behind: str | None) -> str | None:
+    """Raises typer.BadParameter where it is not the origin of a server with TLS."""
+    if behind is None:
+        return None
+    parts = urlsplit(behind)
+    if parts.scheme != "https" or not parts.netloc or parts.path not in ("", "/"):
+        raise typer.BadParameter(f"--behind is {behind!r}; allowed: https://NAME or https://NAME:PORT")
+    return f"https://{parts.netloc.lower()}"
 
 
 def _needed(tokens: Path | None, option: str) -> Path:

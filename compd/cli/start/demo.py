@@ -79,7 +79,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
             "127.0.0.1",
             port,
             tokens,
-            lambda where: typer.echo(f"open http://{where}/?token={token} (Ctrl-C ends all three)"),
+            lambda origin: typer.echo(f"open {origin}/?token={token} (Ctrl-C ends all three)"),
         )
 
     run_live(configuration, seed, serve)

@@ -9,6 +9,7 @@ from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from compd.page.guard import Guard, Token, hashed
+from compd.page.run import origin
 
 HOST = "127.0.0.1:7760"
 OWN = {"Origin": f"http://{HOST}"}
@@ -22,7 +23,7 @@ async def says_who(request):
 def client():
     app = Starlette(routes=[Route("/", says_who), Route("/order", says_who, methods=["POST"])])
     tokens = [Token("Anna", "owner", hashed("anna's")), Token("screen", "view", hashed("screen's"))]
-    return TestClient(Guard(app, tokens, [HOST, "localhost:7760"]), base_url=f"http://{HOST}")
+    return TestClient(Guard(app, tokens, [f"http://{HOST}", "http://localhost:7760"], 7760), base_url=f"http://{HOST}")
 
 
 @pytest.mark.parametrize(("token", "who"), [("anna's", "Anna owner"), ("screen's", "screen view")])
@@ -57,6 +58,8 @@ def test_another_name_for_this_server_is_refused(client, host):
         ({"Origin": "http://evil.example"}, 403),
         ({"Origin": "http://127.0.0.1:7761"}, 403),
         ({"Origin": f"http://{HOST}.evil.example"}, 403),
+        ({"Origin": f"https://{HOST}"}, 403),
+        ({"Origin": "http://localhost:7760"}, 403),
     ],
 )
 def test_an_order_comes_from_this_servers_own_page(client, headers, code):
@@ -73,3 +76,26 @@ def test_every_answer_binds_the_browser_to_this_server(client):
         assert "default-src 'self'" in answer.headers["content-security-policy"]
         assert answer.headers["x-content-type-options"] == "nosniff"
         assert answer.headers["cache-control"] == "no-store"
+
+
+def test_behind_a_proxy_with_tls_its_name_is_the_only_one():
+    app = Starlette(routes=[Route("/", says_who), Route("/order", says_who, methods=["POST"])])
+    guard = Guard(app, [Token("Anna", "owner", hashed("anna's"))], ["https://machine.example"], 7760)
+    client = TestClient(guard, base_url="https://machine.example")
+    answer = client.get("/", params={"token": "anna's"}, follow_redirects=False)
+    assert "secure" in answer.headers["set-cookie"].lower()
+    assert client.post("/order", headers={"Origin": "https://machine.example"}).status_code == 200
+    assert client.post("/order", headers={"Origin": "http://machine.example"}).status_code == 403
+    assert client.get("/", headers={"Host": HOST}).status_code == 400
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "written"),
+    [
+        ("10.1.2.3", 7760, "http://10.1.2.3:7760"),
+        ("machine.example", 80, "http://machine.example"),
+        ("fd00::7", 7760, "http://[fd00::7]:7760"),
+    ],
+)
+def test_an_origin_is_written_as_browsers_do(host, port, written):
+    assert origin(host, port) == written

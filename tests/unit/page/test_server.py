@@ -25,7 +25,7 @@ def open_page(tmp_path):
     def open_as(role):
         recordings = Recordings(tmp_path / "recordings", "/no/socket")
         server = Server(DaemonLink("/no/socket"), recordings)
-        guarded = Guard(server.app(), [Token("a person", role, hashed("x"))], [HOST])
+        guarded = Guard(server.app(), [Token("a person", role, hashed("x"))], [f"http://{HOST}"], 7760)
         client = TestClient(guarded, base_url=f"http://{HOST}")
         client.get("/", params={"token": "x"})
         return client
