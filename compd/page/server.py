@@ -123,7 +123,7 @@ class Server:
 
     async def _record(self, request: Request) -> Response:
         keys = await _keys(request)
-        if request.scope["token"].role != "owner":
+        if request.scope["token"].role != "operate":
             return _refused(_LOOKS_ONLY, 403)
         if keys.get("stop"):
             await self._recordings.stop()

@@ -24,7 +24,7 @@ def page(
     ] = None,
     new_token: Annotated[
         str | None,
-        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or owner, to --tokens; print it; end."),
+        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or operate, to --tokens; print it; end."),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
@@ -44,7 +44,7 @@ def page(
         return
     own = make_token()
     if listen is None:
-        known = [Token("this computer", "view" if read_only else "owner", hashed(own))]
+        known = [Token("this computer", "view" if read_only else "operate", hashed(own))]
     else:
         known = [
             Token(token.name, "view", token.sha256) if read_only else token

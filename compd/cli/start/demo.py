@@ -70,7 +70,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
         f"{configuration.machine}, simulated; its weather {SPEEDUP:g} times faster than real. "
         "Starting it and the daemon (the very first start compiles the kernels) ..."
     )
-    tokens = [Token("this computer", "owner", hashed(token))]
+    tokens = [Token("this computer", "operate", hashed(token))]
 
     def serve(unix_socket: str) -> None:
         run_page(

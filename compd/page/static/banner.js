@@ -44,7 +44,7 @@ export function showBanner(page, behind_s) {
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");
   const left_s = Math.max(0, (page.armed_until ?? 0) - performance.now() / 1000);
-  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "owner" ? "looking" : "view only");
+  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "operate" ? "looking" : "view only");
   at("role").classList.toggle("armed", left_s > 0);
 }
 

@@ -125,8 +125,8 @@ export class Drawer {
   show({ browsers, recording, last_words }) {
     const armed = (this.page.armed_until ?? 0) > performance.now() / 1000;
     this.arm.textContent = armed ? "Disarm" : "Arm for 60 s";
-    this.arm.disabled = this.page.role !== "owner";
-    for (const name of ["record", "burst"]) this.place.querySelector(`#${name}`).disabled = this.page.role !== "owner" || (name === "burst" && Boolean(recording));
+    this.arm.disabled = this.page.role !== "operate";
+    for (const name of ["record", "burst"]) this.place.querySelector(`#${name}`).disabled = this.page.role !== "operate" || (name === "burst" && Boolean(recording));
     this.looking.replaceChildren(...browsers.map((browser) => element("li", {}, `${browser.name}, ${browser.address}, ${browser.role === "view" ? "looks only" : browser.armed_s ? `ARMED, ${Math.ceil(browser.armed_s)} s left` : "not armed"}, for ${ago(browser.connected_s)}`)));
     this.record.textContent = recording ? `Stop ${recording.name}` : "Record";
     if (this.recording && !recording && this.open) this.list();

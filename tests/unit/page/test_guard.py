@@ -21,11 +21,11 @@ async def says_who(request):
 @pytest.fixture
 def client():
     app = Starlette(routes=[Route("/", says_who), Route("/order", says_who, methods=["POST"])])
-    tokens = [Token("Anna", "owner", hashed("anna's")), Token("screen", "view", hashed("screen's"))]
+    tokens = [Token("Anna", "operate", hashed("anna's")), Token("screen", "view", hashed("screen's"))]
     return TestClient(Guard(app, tokens, [HOST, "localhost:7760"]), base_url=f"http://{HOST}")
 
 
-@pytest.mark.parametrize(("token", "who"), [("anna's", "Anna owner"), ("screen's", "screen view")])
+@pytest.mark.parametrize(("token", "who"), [("anna's", "Anna operate"), ("screen's", "screen view")])
 def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address(client, token, who):
     answer = client.get("/", params={"token": token}, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, "/")

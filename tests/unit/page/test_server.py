@@ -42,17 +42,17 @@ def test_what_a_browser_loads_is_there(open_page, path):
     "path", ["/static/../server.py", "/static/%2e%2e/server.py", "/recordings/../../etc", "/nothing"]
 )
 def test_nothing_else_is(open_page, path):
-    assert open_page("owner").get(path).status_code in (404, 405)
+    assert open_page("operate").get(path).status_code in (404, 405)
 
 
 @pytest.mark.parametrize("path", ["/arm", "/orders/zero", "/recordings"])
 @pytest.mark.parametrize("body", [b"", b"{", b"[]", b"3", b"\xff", b'"' + b"x" * LONGEST_BODY_BYTES])
 def test_a_body_that_is_no_order_is_refused(open_page, path, body):
-    assert open_page("owner").post(path, content=body, headers=OWN).status_code in (400, 413)
+    assert open_page("operate").post(path, content=body, headers=OWN).status_code in (400, 413)
 
 
 def test_orders_of_a_browser_that_is_not_there_or_not_armed_are_refused(open_page):
-    client = open_page("owner")
+    client = open_page("operate")
     for keys in ({}, {"id": ""}, {"id": "guessed"}):
         assert client.post("/arm", json=keys, headers=OWN).status_code == 403
         assert client.post("/orders/zero", json=keys, headers=OWN).status_code == 403
@@ -67,15 +67,15 @@ def test_without_a_daemon_an_order_says_so(open_page):
 
 @pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "x" * 65, "a b", "-option"])
 def test_a_name_that_could_be_a_path_is_no_recording(open_page, name):
-    answer = open_page("owner").post("/recordings", json={"name": name}, headers=OWN)
+    answer = open_page("operate").post("/recordings", json={"name": name}, headers=OWN)
     assert answer.status_code == 409
     assert "letters" in answer.json()["reason"]
-    assert open_page("owner").get(f"/recordings/{name or '.'}").status_code in (200, 404, 405)
+    assert open_page("operate").get(f"/recordings/{name or '.'}").status_code in (200, 404, 405)
 
 
 @pytest.mark.parametrize("burst_s", [0, -1, "5", 1e9, []])
 def test_a_burst_has_a_length(open_page, burst_s):
-    answer = open_page("owner").post("/recordings", json={"name": "a", "burst_s": burst_s}, headers=OWN)
+    answer = open_page("operate").post("/recordings", json={"name": "a", "burst_s": burst_s}, headers=OWN)
     assert answer.status_code == 400
 
 
