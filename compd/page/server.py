@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import shlex
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -50,6 +51,7 @@ class Server:
             Route("/", self._index),
             Route("/live", self._live),
             Route("/history", self._history),
+            Route("/moment", self._moment),
             Route("/arm", self._arm, methods=["POST"]),
             Route("/orders/{name}", self._consequence),
             Route("/orders/{name}", self._order, methods=["POST"]),
@@ -83,6 +85,17 @@ class Server:
 
     async def _history(self, request: Request) -> Response:
         return Response(packed(self._broadcast.history), media_type="application/octet-stream")
+
+    async def _moment(self, request: Request) -> Response:
+        """The event that is nearest to `unix_s`, as it was."""
+        try:
+            unix_s = float(request.query_params.get("unix_s", ""))
+        except ValueError:
+            unix_s = math.nan
+        if not math.isfinite(unix_s):
+            return _refused("unix_s is the Unix time of a moment, s", 400)
+        event = self._broadcast.moments.nearest(unix_s)
+        return _refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
 
     async def _arm(self, request: Request) -> Response:
         keys = await _keys(request)

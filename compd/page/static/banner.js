@@ -1,13 +1,14 @@
 // State and reason in words, on top of everything; what is not the present is grey.
+import { SILENT_S } from "./age.js";
 import { ago, signed } from "./format.js";
-import { appearance } from "./states.js";
+import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
 let shown = "";
 
 function describe(page, behind_s) {
   const live = page.live;
-  if (!live || behind_s > 1.5) {
+  if (!live || behind_s > SILENT_S) {
     const text = live ? `no news from the page's server for ${ago(behind_s)}` : "waiting for the page's server";
     return { state: "gone", tone: "gone", sign: "⚡", name: "NOT CONNECTED", reason: text };
   }
@@ -16,8 +17,7 @@ function describe(page, behind_s) {
     return { state: "gone", tone: "gone", sign: "⚡", name: "NO DAEMON", reason: live.reason || "it has told nothing yet" };
   }
   const [tone, sign] = appearance(live.setpoint.state);
-  const name = live.setpoint.state.replace("_", " ").toUpperCase();
-  return { state: live.setpoint.state, tone, sign, name, reason: live.setpoint.reason };
+  return { state: live.setpoint.state, tone, sign, name: stateName(live.setpoint.state), reason: live.setpoint.reason };
 }
 
 function write(id, text) {

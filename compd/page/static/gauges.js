@@ -29,7 +29,7 @@ export class Gauges {
     this.open = !this.open;
     this.button.textContent = this.open ? "fold" : "show all";
     this.written_ms = -WRITE_EVERY_MS;
-    if (this.told) this.show(this.told);
+    if (this.told) this.show(this.told, this.minute);
   }
 
   // Faults of each gauge since the daemon's start, from STATUS.
@@ -38,10 +38,16 @@ export class Gauges {
     this.faults = Object.fromEntries(polled.map(([name, told]) => [name, Object.values(told.faults).reduce((a, b) => a + b, 0)]));
   }
 
-  show(event) {
-    this.told = event;
+  // An event; with `minute` one that has been, of which faults are not counted.
+  show(event, minute) {
+    [this.told, this.minute] = [event, minute];
     const told = event.gauges;
-    if (performance.now() - this.written_ms < WRITE_EVERY_MS) return;
+    if (!told) {
+      this.summary.textContent = "not known";
+      this.table.hidden = true;
+      return;
+    }
+    if (!minute && performance.now() - this.written_ms < WRITE_EVERY_MS) return;
     this.written_ms = performance.now();
     const gauges = this.wiring.map((wire, k) => ({ ...wire, ...told[k], share: (told[k].age_s ?? Infinity) / wire.stale_after_s }));
     const bad = gauges.filter((gauge) => gauge.fault);
@@ -67,7 +73,7 @@ export class Gauges {
       element("td", { class: "number value" }, gauge.value === undefined ? "–" : gauge.value.toFixed(gauge.kind === "quantity" ? 2 : 4) + unit),
       element("td", { class: "name" }, element("span", { class: gauge.fault ? "age old" : "age" }, fill), gauge.age_s === undefined ? "" : ` ${ago(gauge.age_s)}`),
       element("td", { class: "quality", title: quality }, ...accept, quality),
-      element("td", { class: "number" }, String(this.faults[gauge.channel.split(".")[0]] ?? "")),
+      element("td", { class: "number" }, this.minute ? "–" : String(this.faults[gauge.channel.split(".")[0]] ?? "")),
     );
   }
 }

@@ -100,25 +100,29 @@ export class Links {
     this.corrections = this.corrections.map((line, link) => [...earlier.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link])), ...line]);
   }
 
-  // The numbers of a moment that has been, while the page is frozen.
-  past(corrections_um) {
-    this.rows?.forEach(({ number, sources, bar }, k) => {
-      number.textContent = signed(corrections_um[k]);
-      sources.textContent = `link ${k + 1}, then`;
-      bar.replaceChildren();
-    });
+  // The minute before a moment that has been: what came by tenths of a second, and before that the seconds of the hour.
+  lines({ at_s, times, corrections_um }) {
+    const end = this.times.findIndex((time) => time > at_s);
+    const fine = this.times.slice(0, end < 0 ? undefined : end);
+    const coarse = times.map((_, k) => k).filter((k) => times[k] < (fine[0] ?? Infinity));
+    const numbers = (link) => coarse.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link]));
+    const all = [...coarse.map((k) => times[k]), ...fine];
+    return this.corrections.map((line, link) => [all, [...numbers(link), ...line.slice(0, fine.length)]]);
   }
 
-  show({ setpoint }) {
+  // An event; with `minute` one that has been.
+  show({ setpoint }, minute) {
     const now_ms = performance.now();
-    if (now_ms - this.drawn_ms >= DRAW_EVERY_MS && !document.hidden) {
+    if (minute) {
+      this.lines(minute).forEach((line, k) => this.charts[k].setData(line));
+    } else if (now_ms - this.drawn_ms >= DRAW_EVERY_MS && !document.hidden) {
       this.drawn_ms = now_ms;
       this.charts.forEach((chart, k) => chart.setData([this.times, this.corrections[k]]));
     }
     if (!setpoint.valid) {
-      this.rows.forEach(({ number, sources, bar }) => {
+      this.rows.forEach(({ number, sources, bar }, k) => {
         number.textContent = "–";
-        sources.textContent = "not valid";
+        sources.textContent = `link ${k + 1}: not valid`;
         bar.replaceChildren();
       });
       return;

@@ -60,15 +60,21 @@ export class Machine {
     this.draw();
   }
 
-  show({ scene, setpoint, gauges }) {
+  // An event; with `minute` one that has been.
+  show({ scene, setpoint, gauges }, minute) {
     this.scene = scene;
+    if (minute || this.past) this.trail = [];
+    this.past = Boolean(minute);
+    minute?.times.forEach((time_s, k) => {
+      if (time_s >= minute.at_s - TRAIL_S && !Number.isNaN(minute.tips_mm[k][0])) this.trail.push([time_s, minute.tips_mm[k]]);
+    });
     if (scene) {
       this.corrections_um = setpoint.correction_mm.map((value) => value * 1000);
       this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, gauges[k].fault || gauges[k].value === undefined ? null : gauges[k].value * 1000]));
       const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), 0.1);
       if (!document.getElementById("lock").checked) this.largest_um = largest;
-      this.trail.push([setpoint.time_s, scene.tip]);
-      while (this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();
+      this.trail.push([minute?.at_s ?? setpoint.time_s, scene.tip]);
+      while (!minute && this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();
     }
     this.draw();
   }

@@ -83,6 +83,15 @@ def test_who_may_look_only_records_nothing(open_page):
     assert open_page("view").post("/recordings", json={"name": "a"}, headers=OWN).status_code == 403
 
 
+@pytest.mark.parametrize("unix_s", ["", "now", "nan", "inf", "-inf"])
+def test_a_moment_is_a_time(open_page, unix_s):
+    assert open_page("view").get("/moment", params={"unix_s": unix_s}).status_code == 400
+
+
+def test_of_a_moment_before_the_page_nothing_is_known(open_page):
+    assert open_page("view").get("/moment", params={"unix_s": "1e9"}).status_code == 404
+
+
 def test_the_history_can_be_read_back():
     history = History(3)
     setpoint = {"state": "ok", "valid": True, "correction_mm": [1e-3, 0.0, 0.0], "tip_M_mm": [1.0, 2.0, 3.0]}
