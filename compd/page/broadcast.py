@@ -107,6 +107,7 @@ class Broadcast:
             event["setpoint"] = setpoint
             event["gauges"] = gauges(link.readings, link.columns)
             event["budget"] = (link.budget or {}).get("tip_um")
+            event["shadow_budget"] = (link.budget or {}).get("shadow_tip_um")
             event["scene"] = scene(self._machine, setpoint, link.budget)
         return event
 

@@ -1,5 +1,5 @@
 // One strip for each link: the correction of the last minute with its limits, the number, and what it is made of.
-import { scaleFor, stack } from "./budget.js";
+import { keptScale, outline, stack } from "./bar.js";
 import { element, ink, signed } from "./format.js";
 
 const SPAN_S = 60;
@@ -23,7 +23,8 @@ export class Links {
     this.corrections = Array.from({ length: count }, () => []);
     this.charts?.forEach((chart) => chart.destroy());
     this.rows = this.corrections.map((_, link) => this.row(link, count));
-    this.place.replaceChildren(...this.rows.map(({ row }) => row));
+    this.scale = element("p", { class: "note" });
+    this.place.replaceChildren(...this.rows.map(({ row }) => row), this.scale);
     this.charts = this.rows.map(({ plot }) => this.chart(plot, count));
     new ResizeObserver(() => this.charts.forEach((chart, k) => chart.setSize({ width: this.rows[k].plot.clientWidth, height: chart.height }))).observe(this.place);
   }
@@ -128,20 +129,15 @@ export class Links {
       return;
     }
     const causes = Object.values(setpoint.sources_mm);
-    const wanted = scaleFor(Math.max(...setpoint.correction_mm.map((_, k) => causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0)), 0.5));
-    if (wanted > this.scale_um || wanted < this.scale_um / 4) this.scale_um = wanted;
-    const shadow = setpoint.shadow?.correction_mm;
+    const shadow_um = setpoint.shadow?.correction_mm?.map((value) => value * 1000);
+    const ends = setpoint.correction_mm.map((_, k) => Math.max(causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0), Math.abs(shadow_um?.[k] ?? 0)));
+    this.scale_um = keptScale(this.scale_um, Math.max(...ends));
+    this.scale.textContent = `Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
-      sources.textContent = `link ${k + 1}${shadow ? `, shadow ${signed(shadow[k] * 1000)}` : ` of ±${this.limit_um.toFixed(0)}`}`;
+      sources.textContent = `link ${k + 1}${shadow_um ? `, shadow ${signed(shadow_um[k])}` : ""}`;
       stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
-      if (shadow) {
-        const outline = element("i", { class: "shadow", title: "the shadow model" });
-        const value = Math.max(-50, Math.min(50, (50 * shadow[k] * 1000) / this.scale_um));
-        outline.style.left = `${50 + Math.min(0, value)}%`;
-        outline.style.width = `${Math.abs(value)}%`;
-        bar.append(outline);
-      }
+      if (shadow_um) outline(bar, shadow_um[k], this.scale_um);
     });
   }
 }

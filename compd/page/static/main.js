@@ -18,7 +18,7 @@ const at = (id) => document.getElementById(id);
 const drawer = new Drawer(at("drawer"), page);
 const machine = new Machine(at("scene"), at("colours"), page);
 const links = new Links(at("strips"), page);
-const budget = new Budget(at("budget"), page);
+const budget = new Budget(at("budget"));
 const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), drawer);
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
 const parts = [machine, links, budget, gauges];
