@@ -11,7 +11,8 @@ from typing import Any
 from compd.gauge import Quality
 from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
-from compd.page.history import History
+from compd.page.fault_counts import FaultCounts
+from compd.page.history import History, Traces
 from compd.page.moments import Moments
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
@@ -28,7 +29,7 @@ class Broadcast:
     Attributes
     ----------
     history : of the machine; None before the daemon has told what machine it is.
-    moments : the live events of that machine.
+    moments, traces : the live events of that machine, and what its gauges showed.
     """
 
     def __init__(self, link: DaemonLink, browsers: Browsers, recordings: Recordings) -> None:
@@ -37,6 +38,8 @@ class Broadcast:
         self._recordings = recordings
         self.history: History | None = None
         self.moments = Moments()
+        self.traces = Traces(0)
+        self._faults = FaultCounts()
         self._machine: Any = None
         self._live = self._slow = b""
         self._slow_count = 0
@@ -56,6 +59,7 @@ class Broadcast:
             data = plain(live)
             if self.history is not None:
                 self.moments.note(live["unix_s"], data)
+                self.traces.note(live["unix_s"], live.get("gauges", ()))
             async with self._made:
                 self._live = encoded("live", data)
                 if due_s >= slow_due_s:
@@ -96,6 +100,8 @@ class Broadcast:
         self._machine = machine
         self.history = History(sum(wire["kind"] == "scale" for wire in machine["wiring"]))
         self.moments = Moments()
+        self.traces = Traces(len(machine["wiring"]))
+        self._faults = FaultCounts()
 
     def _live_event(self) -> Event:
         """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is."""
@@ -112,10 +118,13 @@ class Broadcast:
         return event
 
     def _slow_event(self) -> Event:
-        """Status, browsers and the recording that runs."""
+        """Status, counts of faults, browsers and the recording that runs."""
+        if self._link.status is not None:
+            self._faults.note(time.time(), self._link.status)
         running = self._recordings.running
         return {
             "status": self._link.status,
+            "faults": self._faults.summary(),
             "browsers": self._browsers.summary(),
             "recording": None if running is None else {"name": running.name, "started": running.started_s},
             "last_words": self._recordings.last_words,

@@ -52,6 +52,7 @@ class Server:
             Route("/live", self._live),
             Route("/history", self._history),
             Route("/moment", self._moment),
+            Route("/traces", self._traces),
             Route("/arm", self._arm, methods=["POST"]),
             Route("/orders/{name}", self._consequence),
             Route("/orders/{name}", self._order, methods=["POST"]),
@@ -88,14 +89,12 @@ class Server:
 
     async def _moment(self, request: Request) -> Response:
         """The event that is nearest to `unix_s`, as it was."""
-        try:
-            unix_s = float(request.query_params.get("unix_s", ""))
-        except ValueError:
-            unix_s = math.nan
-        if not math.isfinite(unix_s):
-            return _refused("unix_s is the Unix time of a moment, s", 400)
-        event = self._broadcast.moments.nearest(unix_s)
+        event = self._broadcast.moments.nearest(_moment(request))
         return _refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
+
+    async def _traces(self, request: Request) -> Response:
+        """What the gauges showed in the minute before `unix_s`."""
+        return JSONResponse(self._broadcast.traces.minute(_moment(request)))
 
     async def _arm(self, request: Request) -> Response:
         keys = await _keys(request)
@@ -154,6 +153,17 @@ class Server:
             return _refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
+
+
+def _moment(request: Request) -> float:
+    """Unix time, s, that a request names. Raises HTTPException (400) for anything else."""
+    try:
+        unix_s = float(request.query_params.get("unix_s", ""))
+    except ValueError:
+        unix_s = math.nan
+    if not math.isfinite(unix_s):
+        raise HTTPException(400, "unix_s is the Unix time of a moment, s")
+    return unix_s
 
 
 async def _keys(request: Request) -> Mapping[str, Any]:

@@ -1,6 +1,6 @@
 // State and reason in words, on top of everything; what is not the present is grey.
 import { SILENT_S } from "./age.js";
-import { ago, signed } from "./format.js";
+import { ago, tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
@@ -36,9 +36,10 @@ export function showBanner(page, behind_s) {
   write("sign", told.sign);
   write("state", told.name);
   write("reason", told.reason);
+  if (at("reason").title !== told.reason) at("reason").title = told.reason;
   const setpoint = told.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
-  write("tip", setpoint?.valid ? tipText(setpoint) : "");
+  write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
   write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
@@ -46,12 +47,4 @@ export function showBanner(page, behind_s) {
   const left_s = Math.max(0, (page.armed_until ?? 0) - performance.now() / 1000);
   write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "operate" ? "looking" : "view only");
   at("role").classList.toggle("armed", left_s > 0);
-}
-
-function tipText(setpoint) {
-  const axes = ["x", "y", "z"].map((axis, k) => {
-    const u = setpoint.u_tip_um ? ` ± ${(2 * setpoint.u_tip_um[k]).toFixed(1)} µm` : "";
-    return `${axis} ${signed(setpoint.tip_M_mm[k], 4)}${u}`;
-  });
-  return `${axes.join("   ")} mm`;
 }

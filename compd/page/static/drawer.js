@@ -1,5 +1,5 @@
 // Orders and recordings. An order is given in two steps: its consequence in numbers, then the order itself.
-import { ago, element } from "./format.js";
+import { ago, dateText, element } from "./format.js";
 
 async function post(path, keys) {
   const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(keys) });
@@ -117,7 +117,7 @@ export class Drawer {
     this.command.textContent = told.command;
     this.parts.replaceChildren(
       ...told.parts.map((part) =>
-        element("tr", {}, element("td", {}, element("a", { href: `recordings/${part.name}`, download: true }, part.name)), element("td", { class: "number" }, `${(part.bytes / 1e6).toFixed(2)} MB`), element("td", {}, new Date(part.changed).toLocaleString())),
+        element("tr", {}, element("td", {}, element("a", { href: `recordings/${part.name}`, download: true }, part.name)), element("td", { class: "number" }, `${(part.bytes / 1e6).toFixed(2)} MB`), element("td", {}, dateText(new Date(part.changed)))),
       ),
     );
   }
@@ -131,6 +131,6 @@ export class Drawer {
     this.record.textContent = recording ? `Stop ${recording.name}` : "Record";
     if (this.recording && !recording && this.open) this.list();
     this.recording = recording;
-    this.recorded.textContent = last_words || (recording ? `recording ${recording.name} since ${new Date(recording.started * 1000).toLocaleTimeString()}` : "");
+    this.recorded.textContent = last_words || (recording ? `recording ${recording.name} since ${dateText(new Date(recording.started * 1000))}` : "");
   }
 }

@@ -8,11 +8,14 @@ const MINUTE_S = 60;
 const HOW_TO = "Click to go there; ← → scrub, space stops and goes on.";
 const clock = (time_s) => new Date(time_s * 1000).toTimeString().slice(0, 5);
 const DRAW_EVERY_MS = 1000;
+// The worse a state, the higher it stands on the tape, px from its edges: not by colour alone.
+const INSET = { good: 8, care: 4, bad: 0, gone: 12 };
 
 export class Hour {
   constructor(tape, place, scrub, links) {
     Object.assign(this, { tape, place, scrub, links, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
     scrub.textContent = HOW_TO;
+    tape.addEventListener("pointermove", (event) => this.name(this.timeAt(event.offsetX)));
     tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
   }
 
@@ -69,6 +72,13 @@ export class Hour {
     return this.end_s - HOUR_S * (1 - x / this.tape.clientWidth);
   }
 
+  // Time and state under the pointer.
+  name(time_s) {
+    const k = this.times.findIndex((time) => time >= time_s);
+    const known = k >= 0 && this.times[k] < time_s + 2;
+    this.tape.title = `${clock(time_s)} ${known ? (Number.isNaN(this.rows[k][0]) ? "no daemon" : NAMES[this.rows[k][0]] ?? "unknown") : "not kept"}`;
+  }
+
   draw(now = false) {
     if (!now && (performance.now() - this.drawn_ms < DRAW_EVERY_MS || document.hidden)) return;
     this.drawn_ms = performance.now();
@@ -82,7 +92,8 @@ export class Hour {
       context.fillStyle = COLOURS[tone];
       // what is not good is never thinner than two pixels
       const wide = Math.max(pixel * 1.05, tone === "good" ? 0.5 : 2);
-      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, tone === "good" ? 6 : 0, wide, tone === "good" ? height - 12 : height);
+      const inset = INSET[tone];
+      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, inset, wide, height - 2 * inset);
     });
     if (this.at_s !== null) {
       context.fillStyle = ink("--ink");
@@ -103,10 +114,10 @@ export class Hour {
         legend: { show: false },
         cursor: { drag: { x: false, y: false } },
         scales: { x: { range: () => [this.end_s - HOUR_S, this.end_s] } },
-        axes: [{ ...axis, values: (_, times) => times.map((time) => clock(time)) }, { ...axis, size: 44 }],
-        series: [{}, ...[["x", "#0072b2"], ["y", "#e69f00"], ["z", "#cc79a7"]].map(([label, stroke]) => ({ label, stroke, width: 1.5, points: { show: false }, spanGaps: false }))],
+        axes: [{ ...axis, size: 24, values: (_, times) => times.map((time) => clock(time)) }, { ...axis, size: 44 }],
+        series: [{}, ...[["x", () => ink("--line"), []], ["y", "#e69f00", [6, 3]], ["z", "#cc79a7", [2, 2]]].map(([label, stroke, dash]) => ({ label, stroke, dash, width: 1.5, points: { show: false }, spanGaps: false }))],
       }, data, this.place);
-      this.place.append(element("p", { class: "note" }, "what has moved the tip, µm: x blue, y orange, z purple"));
+      this.place.append(element("p", { class: "note" }, "tip displacement, µm: x blue, y orange dashed, z purple dotted"));
       new ResizeObserver(() => this.chart.setSize({ width: this.place.clientWidth, height: 130 })).observe(this.place);
     } else this.chart.setData(data);
   }

@@ -5,6 +5,8 @@ import { element, ink, signed } from "./format.js";
 const SPAN_S = 60;
 // Charts are drawn so often, ms: a line moves by a pixel a tenth of a second at most.
 const DRAW_EVERY_MS = 100;
+// Of a strip, px: on a small screen the tip stands below them without scrolling.
+const heightOf = (count) => (count === 6 ? 54 : window.innerHeight <= 820 ? 80 : 108);
 
 export class Links {
   constructor(place, page) {
@@ -37,7 +39,7 @@ export class Links {
     const label = element("div", { class: "number" }, number, sources);
     const row = element("div", { class: "strip", onclick: () => this.select(link + 1) }, label, plot, bar);
     row.title = `link ${link + 1}`;
-    plot.style.height = `${count === 6 ? 54 : 108}px`;
+    plot.style.height = `${heightOf(count)}px`;
     return { row, number, sources, plot, bar };
   }
 
@@ -45,12 +47,12 @@ export class Links {
     const limit = () => this.limit_um;
     const options = {
       width: place.clientWidth || 300,
-      height: count === 6 ? 54 : 108,
+      height: heightOf(count),
       cursor: { show: false },
       legend: { show: false },
       scales: { x: { time: false, range: (_, __, max) => [max - SPAN_S, max] }, y: { range: (_, low, high) => this.range(low, high) } },
       axes: [{ show: false }, { size: 44, stroke: () => ink("--soft"), grid: { stroke: () => ink("--rule"), width: 1 }, ticks: { show: false }, space: 24, font: "11px system-ui" }],
-      series: [{}, { stroke: "#0072b2", width: 1.5, points: { show: false } }],
+      series: [{}, { stroke: () => ink("--line"), width: 1.5, points: { show: false } }],
       hooks: {
         draw: [(chart) => {
           for (const edge of [limit(), -limit()]) {
@@ -123,7 +125,7 @@ export class Links {
     if (!setpoint.valid) {
       this.rows.forEach(({ number, sources, bar }, k) => {
         number.textContent = "–";
-        sources.textContent = `link ${k + 1}: not valid`;
+        sources.textContent = `link ${k + 1}\nnot valid`;
         bar.replaceChildren();
       });
       return;
@@ -132,10 +134,10 @@ export class Links {
     const shadow_um = setpoint.shadow?.correction_mm?.map((value) => value * 1000);
     const ends = setpoint.correction_mm.map((_, k) => Math.max(causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0), Math.abs(shadow_um?.[k] ?? 0)));
     this.scale_um = keptScale(this.scale_um, Math.max(...ends));
-    this.scale.textContent = `Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
+    this.scale.textContent = `Colours: causes, as at the tip. Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
-      sources.textContent = `link ${k + 1}${shadow_um ? `, shadow ${signed(shadow_um[k])}` : ""}`;
+      sources.textContent = `link ${k + 1}${shadow_um ? `\nshadow ${signed(shadow_um[k])}` : ""}`;
       stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
       if (shadow_um) outline(bar, shadow_um[k], this.scale_um);
     });

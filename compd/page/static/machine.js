@@ -55,6 +55,12 @@ export class Machine {
     this.frame = Object.fromEntries(machine.wiring.map((wire, k) => [wire.distance, k]).filter(([distance]) => distance));
   }
 
+  // Mark a rod of the frame, or none.
+  select(rod) {
+    this.rod = this.rod === rod ? null : rod;
+    this.draw();
+  }
+
   view(key) {
     [this.turn, this.tilt] = VIEWS[key];
     this.draw();
@@ -130,6 +136,7 @@ export class Machine {
     for (const [name, [from, i, to, k]] of Object.entries(RODS)) {
       const um = this.rods_um?.[name];
       const ends = [this.scene[from][i], this.scene[to][k]];
+      if (this.rod === name) line(ends, ink("--ink"), 6);
       line(ends, um === null || um === undefined ? "#8c959f55" : diverging(um / this.largest_um), 2);
       this.parts.push({ ends: ends.map(place), text: `rod ${name}: ${signed(um)} µm since machine zero` });
     }
@@ -147,7 +154,7 @@ export class Machine {
       context.font = "bold 12px system-ui";
       context.fillText(String(k + 1), x + 8, y - 6);
     });
-    line(this.trail.map(([, point]) => point), "#0072b2", 1.5);
+    line(this.trail.map(([, point]) => point), ink("--line"), 1.5);
     const [x, y] = place(tip);
     context.beginPath();
     context.arc(x, y, 4, 0, 7);

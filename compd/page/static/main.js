@@ -19,7 +19,10 @@ const drawer = new Drawer(at("drawer"), page);
 const machine = new Machine(at("scene"), at("colours"), page);
 const links = new Links(at("strips"), page);
 const budget = new Budget(at("budget"));
-const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), drawer);
+const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), {
+  accept: (channel) => drawer.ask("accept", channel),
+  select: (wire) => (wire.link ? links.select(wire.link) : machine.select(wire.distance)),
+});
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
 const parts = [machine, links, budget, gauges];
 const past = new Past((event) => page.frozen && showPast(event, event?.unix_s ?? hour.at_s));
@@ -49,7 +52,7 @@ function paint() {
 
 // All parts as they were at `at_s`; `event` is null where nothing is known of it.
 function showPast(event, at_s) {
-  const minute = { at_s, ...hour.minute(at_s) };
+  const minute = { at_s, traces: event?.traces ?? gauges.traces.copy(), ...hour.minute(at_s) };
   for (const part of parts) part.show(event?.setpoint ? event : NOTHING, minute);
   tellMoment(event, at_s);
 }
@@ -70,6 +73,7 @@ function listen() {
     if (!late_s || late_s < 0.5) {
       links.note(told);
       hour.note(told);
+      gauges.note(told);
     }
   });
   on("slow", (told) => {
@@ -77,7 +81,7 @@ function listen() {
     drawer.show(told);
     if (page.frozen || !told.status) return;
     showTiming(at("timing"), told.status);
-    gauges.count(told.status);
+    gauges.count(told.faults);
   });
 }
 
@@ -100,4 +104,5 @@ document.addEventListener("freeze", (event) => freeze(true, event.detail.at_s, e
 bindKeys({ page, machine, hour, drawer, freeze });
 listen();
 paint();
+page.parts = { machine, links, budget, gauges, hour };
 window.compd = page; // for tests, and for the curious

@@ -1,6 +1,6 @@
 // A moment that has been, as a whole: the event that the page's server keeps of it. While keys scrub faster than the
 // server answers, only the newest wish is asked for.
-import { signed } from "./format.js";
+import { tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
@@ -24,7 +24,9 @@ export class Past {
     this.busy = true;
     while (this.wanted_s !== null) {
       const asked_s = this.wanted_s;
-      const event = await fetch(`moment?unix_s=${asked_s}`).then((answer) => (answer.ok ? answer.json() : null)).catch(() => null);
+      const asked = (path) => fetch(`${path}?unix_s=${asked_s}`).then((answer) => (answer.ok ? answer.json() : null)).catch(() => null);
+      const [event, traces] = await Promise.all([asked("moment"), asked("traces")]);
+      if (event) event.traces = traces ?? { times_s: [], values: [] };
       if (this.wanted_s === asked_s) {
         this.wanted_s = null;
         this.take(event);
@@ -45,7 +47,7 @@ export function tellMoment(event, at_s) {
   const setpoint = event?.setpoint;
   const sign = setpoint ? appearance(setpoint.state)[1] : "⚡";
   const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NOTHING IS KNOWN OF IT";
-  const tip = setpoint?.valid ? `  tip ${["x", "y", "z"].map((axis, k) => `${axis} ${signed(setpoint.tip_M_mm[k], 4)}`).join("  ")} mm` : "";
+  const tip = setpoint?.valid ? `  tip ${tipText(setpoint.tip_M_mm)}` : "";
   at("frozen-state").textContent = `${sign} ${state}${tip}`;
   at("frozen-reason").textContent = setpoint?.reason ?? event?.reason ?? "";
 }

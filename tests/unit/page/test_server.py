@@ -85,11 +85,13 @@ def test_who_may_look_only_records_nothing(open_page):
 
 @pytest.mark.parametrize("unix_s", ["", "now", "nan", "inf", "-inf"])
 def test_a_moment_is_a_time(open_page, unix_s):
-    assert open_page("view").get("/moment", params={"unix_s": unix_s}).status_code == 400
+    for path in ("/moment", "/traces"):
+        assert open_page("view").get(path, params={"unix_s": unix_s}).status_code == 400
 
 
 def test_of_a_moment_before_the_page_nothing_is_known(open_page):
     assert open_page("view").get("/moment", params={"unix_s": "1e9"}).status_code == 404
+    assert open_page("view").get("/traces", params={"unix_s": "1e9"}).json() == {"times_s": [], "values": []}
 
 
 def test_the_history_can_be_read_back():
