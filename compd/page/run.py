@@ -26,17 +26,19 @@ def run_page(
     port: int,
     tokens: Sequence[Token],
     started: Callable[[str], None],
+    models: Path | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C.
 
     unix_socket : the daemon's.  recordings : directory of the recordings.
+    models : directory of the model files that are offered.
     started : called with "host:port", once browsers can connect.
     Raises DaemonError where the port is taken.
     """
     listener = _listener(host, port)
     port = listener.getsockname()[1]
     names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [host]
-    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
+    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket), models)
     guarded = Guard(server.app(), tokens, [f"{name}:{port}" for name in names])
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
     started(f"{host}:{port}")

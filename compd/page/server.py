@@ -8,6 +8,7 @@ import math
 import shlex
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from compd.page.browsers import ARMED_S, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Token
 from compd.page.history import History
+from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
 
@@ -32,16 +34,20 @@ STATIC = Path(__file__).parent / "static"
 # At 1 kHz an hour is some gigabytes.
 LONGEST_BURST_S = 3600.0
 LONGEST_BODY_BYTES = 8192
+# Of the page's button.
+BURST_S = 5.0
 _LOOKS_ONLY = "this browser may look only"
 
 
 class Server:
     """The routes of one page. `request.scope["token"]` is from the guard in front of them."""
 
-    def __init__(self, link: DaemonLink, recordings: Recordings) -> None:
+    def __init__(self, link: DaemonLink, recordings: Recordings, models: Path | None = None) -> None:
+        """`models`: the directory whose model files are offered."""
         self._link = link
         self._recordings = recordings
-        self._orders = Orders(link)
+        self._models = ModelFiles(models)
+        self._orders = Orders(link, self._models)
         self._browsers = Browsers(MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
 
@@ -56,6 +62,7 @@ class Server:
             Route("/arm", self._arm, methods=["POST"]),
             Route("/orders/{name}", self._consequence),
             Route("/orders/{name}", self._order, methods=["POST"]),
+            Route("/models", self._list_models),
             Route("/recordings", self._list_recordings),
             Route("/recordings", self._record, methods=["POST"]),
             Route("/recordings/{name}", self._download),
@@ -110,7 +117,7 @@ class Server:
         if name not in self._orders:
             return _refused("there is no such order", 404)
         told = self._orders.consequence(name, request.query_params.get("subject", ""))
-        return JSONResponse({"possible": told.possible, "text": told.text, "command": told.command})
+        return JSONResponse(asdict(told))
 
     async def _order(self, request: Request) -> Response:
         name, keys = request.path_params["name"], await _keys(request)
@@ -124,12 +131,22 @@ class Server:
             return _refused(explained(error), 409, error.problems[0].value)
         return JSONResponse({"answer": answer})
 
+    async def _list_models(self, request: Request) -> Response:
+        directory = self._models.directory
+        return JSONResponse(
+            {
+                "directory": None if directory is None else str(directory),
+                "models": self._models.listed(self._link.models),
+            }
+        )
+
     async def _list_recordings(self, request: Request) -> Response:
         return JSONResponse(
             {
                 "directory": str(self._recordings.directory),
                 "parts": self._recordings.listed(),
                 "command": shlex.join(self._recordings.command("NAME", None)),
+                "burst_command": shlex.join(self._recordings.command("NAME", BURST_S)),
             }
         )
 

@@ -28,6 +28,9 @@ def page(
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
+    models: Annotated[
+        Path | None, typer.Option(help="The directory of model files to choose from; that of CONFIG if left out.")
+    ] = None,
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
 
@@ -56,7 +59,11 @@ def page(
         if listen is not None:
             typer.echo("put a proxy with TLS in front: tokens pass in the clear otherwise", err=True)
 
-    run_page(unix_address(address), recordings.absolute(), listen or "127.0.0.1", port, known, started)
+    unix_socket = unix_address(address)
+    if models is None and unix_socket != address:
+        models = Path(address).parent
+    offered = None if models is None else models.absolute()
+    run_page(unix_socket, recordings.absolute(), listen or "127.0.0.1", port, known, started, offered)
 
 
 def _needed(tokens: Path | None, option: str) -> Path:

@@ -80,6 +80,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
             port,
             tokens,
             lambda where: typer.echo(f"open http://{where}/?token={token} (Ctrl-C ends all three)"),
+            configuration.path.absolute().parent,
         )
 
     run_live(configuration, seed, serve)

@@ -40,6 +40,7 @@ def test_every_part_shows_numbers(tab):
 
 def test_dragging_and_keys_turn_the_machine(tab):
     until(tab, "compd.live.scene && !compd.unpainted")
+    tab.keyboard.press(" ")  # one and the same moment
     before = tab.evaluate("document.getElementById('scene').toDataURL()")
     box = tab.locator("#scene").bounding_box()
     tab.mouse.move(box["x"] + 200, box["y"] + 200)
