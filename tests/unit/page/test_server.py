@@ -12,9 +12,10 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token, hashed
 from compd.page.history import History
 from compd.page.recordings import Recordings
-from compd.page.server import LONGEST_BODY_BYTES, Server, packed
+from compd.page.server import LONGEST_BODY_BYTES, STATIC, Server, packed
 
 HOST = "127.0.0.1:7760"
+LARGEST_PAGE_BYTES = 150_000
 OWN = {"Origin": f"http://{HOST}"}
 
 
@@ -36,6 +37,11 @@ def open_page(tmp_path):
 @pytest.mark.parametrize("path", ["/", "/static/main.js", "/static/page.css", "/static/vendor/uPlot-1.6.32.min.js"])
 def test_what_a_browser_loads_is_there(open_page, path):
     assert open_page("view").get(path).status_code == 200
+
+
+def test_a_page_is_small():
+    loaded = [path for path in STATIC.rglob("*") if path.is_file() and "LICENSE" not in path.name]
+    assert sum(path.stat().st_size for path in loaded) <= LARGEST_PAGE_BYTES
 
 
 @pytest.mark.parametrize(
