@@ -11,7 +11,9 @@ export class CommandLine {
 
   write(text) {
     this.row.hidden = !text;
-    if (this.code.textContent !== text) this.code.textContent = text;
+    if (this.code.textContent === text) return;
+    // a word is broken where it does not fit a line, and not at its hyphens
+    this.code.replaceChildren(...text.split(" ").flatMap((word, k) => [k ? " " : "", element("span", {}, word)]));
   }
 
   async copy() {

@@ -5,11 +5,11 @@ export function signed(value, digits = 1) {
   return (value < 0 && Number(text) !== 0 ? "−" : "+") + text;
 }
 
-// The tip in {M}; blanks as wide as a figure keep y and z where they are, as far as ten metres.
+// The tip in {M}; blanks as wide as a figure keep y and z where they are, as far as a metre.
 export function tipText(tip_M_mm, u_tip_um) {
   const axes = ["x", "y", "z"].map((axis, k) => {
     const u = u_tip_um ? ` ± ${(2 * u_tip_um[k]).toFixed(1)} µm` : "";
-    return `${axis} ${signed(tip_M_mm[k], 4)}${u}`.padStart(k ? 12 + u.length : 0, "\u2007");
+    return `${axis} ${signed(tip_M_mm[k], 4)}${u}`.padStart(k ? 11 + u.length : 0, "\u2007");
   });
   return `${axes.join("  ")} mm`;
 }
