@@ -106,6 +106,7 @@ export class Machine {
     this.parts = [];
     if (!this.scene) {
       context.fillStyle = ink("--soft");
+      context.font = "13px system-ui";
       context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
       return;
     }
