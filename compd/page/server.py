@@ -6,7 +6,7 @@ import asyncio
 import json
 import math
 import shlex
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -36,6 +36,7 @@ LONGEST_BURST_S = 3600.0
 LONGEST_BODY_BYTES = 8192
 # Of the page's button.
 BURST_S = 5.0
+_CANCEL_EVERY_S = 0.5
 _LOOKS_ONLY = "this browser may look only"
 
 
@@ -78,9 +79,7 @@ class Server:
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
         yield
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await _ended(tasks)
         await self._recordings.stop()
 
     async def _index(self, request: Request) -> Response:
@@ -181,6 +180,15 @@ def _moment(request: Request) -> float:
     if not math.isfinite(unix_s):
         raise HTTPException(400, "unix_s is the Unix time of a moment, s")
     return unix_s
+
+
+async def _ended(tasks: Sequence[asyncio.Task[None]]) -> None:
+    """Cancel tasks until they have ended: a cancellation is lost where a connection fails at the same moment."""
+    running = set(tasks)
+    while running:
+        for task in running:
+            task.cancel()
+        _, running = await asyncio.wait(running, timeout=_CANCEL_EVERY_S)
 
 
 async def _keys(request: Request) -> Mapping[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 
 import numpy as np
@@ -12,7 +13,7 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token, hashed
 from compd.page.history import History
 from compd.page.recordings import Recordings
-from compd.page.server import LONGEST_BODY_BYTES, STATIC, Server, packed
+from compd.page.server import LONGEST_BODY_BYTES, STATIC, Server, _ended, packed
 
 HOST = "127.0.0.1:7760"
 LARGEST_PAGE_BYTES = 150_000
@@ -118,3 +119,19 @@ def test_the_history_can_be_read_back():
         assert rows[-1, 1] == 1.0
     assert start == len(data)
     assert [table["rows"] for table in told["tables"]] == [30, 300]
+
+
+def test_a_task_that_has_missed_a_cancellation_ends_too():
+    async def deaf():
+        try:
+            await asyncio.sleep(60.0)
+        except asyncio.CancelledError:
+            await asyncio.sleep(60.0)
+
+    async def both():
+        tasks = [asyncio.create_task(deaf()), asyncio.create_task(asyncio.sleep(60.0))]
+        await asyncio.sleep(0)
+        await asyncio.wait_for(_ended(tasks), 10.0)
+        assert all(task.done() for task in tasks)
+
+    asyncio.run(both())
