@@ -278,7 +278,8 @@ class Client:
         Returns
         -------
         dict
-            `valid` and, where it is, `tip_um` (by cause, in x, y, z of {M}) and where the moving platform is.
+            `valid` and, where it is, `tip_um` (by cause, in x, y, z of {M}), `shadow_tip_um` where a shadow runs, and
+            where the moving platform is.
 
         Raises
         ------

@@ -11,7 +11,9 @@ from typing import Any
 from compd.gauge import Quality
 from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
-from compd.page.history import History
+from compd.page.fault_counts import FaultCounts
+from compd.page.history import History, Traces
+from compd.page.moments import Moments
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
 
@@ -27,6 +29,7 @@ class Broadcast:
     Attributes
     ----------
     history : of the machine; None before the daemon has told what machine it is.
+    moments, traces : the live events of that machine, and what its gauges showed.
     """
 
     def __init__(self, link: DaemonLink, browsers: Browsers, recordings: Recordings) -> None:
@@ -34,6 +37,9 @@ class Broadcast:
         self._browsers = browsers
         self._recordings = recordings
         self.history: History | None = None
+        self.moments = Moments()
+        self.traces = Traces(0)
+        self._faults = FaultCounts()
         self._machine: Any = None
         self._live = self._slow = b""
         self._slow_count = 0
@@ -49,11 +55,16 @@ class Broadcast:
             if self.history is not None:
                 readings = self._link.readings
                 self.history.note(time.time(), None if readings is None else readings["setpoint"], self._link.budget)
+            live = self._live_event()
+            data = plain(live)
+            if self.history is not None:
+                self.moments.note(live["unix_s"], data)
+                self.traces.note(live["unix_s"], live.get("gauges", ()))
             async with self._made:
-                self._live = encoded("live", self._live_event())
+                self._live = encoded("live", data)
                 if due_s >= slow_due_s:
                     slow_due_s += SLOW_EVERY_S
-                    self._slow = encoded("slow", self._slow_event())
+                    self._slow = encoded("slow", plain(self._slow_event()))
                     self._slow_count += 1
                 self._made.notify_all()
             due_s = max(due_s + 1 / LIVE_HZ, loop.time())
@@ -66,14 +77,15 @@ class Broadcast:
     async def events(self, browser: Browser) -> AsyncIterator[bytes]:
         """The events of one browser, until it goes. Each is the newest: a browser that is slow gets fewer."""
         try:
-            yield encoded("hello", {"id": browser.id, "role": browser.role, "machine": self._machine})
+            hello = {"id": browser.id, "role": browser.role, "machine": self._machine}
+            yield encoded("hello", plain(hello))
             machine, slow_count = self._machine, -1
             while not self._ended:
                 async with self._made:
                     await self._made.wait()
                 if self._machine is not machine:
                     machine = self._machine
-                    yield encoded("machine", {"machine": machine})
+                    yield encoded("machine", plain({"machine": machine}))
                 if self._slow_count != slow_count:
                     slow_count = self._slow_count
                     yield self._slow
@@ -87,6 +99,9 @@ class Broadcast:
             return
         self._machine = machine
         self.history = History(sum(wire["kind"] == "scale" for wire in machine["wiring"]))
+        self.moments = Moments()
+        self.traces = Traces(len(machine["wiring"]))
+        self._faults = FaultCounts()
 
     def _live_event(self) -> Event:
         """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is."""
@@ -98,14 +113,18 @@ class Broadcast:
             event["setpoint"] = setpoint
             event["gauges"] = gauges(link.readings, link.columns)
             event["budget"] = (link.budget or {}).get("tip_um")
+            event["shadow_budget"] = (link.budget or {}).get("shadow_tip_um")
             event["scene"] = scene(self._machine, setpoint, link.budget)
         return event
 
     def _slow_event(self) -> Event:
-        """Status, browsers and the recording that runs."""
+        """Status, counts of faults, browsers and the recording that runs."""
+        if self._link.status is not None:
+            self._faults.note(time.time(), self._link.status)
         running = self._recordings.running
         return {
             "status": self._link.status,
+            "faults": self._faults.summary(),
             "browsers": self._browsers.summary(),
             "recording": None if running is None else {"name": running.name, "started": running.started_s},
             "last_words": self._recordings.last_words,
@@ -140,6 +159,11 @@ def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any
     return shown
 
 
-def encoded(name: str, data: Event) -> bytes:
-    """An event as it is sent (server-sent events, WHATWG HTML, section 9.2)."""
-    return f"event: {name}\ndata: {json.dumps(data, separators=(',', ':'))}\n\n".encode()
+def plain(event: Event) -> bytes:
+    """An event as JSON."""
+    return json.dumps(event, separators=(",", ":")).encode()
+
+
+def encoded(name: str, data: bytes) -> bytes:
+    """An event as it is sent (server-sent events, WHATWG HTML, section 9.2); `data`: one line."""
+    return b"event: " + name.encode() + b"\ndata: " + data + b"\n\n"

@@ -15,7 +15,7 @@ ARMED_S = 60.0
 class Browser:
     """One connection of a browser.
 
-    id : known to this browser alone. role : "view" or "owner". since_s, armed_until_s : monotonic time, s.
+    id : known to this browser alone. role : "view" or "operate". since_s, armed_until_s : monotonic time, s.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Browsers:
     def arm(self, id: str) -> Browser | None:
         """Arm the browser for `ARMED_S`; None where it is not connected, or its role is to look only."""
         browser = self._connected.get(id)
-        if browser is None or browser.role != "owner":
+        if browser is None or browser.role != "operate":
             return None
         browser.armed_until_s = self._clock.monotonic() + ARMED_S
         return browser

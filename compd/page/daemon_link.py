@@ -1,6 +1,6 @@
 """The page's connection to the daemon: the newest message of each class, and whether the daemon is there at all.
 
-One connection watches READINGS, another asks for STATUS and BUDGET. Both are made again by themselves; meanwhile
+One connection watches READINGS, another asks for STATUS, MODEL and BUDGET. Both are made again by themselves; meanwhile
 `connected` is False and there are no messages, so that nobody shows what was.
 """
 
@@ -36,7 +36,7 @@ class DaemonLink:
     connected : whether the messages below are of a daemon that is there.
     reason : why it is not.
     machine, columns : MACHINE, and the `columns` of WATCH.
-    readings, status, budget : the newest of each; None before the first.
+    readings, status, budget, models : the newest of each, `models` of MODEL; None before the first.
     news : notified with every READINGS, and when the daemon comes or goes.
     """
 
@@ -49,6 +49,7 @@ class DaemonLink:
     readings: Message | None = None
     status: Message | None = None
     budget: Message | None = None
+    models: Message | None = None
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
     async def run(self) -> None:
@@ -93,6 +94,8 @@ class DaemonLink:
         while True:
             self.budget = await asked.ask({"class": "BUDGET"})
             if loop.time() >= status_due_s:
+                # first the models: who sees in STATUS that they have changed finds them here
+                self.models = await asked.ask({"class": "MODEL"})
                 self.status = await asked.ask({"class": "STATUS"})
                 status_due_s = loop.time() + STATUS_EVERY_S
             await asyncio.sleep(BUDGET_EVERY_S)
@@ -102,7 +105,7 @@ class DaemonLink:
             if self.connected:
                 _log.warning("the daemon is gone", path=self.path, reason=reason)
             self.connected, self.reason = False, reason
-            self.readings = self.status = self.budget = None
+            self.readings = self.status = self.budget = self.models = None
             self.news.notify_all()
 
 

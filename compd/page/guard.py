@@ -20,7 +20,7 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-Role = Literal["view", "owner"]
+Role = Literal["view", "operate"]
 
 # Followed by the port: a browser sends a cookie to every port of a host.
 COOKIE = "compd_page_"

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
 from compd.live.loop.states import state_named
@@ -26,10 +27,10 @@ UNKNOWN_STATE = -1.0
 class Ring:
     """The newest rows of a table of numbers, one every `1 / rate_hz` seconds."""
 
-    def __init__(self, span_s: float, rate_hz: float, columns: int) -> None:
+    def __init__(self, span_s: float, rate_hz: float, columns: int, dtype: type = np.float32) -> None:
         rows = round(span_s * rate_hz)
         self._every_s = 1 / rate_hz
-        self._rows = np.full((rows, columns), np.nan, dtype=np.float32)
+        self._rows: NDArray[Any] = np.full((rows, columns), np.nan, dtype=dtype)
         self._times_s = np.full(rows, np.nan)
         self._count = 0
         self._due_s = -math.inf
@@ -90,3 +91,26 @@ class History:
             if budget is not None and "tip_um" in budget:
                 row[-3:] = moved_um(budget)
         return row
+
+
+class Traces:
+    """What each wired channel showed, once a second of the last hour."""
+
+    def __init__(self, channels: int) -> None:
+        # a length of 500 mm to a nanometre
+        self._ring = Ring(COARSE_S, COARSE_HZ, channels, np.float64)
+
+    def note(self, time_s: float, gauges: Sequence[Message]) -> None:
+        """Take the gauges of a live event at `time_s` (Unix, s); empty while the daemon is not there."""
+        if gauges:
+            self._ring.note(time_s, [gauge.get("value", math.nan) for gauge in gauges])
+
+    def minute(self, end_s: float) -> dict[str, Any]:
+        """The minute before `end_s`: `times_s`, and `values` of each channel at them, None where there was none."""
+        times_s, values = self._ring.table()
+        chosen = (times_s > end_s - FINE_S) & (times_s <= end_s)
+        columns = values[chosen].T.round(7)
+        return {
+            "times_s": times_s[chosen].round(1).tolist(),
+            "values": [[None if math.isnan(value) else value for value in column] for column in columns.tolist()],
+        }

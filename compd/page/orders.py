@@ -10,34 +10,38 @@ import asyncio
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from compd.client import Client, connect
-from compd.errors import DaemonError
+from compd.errors import DaemonError, Problem
 from compd.gauge import Quality
 from compd.page.daemon_link import DaemonLink
+from compd.page.model_files import ModelFiles
 from compd.units import UM_PER_MM
 
 # Reading a model file takes a second; an effect of a person's own may import what it likes.
 _TIMEOUT_S = 30.0
+_NOT_OFFERED = "this is none of the model files in the list"
+_NAME_IT = "choose one of them, or give the absolute path of another"
 
 
 @dataclass(frozen=True)
 class Consequence:
     """What an order will do. possible : whether it can be given now. text : in words and numbers. command : the same
-    as a command line."""
+    as a command line. subject : of the order that does exactly this; "" is that which was asked for."""
 
     possible: bool
     text: str
     command: str
+    subject: str = ""
 
 
 class Orders:
     """The orders by name: each has a consequence, and is done."""
 
-    def __init__(self, link: DaemonLink) -> None:
+    def __init__(self, link: DaemonLink, files: ModelFiles | None = None) -> None:
         self._link = link
+        self._files = files or ModelFiles(None)
         self._consequences: Mapping[str, Callable[[str], Consequence]] = {
             "zero": self._zero,
             "accept": self._accept,
@@ -63,7 +67,9 @@ class Orders:
         return self._consequences[name](subject)
 
     async def do(self, name: str, subject: str) -> Mapping[str, Any]:
-        """Give the order to the daemon; its answer. Raises DaemonError."""
+        """Give the order to the daemon; its answer. Raises DaemonError, also for a model file that is not offered."""
+        if name == "adopt" or (name == "shadow" and subject):
+            subject = self._file(subject)
         return await asyncio.to_thread(self._ask, name, subject)
 
     def _ask(self, name: str, subject: str) -> Mapping[str, Any]:
@@ -83,7 +89,7 @@ class Orders:
         if status["zero"]["taken"]:
             text += f" The zero of {status['zero']['taken_at']} is kept as machine-zero.json.old."
         if largest := self._largest_um():
-            text += f" The correction, now up to {largest:.1f} um, begins at zero again."
+            text += f" The correction, now up to {largest:.1f} µm, begins at zero again."
         return Consequence(True, text, command)
 
     def _accept(self, subject: str) -> Consequence:
@@ -97,26 +103,46 @@ class Orders:
         text = "What it shows from now on is taken as it is. Look at the gauge, and reference it, first. "
         return Consequence(True, text + "; ".join(lines), command)
 
+    def _file(self, subject: str) -> str:
+        """The path of a model file that a browser names. Raises DaemonError where it is none that may be named."""
+        path = self._files.path_of(subject, self._link.models)
+        if path is None:
+            raise DaemonError(Problem(where="page", what=_NOT_OFFERED, value=subject, next_step=_NAME_IT))
+        return path
+
     def _shadow(self, subject: str) -> Consequence:
-        command = self._command("shadow", subject or "--none", "--daemon", self._link.path)
         if not subject:
+            command = self._command("shadow", "--none", "--daemon", self._link.path)
             return Consequence(True, "No model runs beside the applied one any more.", command)
-        if not Path(subject).is_file():
-            return Consequence(False, f"{subject} is no file.", command)
-        return Consequence(True, "It is computed beside the applied model; nothing of it reaches the machine.", command)
+        path = self._files.path_of(subject, self._link.models)
+        command = self._command("shadow", path or subject, "--daemon", self._link.path)
+        if path is None:
+            return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
+        text = "The daemon reads and tries the file. It is computed beside the applied model; nothing of it reaches "
+        return Consequence(True, text + "the machine.", command, path)
 
     def _adopt(self, subject: str) -> Consequence:
         """Of the model that runs as a shadow: its correction is known."""
-        command = self._command("adopt", subject, "--daemon", self._link.path)
+        shadow_file = (self._link.models or {}).get("shadow", {}).get("file", "")
+        path = self._files.path_of(subject, self._link.models) if subject else shadow_file
+        command = self._command("adopt", path or subject or "FILE", "--daemon", self._link.path)
+        if path is None:
+            return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
-        if "correction_mm" not in shadow:
-            why = shadow.get("reason") or "no model runs as a shadow"
-            return Consequence(
-                False, f"Let the model run as a shadow first, so that its effect is known: {why}.", command
-            )
+        why = ""
+        if not shadow_file:
+            why = "no model runs as a shadow"
+        elif path != shadow_file:
+            why = f"{shadow_file} runs as a shadow now"
+        elif "correction_mm" not in shadow or "sources_mm" not in setpoint:
+            why = shadow.get("reason") or "there is no valid setpoint to compare it with"
+        if why:
+            text = f"Let the model run as a shadow first, so that its effect is known: {why}."
+            return Consequence(False, text, command)
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
-        return Consequence(True, self._change(asked_mm, shadow["correction_mm"]), command)
+        text = f"{path}: {self._change(asked_mm, shadow['correction_mm'])}"
+        return Consequence(True, text, command, path)
 
     def _no_model(self, subject: str) -> Consequence:
         command = self._command("adopt", "--none", "--daemon", self._link.path)
@@ -131,7 +157,7 @@ class Orders:
         changes_um = [UM_PER_MM * (after - before) for before, after in zip(before_mm, after_mm, strict=True)]
         link = max(range(len(changes_um)), key=lambda k: abs(changes_um[k]))
         limits = (self._link.machine or {}).get("limits", {})
-        text = f"The correction changes by {changes_um[link]:+.1f} um at link {link + 1}, and less at the others."
+        text = f"The correction changes by {changes_um[link]:+.1f} µm at link {link + 1}, and by less at the others."
         if slew := limits.get("slew_mm_per_s"):
             text += f" It slews for {abs(changes_um[link]) / UM_PER_MM / slew:.1f} s."
         return text

@@ -50,6 +50,7 @@ class Recordings:
                     "bytes": stat.st_size,
                     "changed": datetime.fromtimestamp(stat.st_mtime, UTC).isoformat(timespec="seconds"),
                     "sidecar": path.with_suffix(".yaml").is_file(),
+                    "command": f"cp {shlex.quote(str(path.with_suffix('')))}.* .",
                 }
             )
         return sorted(found, key=lambda part: str(part["changed"]), reverse=True)

@@ -28,11 +28,13 @@ def run_page(
     port: int,
     tokens: Sequence[Token],
     started: Callable[[str], None],
+    models: Path | None = None,
     behind: str | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C.
 
     unix_socket : the daemon's.  recordings : directory of the recordings.
+    models : directory of the model files that are offered.
     started : called with the origin, as "http://127.0.0.1:7760", once browsers can connect.
     behind : origin of a proxy with TLS in front of this server, as "https://machine.example"; only it is used then.
     Raises DaemonError where the port is taken.
@@ -42,7 +44,7 @@ def run_page(
     origins = (
         [behind] if behind else [origin(name, port) for name in (LOOPBACK_NAMES if host in LOOPBACK_NAMES else [host])]
     )
-    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
+    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket), models)
     guarded = Guard(server.app(), tokens, origins, port)
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
     started(origins[0])

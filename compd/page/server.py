@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import shlex
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from compd.page.browsers import ARMED_S, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Token
 from compd.page.history import History
+from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
 
@@ -31,16 +34,21 @@ STATIC = Path(__file__).parent / "static"
 # At 1 kHz an hour is some gigabytes.
 LONGEST_BURST_S = 3600.0
 LONGEST_BODY_BYTES = 8192
+# Of the page's button.
+BURST_S = 5.0
+_CANCEL_EVERY_S = 0.5
 _LOOKS_ONLY = "this browser may look only"
 
 
 class Server:
     """The routes of one page. `request.scope["token"]` is from the guard in front of them."""
 
-    def __init__(self, link: DaemonLink, recordings: Recordings) -> None:
+    def __init__(self, link: DaemonLink, recordings: Recordings, models: Path | None = None) -> None:
+        """`models`: the directory whose model files are offered."""
         self._link = link
         self._recordings = recordings
-        self._orders = Orders(link)
+        self._models = ModelFiles(models)
+        self._orders = Orders(link, self._models)
         self._browsers = Browsers(MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
 
@@ -50,9 +58,12 @@ class Server:
             Route("/", self._index),
             Route("/live", self._live),
             Route("/history", self._history),
+            Route("/moment", self._moment),
+            Route("/traces", self._traces),
             Route("/arm", self._arm, methods=["POST"]),
             Route("/orders/{name}", self._consequence),
             Route("/orders/{name}", self._order, methods=["POST"]),
+            Route("/models", self._list_models),
             Route("/recordings", self._list_recordings),
             Route("/recordings", self._record, methods=["POST"]),
             Route("/recordings/{name}", self._download),
@@ -68,9 +79,7 @@ class Server:
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
         yield
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await _ended(tasks)
         await self._recordings.stop()
 
     async def _index(self, request: Request) -> Response:
@@ -84,6 +93,15 @@ class Server:
 
     async def _history(self, request: Request) -> Response:
         return Response(packed(self._broadcast.history), media_type="application/octet-stream")
+
+    async def _moment(self, request: Request) -> Response:
+        """The event that is nearest to `unix_s`, as it was."""
+        event = self._broadcast.moments.nearest(_moment(request))
+        return _refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
+
+    async def _traces(self, request: Request) -> Response:
+        """What the gauges showed in the minute before `unix_s`."""
+        return JSONResponse(self._broadcast.traces.minute(_moment(request)))
 
     async def _arm(self, request: Request) -> Response:
         keys = await _keys(request)
@@ -99,7 +117,7 @@ class Server:
         if name not in self._orders:
             return _refused("there is no such order", 404)
         told = self._orders.consequence(name, request.query_params.get("subject", ""))
-        return JSONResponse({"possible": told.possible, "text": told.text, "command": told.command})
+        return JSONResponse(asdict(told))
 
     async def _order(self, request: Request) -> Response:
         name, keys = request.path_params["name"], await _keys(request)
@@ -113,18 +131,28 @@ class Server:
             return _refused(explained(error), 409, error.problems[0].value)
         return JSONResponse({"answer": answer})
 
+    async def _list_models(self, request: Request) -> Response:
+        directory = self._models.directory
+        return JSONResponse(
+            {
+                "directory": None if directory is None else str(directory),
+                "models": self._models.listed(self._link.models),
+            }
+        )
+
     async def _list_recordings(self, request: Request) -> Response:
         return JSONResponse(
             {
                 "directory": str(self._recordings.directory),
                 "parts": self._recordings.listed(),
                 "command": shlex.join(self._recordings.command("NAME", None)),
+                "burst_command": shlex.join(self._recordings.command("NAME", BURST_S)),
             }
         )
 
     async def _record(self, request: Request) -> Response:
         keys = await _keys(request)
-        if request.scope["token"].role != "owner":
+        if request.scope["token"].role != "operate":
             return _refused(_LOOKS_ONLY, 403)
         if keys.get("stop"):
             await self._recordings.stop()
@@ -142,6 +170,26 @@ class Server:
             return _refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
+
+
+def _moment(request: Request) -> float:
+    """Unix time, s, that a request names. Raises HTTPException (400) for anything else."""
+    try:
+        unix_s = float(request.query_params.get("unix_s", ""))
+    except ValueError:
+        unix_s = math.nan
+    if not math.isfinite(unix_s):
+        raise HTTPException(400, "unix_s is the Unix time of a moment, s")
+    return unix_s
+
+
+async def _ended(tasks: Sequence[asyncio.Task[None]]) -> None:
+    """Cancel tasks until they have ended: a cancellation is lost where a connection fails at the same moment."""
+    running = set(tasks)
+    while running:
+        for task in running:
+            task.cancel()
+        _, running = await asyncio.wait(running, timeout=_CANCEL_EVERY_S)
 
 
 async def _keys(request: Request) -> Mapping[str, Any]:

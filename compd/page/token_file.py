@@ -37,13 +37,13 @@ def read_tokens(path: Path) -> list[Token]:
 
 
 def add_token(path: Path, role_and_name: str) -> str:
-    """A new token, "view:NAME" or "owner:NAME", whose hash is then in the file; the token itself is nowhere else.
+    """A new token, "view:NAME" or "operate:NAME", whose hash is then in the file; the token itself is nowhere else.
 
     Raises ConfigurationError for another role, or a name that has one already.
     """
     role, _, name = role_and_name.partition(":")
     if role not in get_args(Role) or not name:
-        raise _problem(path, f"{role_and_name!r} is no role and name", "write view:NAME or owner:NAME")
+        raise _problem(path, f"{role_and_name!r} is no role and name", "write view:NAME or operate:NAME")
     tokens = read_tokens(path) if path.exists() else []
     if any(token.name == name for token in tokens):
         raise _problem(path, f"{name} has a token already", "choose another name, or delete the old entry")

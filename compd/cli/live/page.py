@@ -29,10 +29,13 @@ def page(
     ] = None,
     new_token: Annotated[
         str | None,
-        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or owner, to --tokens; print it; end."),
+        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or operate, to --tokens; print it; end."),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
+    models: Annotated[
+        Path | None, typer.Option(help="The directory of model files to choose from; that of CONFIG if left out.")
+    ] = None,
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
 
@@ -50,7 +53,7 @@ def page(
     own = make_token()
     alone = listen is None and behind is None
     if alone:
-        known = [Token("this computer", "view" if read_only else "owner", hashed(own))]
+        known = [Token("this computer", "view" if read_only else "operate", hashed(own))]
     else:
         known = [
             Token(token.name, "view", token.sha256) if read_only else token
@@ -62,8 +65,12 @@ def page(
         if listen is not None and behind is None:
             typer.echo("put a proxy with TLS in front (--behind): tokens pass in the clear otherwise", err=True)
 
+    unix_socket = unix_address(address)
+    if models is None and unix_socket != address:
+        models = Path(address).parent
+    offered = None if models is None else models.absolute()
     host = listen or "127.0.0.1"
-    run_page(unix_address(address), recordings.absolute(), host, port, known, started, _origin(behind))
+    run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind))
 
 
 def _origin(behind: str | None) -> str | None:

@@ -70,7 +70,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
         f"{configuration.machine}, simulated; its weather {SPEEDUP:g} times faster than real. "
         "Starting it and the daemon (the very first start compiles the kernels) ..."
     )
-    tokens = [Token("this computer", "owner", hashed(token))]
+    tokens = [Token("this computer", "operate", hashed(token))]
 
     def serve(unix_socket: str) -> None:
         run_page(
@@ -80,6 +80,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
             port,
             tokens,
             lambda origin: typer.echo(f"open {origin}/?token={token} (Ctrl-C ends all three)"),
+            configuration.path.absolute().parent,
         )
 
     run_live(configuration, seed, serve)

@@ -368,6 +368,11 @@ class BudgetKeys(SentMessage):
         description="how far each cause has moved the tip, in x, y, z of {M}, um: `joints`, `frame`, then each effect "
         "by its id; to first order, before the limits. With the tool on the plate: the touched place, in {P}",
     )
+    shadow_tip_um: Vector | None = Field(
+        default=None,
+        description="how far the shadow model has all causes together move the tip, um: beside the sum of `tip_um`; "
+        "absent without a shadow, and while it has no numbers",
+    )
     supports_M_mm: list[Vector] | None = Field(default=None, description="b1, b2, b3 of the base platform, in {M}, mm")
     supports_moved_um: list[Vector] | None = Field(default=None, description="how far since machine zero, um")
     base_joints_M_mm: list[Vector] | None = Field(default=None, description="the base joint of each link, in {M}, mm")

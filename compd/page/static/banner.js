@@ -1,13 +1,14 @@
 // State and reason in words, on top of everything; what is not the present is grey.
-import { ago, signed } from "./format.js";
-import { appearance } from "./states.js";
+import { SILENT_S } from "./age.js";
+import { ago, tipText } from "./format.js";
+import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
 let shown = "";
 
 function describe(page, behind_s) {
   const live = page.live;
-  if (!live || behind_s > 1.5) {
+  if (!live || behind_s > SILENT_S) {
     const text = live ? `no news from the page's server for ${ago(behind_s)}` : "waiting for the page's server";
     return { state: "gone", tone: "gone", sign: "⚡", name: "NOT CONNECTED", reason: text };
   }
@@ -16,8 +17,7 @@ function describe(page, behind_s) {
     return { state: "gone", tone: "gone", sign: "⚡", name: "NO DAEMON", reason: live.reason || "it has told nothing yet" };
   }
   const [tone, sign] = appearance(live.setpoint.state);
-  const name = live.setpoint.state.replace("_", " ").toUpperCase();
-  return { state: live.setpoint.state, tone, sign, name, reason: live.setpoint.reason };
+  return { state: live.setpoint.state, tone, sign, name: stateName(live.setpoint.state), reason: live.setpoint.reason };
 }
 
 function write(id, text) {
@@ -36,22 +36,15 @@ export function showBanner(page, behind_s) {
   write("sign", told.sign);
   write("state", told.name);
   write("reason", told.reason);
+  if (at("reason").title !== told.reason) at("reason").title = told.reason;
   const setpoint = told.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
-  write("tip", setpoint?.valid ? tipText(setpoint) : "");
+  write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
   write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");
   const left_s = Math.max(0, (page.armed_until ?? 0) - performance.now() / 1000);
-  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "owner" ? "looking" : "view only");
+  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "operate" ? "looking" : "view only");
   at("role").classList.toggle("armed", left_s > 0);
-}
-
-function tipText(setpoint) {
-  const axes = ["x", "y", "z"].map((axis, k) => {
-    const u = setpoint.u_tip_um ? ` ± ${(2 * setpoint.u_tip_um[k]).toFixed(1)} µm` : "";
-    return `${axis} ${signed(setpoint.tip_M_mm[k], 4)}${u}`;
-  });
-  return `${axes.join("   ")} mm`;
 }

@@ -1,17 +1,21 @@
 // Orders and recordings. An order is given in two steps: its consequence in numbers, then the order itself.
+import { CommandLine } from "./command_line.js";
 import { ago, element } from "./format.js";
-
-async function post(path, keys) {
-  const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(keys) });
-  const told = await response.json().catch(() => ({}));
-  return { ok: response.ok, ...told };
-}
+import { ModelList } from "./model_list.js";
+import { post } from "./post.js";
+import { Recordings } from "./recordings.js";
 
 const WHAT_IS_ORDERED = { zero: "Take machine zero", accept: "Accept gauges", shadow: "Run as a shadow", adopt: "Adopt the shadow's model", "no-model": "Run without effects" };
+
+function nameOf(order, subject) {
+  return order === "shadow" && !subject ? "End the shadow" : WHAT_IS_ORDERED[order];
+}
 
 export class Drawer {
   constructor(place, page) {
     Object.assign(this, { place, page, consequence: element("div"), said: element("p", { class: "said", role: "status" }) });
+    this.models = new ModelList();
+    this.recordings = new Recordings(page, (text) => this.say(text));
     this.build();
   }
 
@@ -19,47 +23,43 @@ export class Drawer {
     return !this.place.hidden;
   }
 
+  get armed() {
+    return (this.page.armed_until ?? 0) > performance.now() / 1000;
+  }
+
   toggle() {
     this.place.hidden = !this.place.hidden;
-    if (this.open) {
-      this.list();
-      this.place.querySelector("button").focus();
-    }
+    if (!this.open) return;
+    this.models.list();
+    this.recordings.list();
+    this.place.querySelector("button").focus();
   }
 
   build() {
     const button = (text, onclick, more = {}) => element("button", { type: "button", onclick, ...more }, text);
+    const order = (name, subject, id = name) => button(nameOf(name, subject()), () => this.ask(name, subject()), { id: `order-${id}` });
+    const chosen = () => this.models.chosen;
     this.arm = button("Arm for 60 s", () => this.armOrNot(), { id: "arm" });
-    this.file = element("input", { type: "text", placeholder: "/path/of/a.model.yaml", "aria-label": "Model file on the daemon's computer" });
-    this.name = element("input", { type: "text", placeholder: "name of a recording", "aria-label": "Name of the recording" });
-    this.record = button("Record", () => this.startOrStop(), { id: "record" });
     this.looking = element("ul");
-    this.parts = element("tbody");
-    this.where = element("p", { class: "note" });
-    this.recorded = element("p", { class: "note" });
-    this.command = element("code", { class: "command" });
     this.place.replaceChildren(
-      element("div", { class: "row" }, element("h2", {}, "Orders"), button("Close (Esc)", () => this.toggle())),
+      element("div", { class: "row head" }, element("h2", {}, "Orders"), button("Close (Esc)", () => this.toggle())),
       element("p", { class: "note" }, "The page only looks until you arm it. Everybody who looks sees who is armed."),
       element("div", { class: "row" }, this.arm),
-      element("div", { class: "row" }, ...["zero", "accept"].map((name) => button(WHAT_IS_ORDERED[name], () => this.ask(name, name === "accept" ? "all" : ""), { id: `order-${name}` }))),
-      element("div", { class: "row" }, this.file),
-      element("div", { class: "row" }, ...["shadow", "adopt", "no-model"].map((name) => button(WHAT_IS_ORDERED[name], () => this.ask(name, this.file.value.trim()), { id: `order-${name}` }))),
+      element("div", { class: "row" }, order("zero", () => ""), order("accept", () => "all")),
+      element("h3", {}, "Model"),
+      ...this.models.parts,
+      element("div", { class: "row" }, button(WHAT_IS_ORDERED.shadow, () => this.ask("shadow", chosen()), { id: "order-shadow" }), order("shadow", () => "", "no-shadow"), button(WHAT_IS_ORDERED.adopt, () => this.ask("adopt", chosen()), { id: "order-adopt" }), order("no-model", () => "")),
       this.consequence,
       this.said,
       element("h2", {}, "Who is looking"),
       this.looking,
       element("h2", {}, "Recordings"),
-      element("div", { class: "row" }, this.name, this.record, button("Burst of 5 s", () => this.begin(5), { id: "burst" })),
-      this.recorded,
-      this.where,
-      this.command,
-      element("table", {}, this.parts),
+      ...this.recordings.parts,
     );
   }
 
   async armOrNot() {
-    const armed = (this.page.armed_until ?? 0) > performance.now() / 1000;
+    const armed = this.armed;
     const told = await post("arm", { id: this.page.id, arm: !armed });
     if (!told.ok) return this.say(told.reason);
     this.page.armed_until = performance.now() / 1000 + told.armed_s;
@@ -72,65 +72,46 @@ export class Drawer {
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
     const told = await response.json();
     this.say("");
-    const give = element("button", { type: "button", id: "confirm", onclick: () => this.give(name, subject) }, WHAT_IS_ORDERED[name]);
+    const title = nameOf(name, subject);
+    // what is told is what is given: the file that a name stands for now, not later
+    const give = element("button", { type: "button", id: "confirm", onclick: () => this.give(name, told.subject || subject) }, title);
     give.disabled = !told.possible;
-    this.consequence.replaceChildren(
-      element("div", { class: "consequence" }, element("b", {}, WHAT_IS_ORDERED[name]), element("p", {}, told.text), element("code", {}, told.command), give, " ", element("button", { type: "button", onclick: () => this.consequence.replaceChildren() }, "Leave it")),
-    );
+    const leave = element("button", { type: "button", onclick: () => this.consequence.replaceChildren() }, "Leave it");
+    this.tell(element("b", {}, title), element("p", {}, told.text), new CommandLine(told.command).row, element("div", { class: "row" }, give, leave));
+  }
+
+  tell(...parts) {
+    const box = element("div", { class: "consequence" }, ...parts);
+    this.consequence.replaceChildren(box);
+    box.scrollIntoView({ block: "nearest" });
   }
 
   // Second step: the order.
   async give(name, subject) {
-    if ((this.page.armed_until ?? 0) < performance.now() / 1000) return this.say("Arm the page first.");
+    if (!this.armed) return this.say("Arm the page first.");
     this.say("…");
     const told = await post(`orders/${name}`, { id: this.page.id, subject });
     if (told.value === "zero_differs") {
       this.say(told.reason);
       const replace = element("button", { type: "button", onclick: () => this.give("zero", "replace") }, "It is the zero position: take it");
-      this.consequence.replaceChildren(element("div", { class: "consequence" }, element("p", {}, told.reason), replace));
-      return;
+      return this.tell(element("p", {}, told.reason), new CommandLine(told.command).row, replace);
     }
     this.consequence.replaceChildren();
-    this.say(told.ok ? `Done: ${WHAT_IS_ORDERED[name].toLowerCase()}.` : `Refused: ${told.reason}`);
+    this.say(told.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${told.reason}`);
   }
 
   say(text) {
     this.said.textContent = text ?? "";
   }
 
-  async startOrStop() {
-    if (this.page.slow?.recording) {
-      await post("recordings", { stop: true });
-      this.list();
-    } else this.begin(null);
-  }
-
-  async begin(burst_s) {
-    const told = await post("recordings", { name: this.name.value.trim(), burst_s });
-    this.say(told.ok ? "" : told.reason);
-    this.list();
-  }
-
-  async list() {
-    const told = await (await fetch("recordings")).json();
-    this.where.textContent = `in ${told.directory}`;
-    this.command.textContent = told.command;
-    this.parts.replaceChildren(
-      ...told.parts.map((part) =>
-        element("tr", {}, element("td", {}, element("a", { href: `recordings/${part.name}`, download: true }, part.name)), element("td", { class: "number" }, `${(part.bytes / 1e6).toFixed(2)} MB`), element("td", {}, new Date(part.changed).toLocaleString())),
-      ),
-    );
-  }
-
-  show({ browsers, recording, last_words }) {
-    const armed = (this.page.armed_until ?? 0) > performance.now() / 1000;
-    this.arm.textContent = armed ? "Disarm" : "Arm for 60 s";
-    this.arm.disabled = this.page.role !== "owner";
-    for (const name of ["record", "burst"]) this.place.querySelector(`#${name}`).disabled = this.page.role !== "owner" || (name === "burst" && Boolean(recording));
-    this.looking.replaceChildren(...browsers.map((browser) => element("li", {}, `${browser.name}, ${browser.address}, ${browser.role === "view" ? "looks only" : browser.armed_s ? `ARMED, ${Math.ceil(browser.armed_s)} s left` : "not armed"}, for ${ago(browser.connected_s)}`)));
-    this.record.textContent = recording ? `Stop ${recording.name}` : "Record";
-    if (this.recording && !recording && this.open) this.list();
-    this.recording = recording;
-    this.recorded.textContent = last_words || (recording ? `recording ${recording.name} since ${new Date(recording.started * 1000).toLocaleTimeString()}` : "");
+  // The slow event.
+  show(event) {
+    this.arm.textContent = this.armed ? "Disarm" : "Arm for 60 s";
+    this.arm.disabled = this.page.role !== "operate";
+    this.looking.replaceChildren(...event.browsers.map((browser) => element("li", {}, `${browser.name}, ${browser.address}, ${browser.role === "view" ? "looks only" : browser.armed_s ? `ARMED, ${Math.ceil(browser.armed_s)} s left` : "not armed"}, for ${ago(browser.connected_s)}`)));
+    this.recordings.show(event, this.open);
+    const models = JSON.stringify(event.status?.model);
+    if (this.open && this.running !== models) this.models.list();
+    this.running = models;
   }
 }

@@ -1,8 +1,23 @@
-// Numbers in a fixed width, so that nothing jumps.
+// Numbers with their sign and always as many decimals, so that nothing jumps.
 export function signed(value, digits = 1) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = Math.abs(value).toFixed(digits);
   return (value < 0 && Number(text) !== 0 ? "−" : "+") + text;
+}
+
+// The tip in {M}; blanks as wide as a figure keep y and z where they are, as far as a metre.
+export function tipText(tip_M_mm, u_tip_um) {
+  const axes = ["x", "y", "z"].map((axis, k) => {
+    const u = u_tip_um ? ` ± ${(2 * u_tip_um[k]).toFixed(1)} µm` : "";
+    return `${axis} ${signed(tip_M_mm[k], 4)}${u}`.padStart(k ? 11 + u.length : 0, "\u2007");
+  });
+  return `${axes.join("  ")} mm`;
+}
+
+// Date and time by ISO 8601, in this computer's zone: no country reads them otherwise.
+export function dateText(date) {
+  const two = (number) => String(number).padStart(2, "0");
+  return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toTimeString().slice(0, 8)}`;
 }
 
 export function ago(seconds) {

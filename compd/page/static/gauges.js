@@ -1,73 +1,100 @@
 // The gauges: a line while all are good, else a table, the worst first.
 import { ago, element } from "./format.js";
+import { GaugeRow } from "./gauge_row.js";
+import { Traces } from "./spark.js";
 
 // The table is written so often, ms: numbers that change faster cannot be read.
 const WRITE_EVERY_MS = 500;
+// Good gauges change places when their age has gone from one of so many parts of what is allowed to another.
+const PARTS_OF_AGE = 4;
 
 export class Gauges {
-  constructor(place, summary, drawer) {
-    this.place = place;
-    this.summary = summary;
-    this.drawer = drawer;
-    this.open = false;
-    this.faults = {};
+  constructor(place, summary, { accept, select }) {
+    Object.assign(this, { place, summary, accept, select, open: false, faults: null });
   }
 
   begin(machine) {
-    this.wiring = machine.wiring.map((wire) => ({ ...wire, measures: wire.name ?? (wire.distance ? `frame ${wire.distance}` : `${wire.kind} of link ${wire.link}${wire.role ? `, ${wire.role}` : ""}`) }));
-    this.button = element("button", { type: "button", onclick: () => this.toggle() }, "show all");
+    this.rows = machine.wiring.map((wire) => new GaugeRow(wire, { accept: this.accept, select: this.select }));
+    this.traces = new Traces(this.rows.length);
+    this.button = element("button", { type: "button", onclick: () => this.toggle() }, this.open ? "fold" : "show all");
     this.body = element("tbody");
-    const names = ["measures", "channel", "since zero", "age", "quality", "faults"];
-    const head = element("tr", {}, ...names.map((name) => element("th", { class: ["since zero", "faults"].includes(name) ? "number" : "" }, name)));
-    this.table = element("table", {}, element("thead", {}, head), this.body);
+    this.since = element("small");
+    const head = (name, ...more) => element("th", { class: ["since zero", "faults"].includes(name) ? "number" : "", scope: "col" }, name, ...more);
+    const recent = element("th", { class: "number", scope: "col" }, this.since);
+    this.table = element("table", {}, element("thead", {}, element("tr", {}, head("measures"), head("since zero"), head("age"), head("last 60 s, range"), head("quality"), head("faults"), recent)), this.body);
     this.table.hidden = true;
+    this.order = "";
     this.place.replaceChildren(this.button, this.table);
     this.written_ms = -WRITE_EVERY_MS;
+    this.recalled = false;
+  }
+
+  // The minute before `unix_s`, from the page's server.
+  async recall(traces, unix_s) {
+    this.recalled = true;
+    const answer = await fetch(`traces?unix_s=${unix_s}`).catch(() => null);
+    if (answer?.ok) traces.recall(await answer.json());
   }
 
   toggle() {
     this.open = !this.open;
     this.button.textContent = this.open ? "fold" : "show all";
     this.written_ms = -WRITE_EVERY_MS;
-    if (this.told) this.show(this.told);
+    if (this.told) this.show(this.told, this.minute);
   }
 
-  // Faults of each gauge since the daemon's start, from STATUS.
-  count(status) {
-    const polled = Object.values(status.lines).flatMap((line) => Object.entries(line.gauges));
-    this.faults = Object.fromEntries(polled.map(([name, told]) => [name, Object.values(told.faults).reduce((a, b) => a + b, 0)]));
+  // Faults of each gauge, of the slow event.
+  count(faults) {
+    this.faults = faults;
+    this.since.textContent = !faults ? "" : faults.hour ? "in the last hour" : `since ${new Date(faults.since_s * 1000).toTimeString().slice(0, 5)}`;
   }
 
-  show(event) {
-    this.told = event;
+  // Every event that was not late, frozen or not: the lines go on behind.
+  note({ unix_s, gauges }) {
+    if (!gauges || !this.traces) return;
+    if (!this.recalled) this.recall(this.traces, unix_s);
+    this.traces.note(unix_s, gauges);
+  }
+
+  // An event; with `minute` one that has been, of which faults are not counted.
+  show(event, minute) {
+    [this.told, this.minute] = [event, minute];
     const told = event.gauges;
-    if (performance.now() - this.written_ms < WRITE_EVERY_MS) return;
+    if (!told) {
+      this.summary.textContent = "not known";
+      this.table.hidden = true;
+      return;
+    }
+    if (!minute && performance.now() - this.written_ms < WRITE_EVERY_MS) return;
     this.written_ms = performance.now();
-    const gauges = this.wiring.map((wire, k) => ({ ...wire, ...told[k], share: (told[k].age_s ?? Infinity) / wire.stale_after_s }));
-    const bad = gauges.filter((gauge) => gauge.fault);
-    const oldest_s = Math.max(...gauges.filter((gauge) => !gauge.fault).map((gauge) => gauge.age_s), 0);
-    this.summary.textContent = bad.length ? `${bad.length} of ${gauges.length} not good` : `${gauges.length} good, oldest ${ago(oldest_s)}`;
-    this.table.hidden = !this.open && !bad.length;
+    const bad = told.filter((gauge) => gauge.fault).length;
+    const oldest_s = Math.max(...told.filter((gauge) => !gauge.fault).map((gauge) => gauge.age_s), 0);
+    this.summary.textContent = bad ? `${bad} of ${told.length} not good` : `${told.length} good, oldest ${ago(oldest_s)}`;
+    this.table.hidden = !this.open && !bad;
     if (this.table.hidden) return;
-    gauges.sort((a, b) => Boolean(b.fault) - Boolean(a.fault) || b.share - a.share);
-    this.body.replaceChildren(...(this.open ? gauges : gauges.slice(0, bad.length)).map((gauge) => this.row(gauge)));
+    this.rows.forEach((row, k) => row.show(told[k], minute || !this.faults ? null : this.faultsOf(row)));
+    const shown = this.sorted();
+    const { times_s, values } = minute?.traces ?? { times_s: this.traces.times, values: this.traces.values };
+    const place = (row) => this.rows.indexOf(row);
+    shown.forEach((row) => row.draw(times_s, values[place(row)] ?? []));
   }
 
-  row(gauge) {
-    const fill = element("i");
-    fill.style.width = `${100 * Math.min(1, gauge.share)}%`;
-    const unit = gauge.kind === "quantity" ? "" : " mm";
-    const accept = gauge.fault === "distrusted" ? [" ", element("button", { type: "button", onclick: () => this.drawer.ask("accept", gauge.channel) }, "Accept …")] : [];
-    const quality = gauge.fault ? `${gauge.fault.replaceAll("_", " ")}${gauge.detail ? `: ${gauge.detail}` : ""}` : "ok";
-    return element(
-      "tr",
-      { class: gauge.fault ? "bad" : "" },
-      element("td", { class: "name" }, gauge.measures),
-      element("td", { class: "name" }, gauge.channel),
-      element("td", { class: "number value" }, gauge.value === undefined ? "–" : gauge.value.toFixed(gauge.kind === "quantity" ? 2 : 4) + unit),
-      element("td", { class: "name" }, element("span", { class: gauge.fault ? "age old" : "age" }, fill), gauge.age_s === undefined ? "" : ` ${ago(gauge.age_s)}`),
-      element("td", { class: "quality", title: quality }, ...accept, quality),
-      element("td", { class: "number" }, String(this.faults[gauge.channel.split(".")[0]] ?? "")),
-    );
+  faultsOf(row) {
+    const gauge = row.wire.channel.split(".")[0];
+    return { total: this.faults.total[gauge], recent: this.faults.recent[gauge] };
+  }
+
+  // The rows to be shown, in the table in their order.
+  sorted() {
+    const part = (row) => Math.floor(PARTS_OF_AGE * Math.min(row.share, 1));
+    const sorted = this.rows.filter((row) => this.open || row.bad).sort((a, b) => b.bad - a.bad || part(b) - part(a));
+    const order = sorted.map((row) => row.wire.channel).join();
+    if (order !== this.order) {
+      const focused = document.activeElement;
+      this.body.replaceChildren(...sorted.map(({ row }) => row));
+      if (this.body.contains(focused)) focused.focus();
+      this.order = order;
+    }
+    return sorted;
   }
 }

@@ -1,14 +1,21 @@
 // The last hour: its states as a tape, and what has moved the tip; a click goes there, and what is shown stands still.
-import { element, ink, prepared, signed } from "./format.js";
+import { element, ink, prepared } from "./format.js";
+import { NOT_KEPT, clock as exactly } from "./past.js";
 import { appearance, COLOURS, NAMES } from "./states.js";
 
 const HOUR_S = 3600;
-const clock = (time_s, seconds = true) => new Date(time_s * 1000).toTimeString().slice(0, seconds ? 8 : 5);
+const MINUTE_S = 60;
+const HOW_TO = "Click to go there; ← → scrub, space stops and goes on.";
+const clock = (time_s) => new Date(time_s * 1000).toTimeString().slice(0, 5);
 const DRAW_EVERY_MS = 1000;
+// The worse a state, the higher it stands on the tape, px from its edges: not by colour alone.
+const INSET = { good: 8, care: 4, bad: 0, gone: 12 };
 
 export class Hour {
   constructor(tape, place, scrub, links) {
     Object.assign(this, { tape, place, scrub, links, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
+    scrub.textContent = HOW_TO;
+    tape.addEventListener("pointermove", (event) => this.name(this.timeAt(event.offsetX)));
     tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
   }
 
@@ -65,6 +72,13 @@ export class Hour {
     return this.end_s - HOUR_S * (1 - x / this.tape.clientWidth);
   }
 
+  // Time and state under the pointer.
+  name(time_s) {
+    const k = this.times.findIndex((time) => time >= time_s);
+    const known = k >= 0 && this.times[k] < time_s + 2;
+    this.tape.title = `${clock(time_s)} ${known ? (Number.isNaN(this.rows[k][0]) ? "no daemon" : NAMES[this.rows[k][0]] ?? "unknown") : "not kept"}`;
+  }
+
   draw(now = false) {
     if (!now && (performance.now() - this.drawn_ms < DRAW_EVERY_MS || document.hidden)) return;
     this.drawn_ms = performance.now();
@@ -78,7 +92,8 @@ export class Hour {
       context.fillStyle = COLOURS[tone];
       // what is not good is never thinner than two pixels
       const wide = Math.max(pixel * 1.05, tone === "good" ? 0.5 : 2);
-      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, tone === "good" ? 6 : 0, wide, tone === "good" ? height - 12 : height);
+      const inset = INSET[tone];
+      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, inset, wide, height - 2 * inset);
     });
     if (this.at_s !== null) {
       context.fillStyle = ink("--ink");
@@ -99,27 +114,37 @@ export class Hour {
         legend: { show: false },
         cursor: { drag: { x: false, y: false } },
         scales: { x: { range: () => [this.end_s - HOUR_S, this.end_s] } },
-        axes: [{ ...axis, values: (_, times) => times.map((time) => clock(time, false)) }, { ...axis, size: 44 }],
-        series: [{}, ...[["x", "#0072b2"], ["y", "#e69f00"], ["z", "#cc79a7"]].map(([label, stroke]) => ({ label, stroke, width: 1.5, points: { show: false }, spanGaps: false }))],
+        axes: [{ ...axis, size: 24, values: (_, times) => times.map((time) => clock(time)) }, { ...axis, size: 44 }],
+        series: [{}, ...[["x", () => ink("--line"), []], ["y", "#e69f00", [6, 3]], ["z", "#cc79a7", [2, 2]]].map(([label, stroke, dash]) => ({ label, stroke, dash, width: 1.5, points: { show: false }, spanGaps: false }))],
       }, data, this.place);
-      this.place.append(element("p", { class: "note" }, "what has moved the tip, µm: x blue, y orange, z purple"));
+      this.place.append(element("p", { class: "note" }, "tip displacement, µm: x blue, y orange dashed, z purple dotted"));
       new ResizeObserver(() => this.chart.setSize({ width: this.place.clientWidth, height: 130 })).observe(this.place);
     } else this.chart.setData(data);
   }
 
-  // Show the second that is nearest to `time_s`, and stand still.
-  go(time_s) {
+  // The seconds of the minute before `at_s`: times, corrections of the links, places of the tip.
+  minute(at_s) {
+    const [links, tip] = [this.columns.filter((name) => name.startsWith("correction_")).length, this.columns.indexOf("tip_x_mm")];
+    const kept = this.times.map((_, k) => k).filter((k) => this.times[k] >= at_s - MINUTE_S && this.times[k] <= at_s);
+    return {
+      times: kept.map((k) => this.times[k]),
+      corrections_um: kept.map((k) => [...this.rows[k].slice(1, 1 + links)]),
+      tips_mm: kept.map((k) => [...this.rows[k].slice(tip, tip + 3)]),
+    };
+  }
+
+  // Stand still at the event that is shown.
+  stop(event) {
+    if (event) this.go(event.unix_s, event);
+  }
+
+  // Stand still at `time_s`, or what is kept next to it; of that, `event` is known already.
+  go(time_s, event = null) {
     if (!this.times.length) return;
-    let k = this.times.findIndex((time) => time >= time_s);
-    if (k < 0) k = this.times.length - 1;
-    this.at_s = this.times[k];
-    const row = this.rows[k];
-    const corrections = this.corrections(row);
-    const state = Number.isNaN(row[0]) ? "no daemon" : NAMES[row[0]] ?? "unknown";
-    const numbers = Number.isNaN(row[1]) ? "" : `; corrections ${corrections.map((um) => signed(um)).join(", ")} µm; tip moved ${[...row.slice(-3)].map((um) => signed(um)).join(", ")} µm`;
-    this.scrub.textContent = `${clock(this.at_s)}: ${state}${numbers}`;
-    this.links.past(corrections);
-    document.dispatchEvent(new CustomEvent("freeze", { detail: { frozen: true, at_s: this.at_s } }));
+    const newest_s = Math.max(this.end_s, event?.unix_s ?? 0);
+    this.at_s = Math.min(Math.max(time_s, this.times[0]), newest_s);
+    this.scrub.textContent = `${exactly(this.at_s)} is shown: the last minute is kept by tenths of a second, the hour by seconds. ${NOT_KEPT}`;
+    document.dispatchEvent(new CustomEvent("freeze", { detail: { at_s: this.at_s, event } }));
     this.draw(true);
   }
 
@@ -129,7 +154,7 @@ export class Hour {
 
   follow() {
     this.at_s = null;
-    this.scrub.textContent = "Click to go there; arrows scrub, space goes on.";
+    this.scrub.textContent = HOW_TO;
     this.draw(true);
   }
 }

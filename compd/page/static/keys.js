@@ -2,9 +2,11 @@
 export function bindKeys({ page, machine, hour, drawer, freeze }) {
   const list = document.getElementById("keys");
   const actions = {
-    " ": () => (page.frozen ? freeze(false) : hour.step(0)),
+    " ": () => (page.frozen ? freeze(false) : hour.stop(page.live)),
     ArrowLeft: (event) => hour.step(event.shiftKey ? -60 : -1),
     ArrowRight: (event) => hour.step(event.shiftKey ? 60 : 1),
+    ",": () => hour.step(-0.1),
+    ".": () => hour.step(0.1),
     o: () => drawer.toggle(),
     "?": () => list.showModal(),
     Escape: () => (drawer.open ? drawer.toggle() : page.frozen && freeze(false)),

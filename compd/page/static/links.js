@@ -1,10 +1,12 @@
 // One strip for each link: the correction of the last minute with its limits, the number, and what it is made of.
-import { scaleFor, stack } from "./budget.js";
+import { keptScale, outline, stack } from "./bar.js";
 import { element, ink, signed } from "./format.js";
 
 const SPAN_S = 60;
 // Charts are drawn so often, ms: a line moves by a pixel a tenth of a second at most.
 const DRAW_EVERY_MS = 100;
+// Of a strip, px: on a small screen the tip stands below them without scrolling.
+const heightOf = (count) => (count === 6 ? 54 : window.innerHeight <= 820 ? 80 : 108);
 
 export class Links {
   constructor(place, page) {
@@ -23,7 +25,8 @@ export class Links {
     this.corrections = Array.from({ length: count }, () => []);
     this.charts?.forEach((chart) => chart.destroy());
     this.rows = this.corrections.map((_, link) => this.row(link, count));
-    this.place.replaceChildren(...this.rows.map(({ row }) => row));
+    this.scale = element("p", { class: "note" });
+    this.place.replaceChildren(...this.rows.map(({ row }) => row), this.scale);
     this.charts = this.rows.map(({ plot }) => this.chart(plot, count));
     new ResizeObserver(() => this.charts.forEach((chart, k) => chart.setSize({ width: this.rows[k].plot.clientWidth, height: chart.height }))).observe(this.place);
   }
@@ -36,7 +39,7 @@ export class Links {
     const label = element("div", { class: "number" }, number, sources);
     const row = element("div", { class: "strip", onclick: () => this.select(link + 1) }, label, plot, bar);
     row.title = `link ${link + 1}`;
-    plot.style.height = `${count === 6 ? 54 : 108}px`;
+    plot.style.height = `${heightOf(count)}px`;
     return { row, number, sources, plot, bar };
   }
 
@@ -44,12 +47,12 @@ export class Links {
     const limit = () => this.limit_um;
     const options = {
       width: place.clientWidth || 300,
-      height: count === 6 ? 54 : 108,
+      height: heightOf(count),
       cursor: { show: false },
       legend: { show: false },
       scales: { x: { time: false, range: (_, __, max) => [max - SPAN_S, max] }, y: { range: (_, low, high) => this.range(low, high) } },
       axes: [{ show: false }, { size: 44, stroke: () => ink("--soft"), grid: { stroke: () => ink("--rule"), width: 1 }, ticks: { show: false }, space: 24, font: "11px system-ui" }],
-      series: [{}, { stroke: "#0072b2", width: 1.5, points: { show: false } }],
+      series: [{}, { stroke: () => ink("--line"), width: 1.5, points: { show: false } }],
       hooks: {
         draw: [(chart) => {
           for (const edge of [limit(), -limit()]) {
@@ -100,44 +103,43 @@ export class Links {
     this.corrections = this.corrections.map((line, link) => [...earlier.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link])), ...line]);
   }
 
-  // The numbers of a moment that has been, while the page is frozen.
-  past(corrections_um) {
-    this.rows?.forEach(({ number, sources, bar }, k) => {
-      number.textContent = signed(corrections_um[k]);
-      sources.textContent = `link ${k + 1}, then`;
-      bar.replaceChildren();
-    });
+  // The minute before a moment that has been: what came by tenths of a second, and before that the seconds of the hour.
+  lines({ at_s, times, corrections_um }) {
+    const end = this.times.findIndex((time) => time > at_s);
+    const fine = this.times.slice(0, end < 0 ? undefined : end);
+    const coarse = times.map((_, k) => k).filter((k) => times[k] < (fine[0] ?? Infinity));
+    const numbers = (link) => coarse.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link]));
+    const all = [...coarse.map((k) => times[k]), ...fine];
+    return this.corrections.map((line, link) => [all, [...numbers(link), ...line.slice(0, fine.length)]]);
   }
 
-  show({ setpoint }) {
+  // An event; with `minute` one that has been.
+  show({ setpoint }, minute) {
     const now_ms = performance.now();
-    if (now_ms - this.drawn_ms >= DRAW_EVERY_MS && !document.hidden) {
+    if (minute) {
+      this.lines(minute).forEach((line, k) => this.charts[k].setData(line));
+    } else if (now_ms - this.drawn_ms >= DRAW_EVERY_MS && !document.hidden) {
       this.drawn_ms = now_ms;
       this.charts.forEach((chart, k) => chart.setData([this.times, this.corrections[k]]));
     }
     if (!setpoint.valid) {
-      this.rows.forEach(({ number, sources, bar }) => {
+      this.rows.forEach(({ number, sources, bar }, k) => {
         number.textContent = "–";
-        sources.textContent = "not valid";
+        sources.textContent = `link ${k + 1}\nnot valid`;
         bar.replaceChildren();
       });
       return;
     }
     const causes = Object.values(setpoint.sources_mm);
-    const wanted = scaleFor(Math.max(...setpoint.correction_mm.map((_, k) => causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0)), 0.5));
-    if (wanted > this.scale_um || wanted < this.scale_um / 4) this.scale_um = wanted;
-    const shadow = setpoint.shadow?.correction_mm;
+    const shadow_um = setpoint.shadow?.correction_mm?.map((value) => value * 1000);
+    const ends = setpoint.correction_mm.map((_, k) => Math.max(causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0), Math.abs(shadow_um?.[k] ?? 0)));
+    this.scale_um = keptScale(this.scale_um, Math.max(...ends));
+    this.scale.textContent = `Colours: causes, as at the tip. Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
-      sources.textContent = `link ${k + 1}${shadow ? `, shadow ${signed(shadow[k] * 1000)}` : ` of ±${this.limit_um.toFixed(0)}`}`;
+      sources.textContent = `link ${k + 1}${shadow_um ? `\nshadow ${signed(shadow_um[k])}` : ""}`;
       stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
-      if (shadow) {
-        const outline = element("i", { class: "shadow", title: "the shadow model" });
-        const value = Math.max(-50, Math.min(50, (50 * shadow[k] * 1000) / this.scale_um));
-        outline.style.left = `${50 + Math.min(0, value)}%`;
-        outline.style.width = `${Math.abs(value)}%`;
-        bar.append(outline);
-      }
+      if (shadow_um) outline(bar, shadow_um[k], this.scale_um);
     });
   }
 }

@@ -3,6 +3,8 @@ import { ink, prepared, signed } from "./format.js";
 
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
 const TRAIL_S = 10;
+// The colour scale ends no nearer to nought, µm: noise does not look like a movement.
+const LEAST_UM = 1;
 const VIEWS = { f: [0, 0], s: [Math.PI / 2, 0], t: [0, Math.PI / 2 - 1e-3] };
 
 // Blue below nothing, grey at nothing, vermilion above.
@@ -55,20 +57,32 @@ export class Machine {
     this.frame = Object.fromEntries(machine.wiring.map((wire, k) => [wire.distance, k]).filter(([distance]) => distance));
   }
 
+  // Mark a rod of the frame, or none.
+  select(rod) {
+    this.rod = this.rod === rod ? null : rod;
+    this.draw();
+  }
+
   view(key) {
     [this.turn, this.tilt] = VIEWS[key];
     this.draw();
   }
 
-  show({ scene, setpoint, gauges }) {
+  // An event; with `minute` one that has been.
+  show({ scene, setpoint, gauges }, minute) {
     this.scene = scene;
+    if (minute || this.past) this.trail = [];
+    this.past = Boolean(minute);
+    minute?.times.forEach((time_s, k) => {
+      if (time_s >= minute.at_s - TRAIL_S && !Number.isNaN(minute.tips_mm[k][0])) this.trail.push([time_s, minute.tips_mm[k]]);
+    });
     if (scene) {
       this.corrections_um = setpoint.correction_mm.map((value) => value * 1000);
       this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, gauges[k].fault || gauges[k].value === undefined ? null : gauges[k].value * 1000]));
-      const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), 0.1);
+      const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), LEAST_UM);
       if (!document.getElementById("lock").checked) this.largest_um = largest;
-      this.trail.push([setpoint.time_s, scene.tip]);
-      while (this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();
+      this.trail.push([minute?.at_s ?? setpoint.time_s, scene.tip]);
+      while (!minute && this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();
     }
     this.draw();
   }
@@ -92,6 +106,7 @@ export class Machine {
     this.parts = [];
     if (!this.scene) {
       context.fillStyle = ink("--soft");
+      context.font = "13px system-ui";
       context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
       return;
     }
@@ -124,6 +139,7 @@ export class Machine {
     for (const [name, [from, i, to, k]] of Object.entries(RODS)) {
       const um = this.rods_um?.[name];
       const ends = [this.scene[from][i], this.scene[to][k]];
+      if (this.rod === name) line(ends, ink("--ink"), 6);
       line(ends, um === null || um === undefined ? "#8c959f55" : diverging(um / this.largest_um), 2);
       this.parts.push({ ends: ends.map(place), text: `rod ${name}: ${signed(um)} µm since machine zero` });
     }
@@ -141,7 +157,7 @@ export class Machine {
       context.font = "bold 12px system-ui";
       context.fillText(String(k + 1), x + 8, y - 6);
     });
-    line(this.trail.map(([, point]) => point), "#0072b2", 1.5);
+    line(this.trail.map(([, point]) => point), ink("--line"), 1.5);
     const [x, y] = place(tip);
     context.beginPath();
     context.arc(x, y, 4, 0, 7);

@@ -1,5 +1,5 @@
 // The page: takes the events, paints the newest of them once a frame, and never an old one as the present.
-import { Age } from "./age.js";
+import { Age, SILENT_S } from "./age.js";
 import { showBanner } from "./banner.js";
 import { Budget } from "./budget.js";
 import { Drawer } from "./drawer.js";
@@ -8,6 +8,7 @@ import { Hour } from "./hour.js";
 import { bindKeys } from "./keys.js";
 import { Links } from "./links.js";
 import { Machine } from "./machine.js";
+import { NOT_KEPT, Past, clock, tellMoment } from "./past.js";
 import { showTiming } from "./timing.js";
 
 export const page = { live: null, slow: null, machine: null, id: "", role: "view", frozen: false, selected: 0, unpainted: false };
@@ -17,16 +18,23 @@ const at = (id) => document.getElementById(id);
 const drawer = new Drawer(at("drawer"), page);
 const machine = new Machine(at("scene"), at("colours"), page);
 const links = new Links(at("strips"), page);
-const budget = new Budget(at("budget"), page);
-const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), drawer);
+const budget = new Budget(at("budget"));
+const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), {
+  accept: (channel) => drawer.ask("accept", channel),
+  select: (wire) => (wire.link ? links.select(wire.link) : machine.select(wire.distance)),
+});
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
+const parts = [machine, links, budget, gauges];
+const past = new Past((event) => page.frozen && showPast(event, event?.unix_s ?? hour.at_s));
+// In the place of a setpoint that is not there: the numbers before it are not shown on.
+const NOTHING = { setpoint: { valid: false }, scene: null, budget: null, gauges: null };
 
 function begin(told) {
   page.machine = told;
   if (!told) return;
   document.title = `${told.machine} · compd`;
   at("machine-name").textContent = told.machine;
-  for (const part of [machine, links, budget, gauges]) part.begin(told);
+  for (const part of parts) part.begin(told);
   hour.begin();
 }
 
@@ -34,10 +42,19 @@ function paint() {
   requestAnimationFrame(paint);
   const behind_s = age.behind_s;
   showBanner(page, behind_s);
-  if (!page.unpainted || page.frozen || behind_s) return;
+  const alone = behind_s > SILENT_S;
+  if (page.frozen || !page.machine || (alone ? page.blank : behind_s || !page.unpainted)) return;
   page.unpainted = false;
-  if (!page.live?.connected || !page.live.setpoint) return;
-  for (const part of [machine, links, budget, gauges]) part.show(page.live);
+  page.blank = alone;
+  const known = !alone && page.live?.connected && page.live.setpoint;
+  for (const part of parts) part.show(known ? page.live : NOTHING);
+}
+
+// All parts as they were at `at_s`; `event` is null where nothing is known of it.
+function showPast(event, at_s) {
+  const minute = { at_s, traces: event?.traces ?? gauges.traces.copy(), ...hour.minute(at_s) };
+  for (const part of parts) part.show(event?.setpoint ? event : NOTHING, minute);
+  tellMoment(event, at_s);
 }
 
 function listen() {
@@ -56,6 +73,7 @@ function listen() {
     if (!late_s || late_s < 0.5) {
       links.note(told);
       hour.note(told);
+      gauges.note(told);
     }
   });
   on("slow", (told) => {
@@ -63,21 +81,28 @@ function listen() {
     drawer.show(told);
     if (page.frozen || !told.status) return;
     showTiming(at("timing"), told.status);
-    gauges.count(told.status);
+    gauges.count(told.faults);
   });
 }
 
-export function freeze(frozen, at_s) {
+// Stand still at `at_s`, of which `event` is known already, or is asked for; or go on.
+export function freeze(frozen, at_s, event) {
+  if (frozen && !page.frozen) at("loop-note").textContent = `As it was when the page was frozen, ${clock(Date.now() / 1000)}. ${NOT_KEPT}`;
   page.frozen = frozen;
-  at("frozen").hidden = !frozen;
-  if (frozen) at("frozen-at").textContent = new Date(at_s * 1000).toTimeString().slice(0, 8);
-  else hour.follow();
+  page.blank = false;
+  at("frozen").hidden = at("loop-note").hidden = !frozen;
+  document.body.toggleAttribute("data-frozen", frozen);
+  past.leave();
+  if (!frozen) hour.follow();
+  else if (event) showPast(event, at_s);
+  else past.ask(at_s);
 }
 
 at("thaw").addEventListener("click", () => freeze(false));
 at("role").addEventListener("click", () => drawer.toggle());
-document.addEventListener("freeze", (event) => freeze(event.detail.frozen, event.detail.at_s));
+document.addEventListener("freeze", (event) => freeze(true, event.detail.at_s, event.detail.event));
 bindKeys({ page, machine, hour, drawer, freeze });
 listen();
 paint();
+page.parts = { machine, links, budget, gauges, hour };
 window.compd = page; // for tests, and for the curious

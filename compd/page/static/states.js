@@ -11,3 +11,7 @@ export const COLOURS = { good: "#009e73", care: "#e69f00", bad: "#d55e00", gone:
 export function appearance(state) {
   return STATES[state] || ["bad", "?"];
 }
+
+export function stateName(state) {
+  return state.replaceAll("_", " ").toUpperCase();
+}

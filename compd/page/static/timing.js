@@ -1,5 +1,5 @@
 // How well the loop keeps time.
-import { element } from "./format.js";
+import { dateText, element } from "./format.js";
 
 export function showTiming(list, status) {
   const loop = status.loop;
@@ -12,7 +12,7 @@ export function showTiming(list, status) {
     ["cycle, 99 %", us(loop.cycle_p99_us)],
     ["missed cycles", `${loop.missed_cycles} of ${loop.cycles + loop.missed_cycles}`],
     ["real time", granted.join(", ")],
-    ["machine zero", status.zero.taken ? new Date(status.zero.taken_at).toLocaleString() : "none"],
+    ["machine zero", status.zero.taken ? dateText(new Date(status.zero.taken_at)) : "none"],
     ["model", status.model.applied?.effects.join(", ") || "no effects"],
     ["clients of the daemon", status.publisher.connected.map((one) => one.name + (one.controller ? " (controller)" : "")).join(", ")],
   ];

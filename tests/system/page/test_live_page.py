@@ -40,6 +40,7 @@ def test_every_part_shows_numbers(tab):
 
 def test_dragging_and_keys_turn_the_machine(tab):
     until(tab, "compd.live.scene && !compd.unpainted")
+    tab.keyboard.press(" ")  # one and the same moment
     before = tab.evaluate("document.getElementById('scene').toDataURL()")
     box = tab.locator("#scene").bounding_box()
     tab.mouse.move(box["x"] + 200, box["y"] + 200)
@@ -51,14 +52,70 @@ def test_dragging_and_keys_turn_the_machine(tab):
     assert len({before, dragged, tab.evaluate("document.getElementById('scene').toDataURL()")}) == 3
 
 
+def shown(tab):
+    """What the parts show, as text."""
+    return tab.evaluate(
+        "['strips', 'budget', 'gauge-table'].map((id) => document.getElementById(id).innerText).join()"
+        " + document.getElementById('scene').toDataURL()"
+    )
+
+
 def test_space_freezes_all_but_the_banner(tab):
     until(tab, "document.querySelector('#hour-chart canvas')")
+    tab.locator("#gauge-table button").click()
+    tab.locator("#scene").focus()  # space on a button presses the button
     tab.keyboard.press(" ")
     assert tab.locator("#frozen").is_visible()
-    number = text(tab, ".strip .number b >> nth=0")
-    tab.wait_for_timeout(500)
-    assert text(tab, ".strip .number b >> nth=0") == number
+    assert re.match(r"\S [A-Z]+", text(tab, "#frozen-state"))
+    before, unix_s = shown(tab), tab.evaluate("compd.live.unix_s")
+    until(tab, f"compd.live.unix_s > {unix_s} + 1")
+    assert shown(tab) == before
     tab.keyboard.press(" ")
+    assert not tab.locator("#frozen").is_visible()
+    until(tab, f"!compd.unpainted && compd.live.unix_s > {unix_s} + 2")
+    assert shown(tab) != before
+
+
+def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, live):
+    """A gauge of the frame is moved; then the page goes back to before that, and forth."""
+    until(tab, "document.querySelector('#hour-chart canvas')")
+    tab.locator("#gauge-table button").click()
+    until(tab, "compd.live.setpoint.state === 'ok' && (compd.test_s = compd.live.unix_s)")
+    before_s = tab.evaluate("compd.test_s")
+    until(tab, f"compd.live.unix_s > {before_s} + 1.5")
+    live.machine.ask("FAULT", line="frame_u", fault="unplugged")
+    try:
+        until(tab, "document.body.dataset.state === 'hold'")
+        tab.locator("#scene").focus()
+        tab.keyboard.press(" ")
+        until(tab, "document.getElementById('frozen-state').textContent.includes('HOLD')")
+        assert "not good" in text(tab, "#gauges-summary")
+        held = shown(tab)
+        tab.evaluate(f"document.dispatchEvent(new CustomEvent('freeze', {{ detail: {{ at_s: {before_s} }} }}))")
+        until(tab, "document.getElementById('frozen-state').textContent.includes('OK')")
+        assert shown(tab) != held
+        assert re.search(r"tip x .\d", text(tab, "#frozen-state"))
+        assert re.match(r"\d+ good", text(tab, "#gauges-summary"))
+        assert tab.evaluate("document.body.dataset.state") == "hold", "the banner goes on"
+        assert "not kept" in text(tab, "#loop-note")
+    finally:
+        live.machine.ask("FAULT", line="frame_u", fault=None)
+
+
+def test_arrows_and_points_scrub_by_a_second_and_a_tenth(tab):
+    until(tab, "document.querySelector('#hour-chart canvas') && compd.live.unix_s")
+    unix_s = tab.evaluate("compd.live.unix_s")
+    until(tab, f"compd.live.unix_s > {unix_s} + 4")
+    tab.keyboard.press(" ")
+    shown_at = "(() => { const [h, m, s] = document.getElementById('frozen-at').textContent.split(':').map(Number);"
+    shown_at += " return 3600 * h + 60 * m + s; })()"
+    start = tab.evaluate(shown_at)
+    tab.keyboard.press("ArrowLeft")
+    tab.keyboard.press("ArrowLeft")
+    until(tab, f"Math.abs({start} - {shown_at} - 2) < 0.16")
+    tab.keyboard.press(".")
+    until(tab, f"Math.abs({start} - {shown_at} - 1.9) < 0.16")
+    tab.keyboard.press("Escape")
     assert not tab.locator("#frozen").is_visible()
 
 

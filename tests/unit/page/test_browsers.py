@@ -21,7 +21,7 @@ def clock():
 
 def test_an_armed_browser_is_armed_for_a_minute_and_no_longer_than_its_connection(clock):
     browsers = Browsers(clock)
-    anna = browsers.connect("Anna", "10.0.0.1", "owner")
+    anna = browsers.connect("Anna", "10.0.0.1", "operate")
     assert browsers.armed(anna.id) is None
     assert browsers.arm(anna.id) is anna
     clock.now_s += ARMED_S - 0.1
@@ -43,7 +43,7 @@ def test_who_may_look_only_is_never_armed(clock):
 
 def test_everybody_sees_who_is_there_and_armed_and_nobody_another_ones_id(clock):
     browsers = Browsers(clock)
-    anna, screen = browsers.connect("Anna", "10.0.0.1", "owner"), browsers.connect("screen", "10.0.0.2", "view")
+    anna, screen = browsers.connect("Anna", "10.0.0.1", "operate"), browsers.connect("screen", "10.0.0.2", "view")
     browsers.arm(anna.id)
     clock.now_s += 20.0
     told = browsers.summary()

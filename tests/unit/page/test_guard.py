@@ -22,11 +22,11 @@ async def says_who(request):
 @pytest.fixture
 def client():
     app = Starlette(routes=[Route("/", says_who), Route("/order", says_who, methods=["POST"])])
-    tokens = [Token("Anna", "owner", hashed("anna's")), Token("screen", "view", hashed("screen's"))]
+    tokens = [Token("Anna", "operate", hashed("anna's")), Token("screen", "view", hashed("screen's"))]
     return TestClient(Guard(app, tokens, [f"http://{HOST}", "http://localhost:7760"], 7760), base_url=f"http://{HOST}")
 
 
-@pytest.mark.parametrize(("token", "who"), [("anna's", "Anna owner"), ("screen's", "screen view")])
+@pytest.mark.parametrize(("token", "who"), [("anna's", "Anna operate"), ("screen's", "screen view")])
 def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address(client, token, who):
     answer = client.get("/", params={"token": token}, follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (303, "/")
@@ -80,7 +80,7 @@ def test_every_answer_binds_the_browser_to_this_server(client):
 
 def test_behind_a_proxy_with_tls_its_name_is_the_only_one():
     app = Starlette(routes=[Route("/", says_who), Route("/order", says_who, methods=["POST"])])
-    guard = Guard(app, [Token("Anna", "owner", hashed("anna's"))], ["https://machine.example"], 7760)
+    guard = Guard(app, [Token("Anna", "operate", hashed("anna's"))], ["https://machine.example"], 7760)
     client = TestClient(guard, base_url="https://machine.example")
     answer = client.get("/", params={"token": "anna's"}, follow_redirects=False)
     assert "secure" in answer.headers["set-cookie"].lower()

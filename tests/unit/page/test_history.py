@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.page.history import History
+from compd.page.history import History, Traces
 
 BUDGET = {"tip_um": {"joints": [1.0, 2.0, 3.0], "frame": [0.5, 0.5, 0.5]}}
 
@@ -50,3 +50,16 @@ def test_what_is_not_known_is_nan_and_never_the_value_before():
     assert np.isnan(rows[1, 1:]).all()
     assert np.isnan(rows[2]).all()
     assert rows[3, 0] == -1.0
+
+
+def test_the_minute_of_a_gauge_before_a_moment():
+    traces = Traces(2)
+    for k in range(20 * 100):
+        traces.note(k / 20, [{"value": 400.0 + 1e-7 * (k // 20)}, {"fault": "timeout"}])
+    traces.note(100.0, [])
+    told = traces.minute(80.0)
+    assert len(told["times_s"]) == 60
+    assert told["times_s"][-1] == 80.0
+    assert told["values"][0][-1] == 400.000008, "to a tenth of a nanometre"
+    assert told["values"][1] == [None] * 60
+    assert traces.minute(1e6)["times_s"] == []

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
+from compd.errors import DaemonError
 from compd.page.daemon_link import DaemonLink
+from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders
 
 SETPOINT = {
@@ -31,7 +35,7 @@ def test_zero_names_the_gauges_the_old_zero_and_what_becomes_of_the_correction(l
     assert told.possible
     assert "21 gauges" in told.text
     assert "02:06" in told.text
-    assert "up to 10.0 um" in told.text
+    assert "up to 10.0 µm" in told.text
     assert told.command == "compd zero /run/compd/compd.sock"
 
 
@@ -55,27 +59,51 @@ def test_accept_names_the_gauges_that_wait_and_why(link):
 
 
 def test_a_model_is_adopted_when_its_shadow_has_told_the_change(link):
-    assert not Orders(link).consequence("adopt", "/a.yaml").possible
+    assert "no model runs" in Orders(link).consequence("adopt", "/a.yaml").text
+    link.models = {"applied": {"effects": []}, "shadow": {"effects": ["backlash"], "file": "/a.yaml"}}
+    assert not Orders(link).consequence("adopt", "/a.yaml").possible, "it has no numbers yet"
     link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
-    told = Orders(link).consequence("adopt", "/a.yaml")
+    told = Orders(link).consequence("adopt", "")
     assert told.possible
-    assert "-10.0 um at link 1" in told.text
+    assert told.subject == "/a.yaml", "without a name it is the shadow's, and never none"
+    assert told.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
+    other = Orders(link).consequence("adopt", "/b.yaml")
+    assert not other.possible
+    assert "/a.yaml runs as a shadow" in other.text, "the numbers would be another model's"
+    assert "-10.0 µm at link 1" in told.text
     assert "0.0 s" in told.text
 
 
 def test_without_effects_the_correction_loses_theirs(link):
     told = Orders(link).consequence("no-model", "")
-    assert "-5.0 um at link 1" in told.text
+    assert "-5.0 µm at link 1" in told.text
     assert told.command == "compd adopt --none --daemon /run/compd/compd.sock"
 
 
-def test_a_shadow_needs_a_file_that_is_there(link, tmp_path):
-    assert not Orders(link).consequence("shadow", str(tmp_path / "none.yaml")).possible
-    file = tmp_path / "a model's.yaml"
-    file.touch()
-    told = Orders(link).consequence("shadow", str(file))
+def test_a_model_file_is_chosen_by_its_name_or_named_by_its_absolute_path(link, tmp_path):
+    (tmp_path / "a model's.model.yaml").touch()
+    orders = Orders(link, ModelFiles(tmp_path))
+    told = orders.consequence("shadow", "a model's.model.yaml")
     assert told.possible
+    assert told.subject == str(tmp_path / "a model's.model.yaml")
     assert "'" in told.command, "quoted for the shell"
+    elsewhere = orders.consequence("shadow", "/elsewhere/b.yaml")
+    assert (elsewhere.possible, elsewhere.subject) == (True, "/elsewhere/b.yaml"), "the daemon looks, the page does not"
+
+
+@pytest.mark.parametrize("subject", ["", "../a.model.yaml", "b.model.yaml", "./a.model.yaml", "a.model.yaml\x00", "*"])
+def test_no_other_name_reaches_the_daemon(link, tmp_path, subject):
+    (tmp_path / "models").mkdir()
+    for place in (tmp_path, tmp_path / "models"):
+        (place / "a.model.yaml").touch()
+    orders = Orders(link, ModelFiles(tmp_path / "models"))
+    assert not orders.consequence("adopt", subject).possible
+    with pytest.raises(DaemonError, match="none of the model files"):
+        asyncio.run(orders.do("adopt", subject))
+    if subject:
+        assert not orders.consequence("shadow", subject).possible
+        with pytest.raises(DaemonError, match="none of the model files"):
+            asyncio.run(orders.do("shadow", subject))
 
 
 def test_without_the_daemon_nothing_is_possible(link):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 
 import numpy as np
@@ -12,9 +13,10 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token, hashed
 from compd.page.history import History
 from compd.page.recordings import Recordings
-from compd.page.server import LONGEST_BODY_BYTES, Server, packed
+from compd.page.server import LONGEST_BODY_BYTES, STATIC, Server, _ended, packed
 
 HOST = "127.0.0.1:7760"
+LARGEST_PAGE_BYTES = 150_000
 OWN = {"Origin": f"http://{HOST}"}
 
 
@@ -38,21 +40,26 @@ def test_what_a_browser_loads_is_there(open_page, path):
     assert open_page("view").get(path).status_code == 200
 
 
+def test_a_page_is_small():
+    loaded = [path for path in STATIC.rglob("*") if path.is_file() and "LICENSE" not in path.name]
+    assert sum(path.stat().st_size for path in loaded) <= LARGEST_PAGE_BYTES
+
+
 @pytest.mark.parametrize(
     "path", ["/static/../server.py", "/static/%2e%2e/server.py", "/recordings/../../etc", "/nothing"]
 )
 def test_nothing_else_is(open_page, path):
-    assert open_page("owner").get(path).status_code in (404, 405)
+    assert open_page("operate").get(path).status_code in (404, 405)
 
 
 @pytest.mark.parametrize("path", ["/arm", "/orders/zero", "/recordings"])
 @pytest.mark.parametrize("body", [b"", b"{", b"[]", b"3", b"\xff", b'"' + b"x" * LONGEST_BODY_BYTES])
 def test_a_body_that_is_no_order_is_refused(open_page, path, body):
-    assert open_page("owner").post(path, content=body, headers=OWN).status_code in (400, 413)
+    assert open_page("operate").post(path, content=body, headers=OWN).status_code in (400, 413)
 
 
 def test_orders_of_a_browser_that_is_not_there_or_not_armed_are_refused(open_page):
-    client = open_page("owner")
+    client = open_page("operate")
     for keys in ({}, {"id": ""}, {"id": "guessed"}):
         assert client.post("/arm", json=keys, headers=OWN).status_code == 403
         assert client.post("/orders/zero", json=keys, headers=OWN).status_code == 403
@@ -67,20 +74,31 @@ def test_without_a_daemon_an_order_says_so(open_page):
 
 @pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "x" * 65, "a b", "-option"])
 def test_a_name_that_could_be_a_path_is_no_recording(open_page, name):
-    answer = open_page("owner").post("/recordings", json={"name": name}, headers=OWN)
+    answer = open_page("operate").post("/recordings", json={"name": name}, headers=OWN)
     assert answer.status_code == 409
     assert "letters" in answer.json()["reason"]
-    assert open_page("owner").get(f"/recordings/{name or '.'}").status_code in (200, 404, 405)
+    assert open_page("operate").get(f"/recordings/{name or '.'}").status_code in (200, 404, 405)
 
 
 @pytest.mark.parametrize("burst_s", [0, -1, "5", 1e9, []])
 def test_a_burst_has_a_length(open_page, burst_s):
-    answer = open_page("owner").post("/recordings", json={"name": "a", "burst_s": burst_s}, headers=OWN)
+    answer = open_page("operate").post("/recordings", json={"name": "a", "burst_s": burst_s}, headers=OWN)
     assert answer.status_code == 400
 
 
 def test_who_may_look_only_records_nothing(open_page):
     assert open_page("view").post("/recordings", json={"name": "a"}, headers=OWN).status_code == 403
+
+
+@pytest.mark.parametrize("unix_s", ["", "now", "nan", "inf", "-inf"])
+def test_a_moment_is_a_time(open_page, unix_s):
+    for path in ("/moment", "/traces"):
+        assert open_page("view").get(path, params={"unix_s": unix_s}).status_code == 400
+
+
+def test_of_a_moment_before_the_page_nothing_is_known(open_page):
+    assert open_page("view").get("/moment", params={"unix_s": "1e9"}).status_code == 404
+    assert open_page("view").get("/traces", params={"unix_s": "1e9"}).json() == {"times_s": [], "values": []}
 
 
 def test_the_history_can_be_read_back():
@@ -101,3 +119,19 @@ def test_the_history_can_be_read_back():
         assert rows[-1, 1] == 1.0
     assert start == len(data)
     assert [table["rows"] for table in told["tables"]] == [30, 300]
+
+
+def test_a_task_that_has_missed_a_cancellation_ends_too():
+    async def deaf():
+        try:
+            await asyncio.sleep(60.0)
+        except asyncio.CancelledError:
+            await asyncio.sleep(60.0)
+
+    async def both():
+        tasks = [asyncio.create_task(deaf()), asyncio.create_task(asyncio.sleep(60.0))]
+        await asyncio.sleep(0)
+        await asyncio.wait_for(_ended(tasks), 10.0)
+        assert all(task.done() for task in tasks)
+
+    asyncio.run(both())

@@ -11,9 +11,9 @@ from compd.page.token_file import add_token, read_tokens
 
 def test_a_token_is_told_once_and_kept_as_its_hash(tmp_path):
     path = tmp_path / "tokens.yaml"
-    first, second = add_token(path, "owner:Anna"), add_token(path, "view:screen by the door")
+    first, second = add_token(path, "operate:Anna"), add_token(path, "view:screen by the door")
     assert [(token.name, token.role, token.sha256) for token in read_tokens(path)] == [
-        ("Anna", "owner", hashed(first)),
+        ("Anna", "operate", hashed(first)),
         ("screen by the door", "view", hashed(second)),
     ]
     assert path.stat().st_mode & 0o777 == 0o600
@@ -21,7 +21,7 @@ def test_a_token_is_told_once_and_kept_as_its_hash(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 
 
-@pytest.mark.parametrize("text", ["owner", "master:Anna", "view:", "owner:Anna"])
+@pytest.mark.parametrize("text", ["operate", "master:Anna", "view:", "operate:Anna"])
 def test_what_is_no_role_or_has_a_token_already_is_refused(tmp_path, text):
     path = tmp_path / "tokens.yaml"
     add_token(path, "view:Anna")

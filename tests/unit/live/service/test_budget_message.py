@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.live.loop.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
 from compd.model.kernels.rotation import rotation_matrix
 from tests.support.live_machine import machine
+from tests.support.live_models import file_with, thermal
 
 LINKS = {"tripod-cmm.yaml": 3, "hexapod.yaml": 6}
 
@@ -52,6 +54,28 @@ def test_the_machine_can_be_drawn_from_it(name):
     tool_P_mm = np.array(live.configuration.geometry.tool.at_P_mm)
     tip_M_mm = platform["origin_M_mm"] + rotation_matrix(np.array(platform["rotation_M_rad"])) @ tool_P_mm
     assert tip_M_mm == pytest.approx(setpoint.values.tip_M_mm, abs=0.05)
+
+
+@pytest.mark.parametrize("name", LINKS)
+def test_the_shadow_at_the_tip_is_what_its_model_would_be_there_if_it_were_applied(name, tmp_path):
+    live, _ = displaced(name)
+    told = {"name": live.configuration.machine, "links": LINKS[name], "link_zero": 20.0}
+    model = live.loader.read(file_with(tmp_path / "a.yaml", "link_zero", **told))
+    live.commands.models = Models(live.loader.without_effects, model)
+    shadow_um = budget_of(live, live.settle())["shadow_tip_um"]
+    live.commands.models = Models(model)
+    applied = budget_of(live, live.settle())
+    assert "shadow_tip_um" not in applied
+    assert np.linalg.norm(applied["tip_um"]["link_zero"]) > 5.0
+    assert shadow_um == pytest.approx(sum(map(np.array, applied["tip_um"].values())), abs=0.05)
+
+
+def test_a_shadow_without_numbers_has_none_at_the_tip(tmp_path):
+    live = machine()
+    live.commands.models = Models(live.loader.without_effects, thermal(live, tmp_path).applied)
+    assert "shadow_tip_um" in budget_of(live, live.settle())
+    live.faults["cabinet.link_1"] = "timeout"
+    assert "shadow_tip_um" not in budget_of(live, live.step())
 
 
 def test_without_a_valid_setpoint_there_is_no_number():

@@ -1,0 +1,79 @@
+// One gauge in the table. Its cells stay where they are and only what has changed is written, so that a button in it can
+// be pressed and the focus is not lost.
+import { ago, element, signed } from "./format.js";
+import { drawSpark, rangeOf } from "./spark.js";
+
+const UNITS = { degC: "°C", percent: "%", um: "µm" };
+// What is smaller than this is drawn as flat: mm of a length, else in the quantity's unit.
+const LEAST_MM = 0.001;
+const LEAST_QUANTITY = 0.1;
+
+// A quantity's name ends with its unit, as in temperature_room_degC.
+export function quantity(name) {
+  const words = name.split("_");
+  const unit = words.pop();
+  return { measures: words.join(" "), unit: UNITS[unit] ?? unit };
+}
+
+export function measured(wire) {
+  if (wire.name) return quantity(wire.name);
+  if (wire.distance) return { measures: `frame ${wire.distance}`, unit: "mm" };
+  return { measures: `${wire.kind} of link ${wire.link}${wire.role ? `, ${wire.role}` : ""}`, unit: "mm" };
+}
+
+function write(cell, text) {
+  if (cell.textContent !== text) cell.textContent = text;
+}
+
+export class GaugeRow {
+  constructor(wire, { accept, select }) {
+    Object.assign(this, { wire, ...measured(wire) });
+    this.cells = Object.fromEntries(["value", "age", "quality", "change", "total", "recent"].map((name) => [name, element("span")]));
+    this.bar = element("i");
+    this.age = element("span", { class: "age" }, this.bar);
+    this.spark = element("canvas", { class: "spark", role: "img", "aria-label": `${this.measures}, the last minute` });
+    this.button = element("button", { type: "button", onclick: () => accept(wire.channel) }, "Accept …");
+    this.quality = element("td", { class: "quality" }, this.cells.quality);
+    const cell = (name, ...children) => element("td", { class: name }, ...children);
+    this.row = element(
+      "tr",
+      { onclick: () => select(wire) },
+      cell("name", this.measures, element("small", {}, wire.channel)),
+      cell("number value", this.cells.value),
+      cell("name", this.age, this.cells.age),
+      cell("name", this.spark, this.cells.change),
+      this.quality,
+      cell("number", this.cells.total),
+      cell("number", this.cells.recent),
+    );
+  }
+
+  // told : of a live event. faults : {total, recent} of this gauge, where they are known.
+  show(told, faults) {
+    const digits = this.wire.kind === "quantity" ? 2 : 4;
+    this.share = told.fault ? Infinity : (told.age_s ?? Infinity) / this.wire.stale_after_s;
+    this.bad = Boolean(told.fault);
+    this.row.className = this.bad ? "bad" : "";
+    this.age.classList.toggle("old", this.bad);
+    this.bar.style.width = `${100 * Math.min(1, this.share)}%`;
+    const waits = told.fault === "distrusted";
+    if (waits && !this.button.isConnected) this.quality.prepend(this.button);
+    if (!waits) this.button.remove();
+    const quality = told.fault ? `✕ ${told.fault.replaceAll("_", " ")}${told.detail ? `: ${told.detail}` : ""}` : "✓ ok";
+    write(this.cells.value, told.value === undefined ? "–" : `${this.wire.kind === "quantity" ? told.value.toFixed(digits) : signed(told.value, digits)} ${this.unit}`);
+    write(this.cells.age, told.age_s === undefined ? "" : ago(told.age_s));
+    write(this.cells.quality, quality);
+    this.row.title = quality;
+    write(this.cells.total, faults ? String(faults.total ?? 0) : "–");
+    write(this.cells.recent, faults ? String(faults.recent ?? 0) : "–");
+  }
+
+  // The spark line, from its values at `times`.
+  draw(times, values) {
+    const isLength = this.unit === "mm";
+    drawSpark(this.spark, times, values, isLength ? LEAST_MM : LEAST_QUANTITY);
+    const range = rangeOf(values);
+    const far = range ? range[1] - range[0] : NaN;
+    write(this.cells.change, !Number.isFinite(far) ? "–" : isLength ? (far < 1 ? `${(far * 1000).toFixed(1)} µm` : `${far.toFixed(3)} mm`) : `${far.toFixed(2)} ${this.unit}`);
+  }
+}

@@ -1,0 +1,38 @@
+// The model files that the daemon's computer offers; choosing one writes its name, and any absolute path can be typed.
+import { dateText, element } from "./format.js";
+
+export class ModelList {
+  constructor() {
+    this.input = element("input", { type: "text", placeholder: "a name of the list, or /path/of/a.model.yaml", "aria-label": "Model file on the daemon's computer" });
+    this.input.addEventListener("input", () => this.mark());
+    this.body = element("tbody");
+    this.where = element("p", { class: "note" });
+    this.parts = [element("table", { class: "choose", "aria-label": "Model files" }, this.body), this.where, element("div", { class: "row" }, this.input)];
+    this.rows = [];
+  }
+
+  get chosen() {
+    return this.input.value.trim();
+  }
+
+  choose(name) {
+    this.input.value = this.chosen === name ? "" : name;
+    this.mark();
+  }
+
+  mark() {
+    for (const { name, button } of this.rows) button.setAttribute("aria-pressed", String(name === this.chosen));
+  }
+
+  async list() {
+    const told = await (await fetch("models")).json();
+    this.rows = told.models.map(({ name, changed, runs }) => {
+      const button = element("button", { type: "button", onclick: () => this.choose(name) }, name);
+      return { name, button, row: element("tr", {}, element("td", {}, button), element("td", {}, changed ? dateText(new Date(changed)) : "not there any more"), element("td", {}, runs ? `● ${runs}` : "")) };
+    });
+    const beside = told.directory ? `*model.yaml in ${told.directory}` : "start the page with the configuration, or --models, to have a list";
+    this.where.textContent = this.rows.length ? beside : `no model files: ${beside}`;
+    this.body.replaceChildren(...this.rows.map(({ row }) => row));
+    this.mark();
+  }
+}

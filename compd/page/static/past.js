@@ -1,0 +1,53 @@
+// A moment that has been, as a whole: the event that the page's server keeps of it. While keys scrub faster than the
+// server answers, only the newest wish is asked for.
+import { tipText } from "./format.js";
+import { appearance, stateName } from "./states.js";
+
+const at = (id) => document.getElementById(id);
+export const NOT_KEPT = "Timing of the loop, clients and counts of faults are not kept.";
+
+// To a tenth of a second, as often as the last minute is kept.
+export const clock = (time_s) => {
+  const tenths = Math.floor(time_s * 10);
+  return `${new Date(tenths * 100).toTimeString().slice(0, 8)}.${tenths % 10}`;
+};
+
+export class Past {
+  constructor(take) {
+    Object.assign(this, { take, wanted_s: null, busy: false });
+  }
+
+  // Ask for the moment `time_s`; `take(event)` gets it, or null where nothing is known of it.
+  async ask(time_s) {
+    this.wanted_s = time_s;
+    if (this.busy) return;
+    this.busy = true;
+    while (this.wanted_s !== null) {
+      const asked_s = this.wanted_s;
+      const asked = (path) => fetch(`${path}?unix_s=${asked_s}`).then((answer) => (answer.ok ? answer.json() : null)).catch(() => null);
+      const [event, traces] = await Promise.all([asked("moment"), asked("traces")]);
+      if (event) event.traces = traces ?? { times_s: [], values: [] };
+      if (this.wanted_s === asked_s) {
+        this.wanted_s = null;
+        this.take(event);
+      }
+    }
+    this.busy = false;
+  }
+
+  // What is not wanted any more is not shown when it comes.
+  leave() {
+    this.wanted_s = null;
+  }
+}
+
+// The line under the banner: which moment is shown, and its state, for the banner goes on with the present one.
+export function tellMoment(event, at_s) {
+  at("frozen-at").textContent = clock(at_s);
+  const setpoint = event?.setpoint;
+  const sign = setpoint ? appearance(setpoint.state)[1] : "⚡";
+  const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NOTHING IS KNOWN OF IT";
+  const tip = setpoint?.valid ? `  tip ${tipText(setpoint.tip_M_mm)}` : "";
+  at("frozen-state").textContent = `${sign} ${state}${tip}`;
+  at("frozen-reason").textContent = setpoint?.reason ?? event?.reason ?? "";
+}
