@@ -35,11 +35,12 @@ def run_page(
     """
     listener = _listener(host, port)
     port = listener.getsockname()[1]
-    names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [host]
+    name = f"[{host}]" if ":" in host else host
+    names = sorted({host, "127.0.0.1", "localhost"}) if host in ("127.0.0.1", "localhost") else [name]
     server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket))
     guarded = Guard(server.app(), tokens, [f"{name}:{port}" for name in names])
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
-    started(f"{host}:{port}")
+    started(f"{name}:{port}")
     _Uvicorn(config, server.end).run(sockets=[listener])
 
 

@@ -9,6 +9,8 @@ import typer
 
 from compd.cli.options import DEFAULT_SOCKET
 
+_TLS = "put a proxy with TLS in front: tokens pass in the clear otherwise"
+
 
 def page(
     address: Annotated[
@@ -48,18 +50,18 @@ def page(
     else:
         known = [
             Token(token.name, "view", token.sha256) if read_only else token
-            for token in read_tokens(_needed(tokens, "--listen"))
+            for token in read_tokens(_needed(tokens, "--listen", f"; {_TLS}"))
         ]
 
     def started(where: str) -> None:
         typer.echo(f"open http://{where}/" + (f"?token={own}" if listen is None else "?token=YOUR-TOKEN"))
         if listen is not None:
-            typer.echo("put a proxy with TLS in front: tokens pass in the clear otherwise", err=True)
+            typer.echo(_TLS, err=True)
 
     run_page(unix_address(address), recordings.absolute(), listen or "127.0.0.1", port, known, started)
 
 
-def _needed(tokens: Path | None, option: str) -> Path:
+def _needed(tokens: Path | None, option: str, more: str = "") -> Path:
     if tokens is None:
-        raise typer.BadParameter(f"{option} needs --tokens FILE")
+        raise typer.BadParameter(f"{option} needs --tokens FILE{more}")
     return tokens
