@@ -1,6 +1,6 @@
 """The page's connection to the daemon: the newest message of each class, and whether the daemon is there at all.
 
-One connection watches READINGS, another asks for STATUS and BUDGET. Both are made again by themselves; meanwhile
+One connection watches READINGS, another asks for STATUS, MODEL and BUDGET. Both are made again by themselves; meanwhile
 `connected` is False and there are no messages, so that nobody shows what was.
 """
 
@@ -36,7 +36,7 @@ class DaemonLink:
     connected : whether the messages below are of a daemon that is there.
     reason : why it is not.
     machine, columns : MACHINE, and the `columns` of WATCH.
-    readings, status, budget : the newest of each; None before the first.
+    readings, status, model, budget : the newest of each; None before the first.
     news : notified with every READINGS, and when the daemon comes or goes.
     """
 
@@ -48,6 +48,7 @@ class DaemonLink:
     columns: list[Message] = field(default_factory=list)
     readings: Message | None = None
     status: Message | None = None
+    model: Message | None = None
     budget: Message | None = None
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
@@ -59,6 +60,8 @@ class DaemonLink:
             except* (OSError, ValueError, TimeoutError, EOFError) as errors:
                 error = errors.exceptions[0]
                 await self._gone(str(error) or type(error).__name__)
+            except* (LookupError, TypeError, AttributeError) as errors:
+                await self._gone(f"it tells what this page does not understand: {errors.exceptions[0]!r}")
             await asyncio.sleep(_AGAIN_AFTER_S)
 
     async def _serve(self) -> None:
@@ -89,6 +92,7 @@ class DaemonLink:
             self.budget = await asked.ask({"class": "BUDGET"})
             if loop.time() >= status_due_s:
                 self.status = await asked.ask({"class": "STATUS"})
+                self.model = await asked.ask({"class": "MODEL"})
                 status_due_s = loop.time() + STATUS_EVERY_S
             await asyncio.sleep(BUDGET_EVERY_S)
 
@@ -97,7 +101,7 @@ class DaemonLink:
             if self.connected:
                 _log.warning("the daemon is gone", path=self.path, reason=reason)
             self.connected, self.reason = False, reason
-            self.readings = self.status = self.budget = None
+            self.readings = self.status = self.model = self.budget = None
             self.news.notify_all()
 
 
@@ -110,10 +114,17 @@ class _Connection:
 
     async def __aenter__(self) -> _Connection:
         self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
-        self.greeting = await self.read()
+        try:
+            self.greeting = _agreed(await self.read(), "the connection")
+        except BaseException:
+            await self._close()
+            raise
         return self
 
     async def __aexit__(self, *_: object) -> None:
+        await self._close()
+
+    async def _close(self) -> None:
         self._writer.close()
         with suppress(OSError):
             await self._writer.wait_closed()
@@ -130,6 +141,10 @@ class _Connection:
         """The answer to a request. Raises ValueError where the daemon refuses it."""
         self._writer.write(json.dumps(request).encode() + b"\n")
         answer = await asyncio.wait_for(self.read(), SILENT_AFTER_S)
-        if answer["class"] == "ERROR":
-            raise ValueError(f"the daemon refuses {request['class']}: {answer['text']}")
-        return answer
+        return _agreed(answer, request["class"])
+
+
+def _agreed(answer: Message, request: str) -> Message:
+    if answer["class"] == "ERROR":
+        raise ValueError(f"the daemon refuses {request}: {answer['text']}")
+    return answer

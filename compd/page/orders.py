@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.client import Client, connect
-from compd.errors import DaemonError
+from compd.errors import DaemonError, Problem
 from compd.gauge import Quality
 from compd.page.daemon_link import DaemonLink
 from compd.units import UM_PER_MM
@@ -49,7 +49,7 @@ class Orders:
             "zero": lambda client, subject: client.zero(replace=subject == "replace"),
             "accept": lambda client, subject: client.accept(subject),
             "shadow": lambda client, subject: client.model(subject, shadow=True),
-            "adopt": lambda client, subject: client.model(subject),
+            "adopt": lambda client, subject: client.model(_shadowed(client.model(), subject)),
             "no-model": lambda client, subject: client.model(""),
         }
 
@@ -107,14 +107,17 @@ class Orders:
 
     def _adopt(self, subject: str) -> Consequence:
         """Of the model that runs as a shadow: its correction is known."""
-        command = self._command("adopt", subject, "--daemon", self._link.path)
+        try:
+            file = _shadowed(self._link.model or {}, subject)
+        except DaemonError as error:
+            command = self._command("adopt", subject or "FILE", "--daemon", self._link.path)
+            return Consequence(False, f"{explained(error)}.", command)
+        command = self._command("adopt", file, "--daemon", self._link.path)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
         if "correction_mm" not in shadow:
-            why = shadow.get("reason") or "no model runs as a shadow"
-            return Consequence(
-                False, f"Let the model run as a shadow first, so that its effect is known: {why}.", command
-            )
+            why = shadow.get("reason") or "it has not been computed yet"
+            return Consequence(False, f"What it would change is not known: {why}.", command)
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
         return Consequence(True, self._change(asked_mm, shadow["correction_mm"]), command)
 
@@ -139,6 +142,23 @@ class Orders:
     def _largest_um(self) -> float:
         setpoint = (self._link.readings or {}).get("setpoint", {})
         return max((abs(value) * UM_PER_MM for value in setpoint.get("correction_mm", ())), default=0.0)
+
+
+def _shadowed(models: Mapping[str, Any], subject: str) -> str:
+    """The file of the shadow among the MODEL message's models: only its effect has been seen.
+
+    Raises DaemonError where there is none, or it is not the one that is meant (`subject`, or "" for whichever it is).
+    """
+    file = str(models.get("shadow", {}).get("file", ""))
+    if not file or subject not in ("", file):
+        raise DaemonError(
+            Problem(
+                where="adopt",
+                what=f"{file} runs as a shadow, not {subject}" if file else "no model runs as a shadow",
+                next_step="let the model run as a shadow first, so that its effect is known",
+            )
+        )
+    return file
 
 
 def explained(error: DaemonError) -> str:

@@ -56,11 +56,24 @@ def test_accept_names_the_gauges_that_wait_and_why(link):
 
 def test_a_model_is_adopted_when_its_shadow_has_told_the_change(link):
     assert not Orders(link).consequence("adopt", "/a.yaml").possible
+    link.model = {"applied": {"effects": []}, "shadow": {"file": "/a.yaml"}}
+    assert not Orders(link).consequence("adopt", "/a.yaml").possible
     link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
     told = Orders(link).consequence("adopt", "/a.yaml")
     assert told.possible
     assert "-10.0 um at link 1" in told.text
     assert "0.0 s" in told.text
+    assert told.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
+
+
+def test_no_model_is_adopted_but_the_one_whose_change_is_told(link):
+    """The numbers are the shadow's: another file has others, and no file would be no model at all."""
+    link.model = {"applied": {"effects": []}, "shadow": {"file": "/a.yaml"}}
+    link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
+    told = Orders(link).consequence("adopt", "/b.yaml")
+    assert not told.possible
+    assert "/a.yaml runs as a shadow, not /b.yaml" in told.text
+    assert Orders(link).consequence("adopt", "").command.startswith("compd adopt /a.yaml ")
 
 
 def test_without_effects_the_correction_loses_theirs(link):
