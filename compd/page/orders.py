@@ -125,7 +125,12 @@ class Orders:
         command = self._command("adopt", "--none", "--daemon", self._link.path)
         sources = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
         if sources is None:
-            return Consequence(True, "The machine is computed without effects.", command)
+            return Consequence(
+                True,
+                "The machine is computed without effects; by how much the correction changes is not known, "
+                "because there is no valid setpoint.",
+                command,
+            )
         asked_mm = [sum(parts) for parts in zip(*sources.values(), strict=True)]
         bare_mm = [sum(parts) for parts in zip(sources["joints"], sources["frame"], strict=True)]
         return Consequence(True, self._change(asked_mm, bare_mm), command)

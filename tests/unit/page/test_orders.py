@@ -80,6 +80,10 @@ def test_without_effects_the_correction_loses_theirs(link):
     told = Orders(link).consequence("no-model", "")
     assert "-5.0 um at link 1" in told.text
     assert told.command == "compd adopt --none --daemon /run/compd/compd.sock"
+    link.readings = {"setpoint": {"valid": False}}
+    told = Orders(link).consequence("no-model", "")
+    assert told.possible
+    assert "not known" in told.text
 
 
 def test_a_shadow_needs_a_file_that_is_there(link, tmp_path):
