@@ -1,4 +1,4 @@
-"""What every browser gets: live events ten times a second and slow ones once, made once for all of them."""
+"""What every browser gets: live events twenty times a second and slow ones once, made once for all of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from compd.page.moments import Moments
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
 
-LIVE_HZ = 10.0
+LIVE_HZ = 20.0
 SLOW_EVERY_S = 1.0
 
 Event = Mapping[str, Any]
@@ -51,24 +51,29 @@ class Broadcast:
         loop = asyncio.get_running_loop()
         due_s = slow_due_s = loop.time()
         while True:
-            self._note_machine()
-            if self.history is not None:
-                readings = self._link.readings
-                self.history.note(time.time(), None if readings is None else readings["setpoint"], self._link.budget)
-            live = self._live_event()
-            data = plain(live)
-            if self.history is not None:
-                self.moments.note(live["unix_s"], data)
-                self.traces.note(live["unix_s"], live.get("gauges", ()))
-            async with self._made:
-                self._live = encoded("live", data)
-                if due_s >= slow_due_s:
-                    slow_due_s += SLOW_EVERY_S
-                    self._slow = encoded("slow", plain(self._slow_event()))
-                    self._slow_count += 1
-                self._made.notify_all()
+            slow = due_s >= slow_due_s
+            if slow:
+                slow_due_s = max(slow_due_s + SLOW_EVERY_S, due_s)
+            await self.make(time.time(), slow)
             due_s = max(due_s + 1 / LIVE_HZ, loop.time())
             await asyncio.sleep(due_s - loop.time())
+
+    async def make(self, unix_s: float, slow: bool) -> None:
+        """The events of now, `unix_s` (s); the slow one too where it is due."""
+        self._note_machine()
+        live = self._live_event(unix_s)
+        data = plain(live)
+        if self.history is not None:
+            readings = self._link.readings
+            self.history.note(unix_s, None if readings is None else readings["setpoint"], self._link.budget)
+            self.moments.note(unix_s, data)
+            self.traces.note(unix_s, live.get("gauges", ()))
+        async with self._made:
+            self._live = encoded("live", data)
+            if slow:
+                self._slow = encoded("slow", plain(self._slow_event()))
+                self._slow_count += 1
+            self._made.notify_all()
 
     def end(self) -> None:
         """End every browser's events within a tick, so that the server can stop; called from a signal's handler too."""
@@ -103,10 +108,13 @@ class Broadcast:
         self.traces = Traces(len(machine["wiring"]))
         self._faults = FaultCounts()
 
-    def _live_event(self) -> Event:
-        """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is."""
+    def _live_event(self, unix_s: float) -> Event:
+        """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is.
+
+        unix_s : now, s.
+        """
         link = self._link
-        event: dict[str, Any] = {"made": time.monotonic(), "unix_s": time.time()}
+        event: dict[str, Any] = {"made": time.monotonic(), "unix_s": unix_s}
         event |= {"connected": link.connected, "reason": link.reason}
         if link.connected and link.readings is not None and self._machine is not None:
             setpoint = link.readings["setpoint"]

@@ -60,6 +60,8 @@ class DaemonLink:
             except* (OSError, ValueError, TimeoutError, EOFError) as errors:
                 error = errors.exceptions[0]
                 await self._gone(self._why(error))
+            except* (LookupError, TypeError, AttributeError) as errors:
+                await self._gone(f"it tells what this page does not understand: {errors.exceptions[0]!r}")
             await asyncio.sleep(_AGAIN_AFTER_S)
 
     def _why(self, error: Exception) -> str:
@@ -118,10 +120,17 @@ class _Connection:
 
     async def __aenter__(self) -> _Connection:
         self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
-        self.greeting = await self.read()
+        try:
+            self.greeting = _agreed(await self.read(), "the connection")
+        except BaseException:
+            await self._close()
+            raise
         return self
 
     async def __aexit__(self, *_: object) -> None:
+        await self._close()
+
+    async def _close(self) -> None:
         self._writer.close()
         with suppress(OSError):
             await self._writer.wait_closed()
@@ -138,6 +147,10 @@ class _Connection:
         """The answer to a request. Raises ValueError where the daemon refuses it."""
         self._writer.write(json.dumps(request).encode() + b"\n")
         answer = await asyncio.wait_for(self.read(), SILENT_AFTER_S)
-        if answer["class"] == "ERROR":
-            raise ValueError(f"the daemon refuses {request['class']}: {answer['text']}")
-        return answer
+        return _agreed(answer, request["class"])
+
+
+def _agreed(answer: Message, request: str) -> Message:
+    if answer["class"] == "ERROR":
+        raise ValueError(f"the daemon refuses {request}: {answer['text']}")
+    return answer

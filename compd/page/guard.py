@@ -81,10 +81,11 @@ class Guard:
         host = headers.get("host", "")
         if host not in self._hosts:
             return PlainTextResponse(f"this server is not {host!r}; it is {', '.join(sorted(self._hosts))}", 400)
-        if connection.scope["method"] not in ("GET", "HEAD"):
-            origin = headers.get("origin", "")
-            if origin not in self._origins or urlsplit(origin).netloc != host:
-                return PlainTextResponse("orders come from this server's own pages only", 403)
+        looks = connection.scope["method"] in ("GET", "HEAD")
+        origin = headers.get("origin", "")
+        own = origin in self._origins and urlsplit(origin).netloc == host
+        if not own and (not looks or "origin" in headers):
+            return PlainTextResponse("requests come from this server's own pages only", 403)
         given = connection.query_params.get("token")
         if given is not None:
             if self._known(given) is None:

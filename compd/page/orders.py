@@ -53,7 +53,7 @@ class Orders:
             "zero": lambda client, subject: client.zero(replace=subject == "replace"),
             "accept": lambda client, subject: client.accept(subject),
             "shadow": lambda client, subject: client.model(subject, shadow=True),
-            "adopt": lambda client, subject: client.model(subject),
+            "adopt": lambda client, subject: client.model(_shadowed(client.model(), subject)),
             "no-model": lambda client, subject: client.model(""),
         }
 
@@ -123,23 +123,20 @@ class Orders:
 
     def _adopt(self, subject: str) -> Consequence:
         """Of the model that runs as a shadow: its correction is known."""
-        shadow_file = (self._link.models or {}).get("shadow", {}).get("file", "")
+        shadow_file = str((self._link.models or {}).get("shadow", {}).get("file", ""))
         path = self._files.path_of(subject, self._link.models) if subject else shadow_file
         command = self._command("adopt", path or subject or "FILE", "--daemon", self._link.path)
         if path is None:
             return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
+        try:
+            _shadowed(self._link.models or {}, path)
+        except DaemonError as error:
+            return Consequence(False, f"{explained(error)}.", command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
-        why = ""
-        if not shadow_file:
-            why = "no model runs as a shadow"
-        elif path != shadow_file:
-            why = f"{shadow_file} runs as a shadow now"
-        elif "correction_mm" not in shadow or "sources_mm" not in setpoint:
+        if "correction_mm" not in shadow or "sources_mm" not in setpoint:
             why = shadow.get("reason") or "there is no valid setpoint to compare it with"
-        if why:
-            text = f"Let the model run as a shadow first, so that its effect is known: {why}."
-            return Consequence(False, text, command)
+            return Consequence(False, f"What it would change is not known: {why}.", command)
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
         text = f"{path}: {self._change(asked_mm, shadow['correction_mm'])}"
         return Consequence(True, text, command, path)
@@ -148,7 +145,12 @@ class Orders:
         command = self._command("adopt", "--none", "--daemon", self._link.path)
         sources = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
         if sources is None:
-            return Consequence(True, "The machine is computed without effects.", command)
+            return Consequence(
+                True,
+                "The machine is computed without effects; by how much the correction changes is not known, "
+                "because there is no valid setpoint.",
+                command,
+            )
         asked_mm = [sum(parts) for parts in zip(*sources.values(), strict=True)]
         bare_mm = [sum(parts) for parts in zip(sources["joints"], sources["frame"], strict=True)]
         return Consequence(True, self._change(asked_mm, bare_mm), command)
@@ -165,6 +167,23 @@ class Orders:
     def _largest_um(self) -> float:
         setpoint = (self._link.readings or {}).get("setpoint", {})
         return max((abs(value) * UM_PER_MM for value in setpoint.get("correction_mm", ())), default=0.0)
+
+
+def _shadowed(models: Mapping[str, Any], file: str) -> str:
+    """`file`, where it is the shadow's among the models of a MODEL message: only the shadow's effect has been seen.
+
+    Raises DaemonError where it is another's.
+    """
+    running = str(models.get("shadow", {}).get("file", ""))
+    if not running or file != running:
+        raise DaemonError(
+            Problem(
+                where="adopt",
+                what=f"{running} runs as a shadow, not {file}" if running else "no model runs as a shadow",
+                next_step="let the model run as a shadow first, so that its effect is known",
+            )
+        )
+    return file
 
 
 def explained(error: DaemonError) -> str:

@@ -42,8 +42,11 @@ class Recordings:
     def listed(self) -> list[dict[str, Any]]:
         """Every part of every recording, the newest first."""
         found = []
-        for path in self.directory.glob("*.csv"):
-            stat = path.stat()
+        for path in filter(_is_own, self.directory.glob("*.csv")):
+            try:
+                stat = path.stat()
+            except FileNotFoundError:  # somebody has just removed it
+                continue
             found.append(
                 {
                     "name": path.stem,
@@ -102,12 +105,17 @@ class Recordings:
         return data.getvalue()
 
     def _files_of(self, name: str) -> Sequence[Path]:
-        if not NAME.fullmatch(name) or not (self.directory / f"{name}.csv").is_file():
+        if not NAME.fullmatch(name) or not _is_own(self.directory / f"{name}.csv"):
             return []
-        return sorted(path for path in self.directory.glob(f"{name}.*") if path.is_file())
+        return sorted(filter(_is_own, self.directory.glob(f"{name}.*")))
 
     async def _watch(self, running: Running) -> None:
         _, errors = await running.process.communicate()
         if running.process.returncode:
             self.last_words = errors.decode(errors="replace").strip()[-500:]
         self.running = None
+
+
+def _is_own(path: Path) -> bool:
+    """Whether it is a file of the directory itself: a link leads anywhere."""
+    return path.is_file() and not path.is_symlink()

@@ -19,7 +19,7 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from compd.clock import MonotonicClock
+from compd.clock import Clock, MonotonicClock
 from compd.errors import DaemonError
 from compd.page.broadcast import Broadcast
 from compd.page.browsers import ARMED_S, Browsers
@@ -43,13 +43,15 @@ _LOOKS_ONLY = "this browser may look only"
 class Server:
     """The routes of one page. `request.scope["token"]` is from the guard in front of them."""
 
-    def __init__(self, link: DaemonLink, recordings: Recordings, models: Path | None = None) -> None:
-        """`models`: the directory whose model files are offered."""
+    def __init__(
+        self, link: DaemonLink, recordings: Recordings, models: Path | None = None, clock: Clock | None = None
+    ) -> None:
+        """`models`: the directory whose model files are offered. `clock`: by which arming ends."""
         self._link = link
         self._recordings = recordings
         self._models = ModelFiles(models)
         self._orders = Orders(link, self._models)
-        self._browsers = Browsers(MonotonicClock())
+        self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
 
     def app(self) -> Starlette:
@@ -201,7 +203,7 @@ async def _keys(request: Request) -> Mapping[str, Any]:
             raise HTTPException(413, "an order is short")
     try:
         keys = json.loads(body)
-    except ValueError:
+    except (ValueError, RecursionError):
         keys = None
     if not isinstance(keys, dict):
         raise HTTPException(400, "the body is one JSON object")

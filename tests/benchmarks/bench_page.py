@@ -1,26 +1,40 @@
-"""What the page costs: `python -m tests.benchmarks.bench_page`.
+"""What the page costs, and what it delivers: `python -m tests.benchmarks.bench_page`.
 
-Processor time of the page's process and of the daemon, without a browser, with one and with ten that read the events,
-side by side in one run, as shares of one processor and as ratios; and the size of what a browser loads.
+Side by side in one run: processor time of the page's process and of the daemon, and the cycles that the daemon missed,
+without the page, with it, and with one and ten clients that read its events; the updates that Chromium received and
+painted, of a hexapod whose page has more than 40 series; and the memory of the server over 72,000 events, which are an
+hour of them, made without pauses.
 """
 
 from __future__ import annotations
 
-import http.client
+import asyncio
 import os
 import sys
 import threading
 import time
-from contextlib import ExitStack
 from pathlib import Path
-from urllib.parse import urlsplit
+from typing import Any
 
 from compd.client import connect
+from compd.live.loop.states import State
+from compd.page.broadcast import LIVE_HZ, Broadcast
+from compd.page.browsers import Browsers
+from compd.page.guard import Token
+from compd.page.recordings import Recordings
 from compd.page.server import STATIC
-from tests.support.live_page import served
+from tests.benchmarks.figures import quiet, show
+from tests.support.event_stream import EventStream
+from tests.support.live_page import CHROMIUM, browser, opened, page_process, running_machine, served, until
+from tests.support.scripted_page import LOOKS, ScriptedLink
 
-MEASURED_S = 20.0
+MEASURED_S = 15.0
 BROWSERS = (0, 1, 10)
+EVENTS = 72_000
+# Memory is looked at when so many of them have been made: before the last hour is full it grows, as it is meant to.
+LOOKED_AT = (1, 18_000, 36_000, 54_000, EVENTS)
+# Of the event loop, in which every client takes an event.
+_TURNS = 5
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
@@ -35,55 +49,161 @@ def memory_mb(pid: int) -> float:
     return int(Path(f"/proc/{pid}/statm").read_text(encoding="utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-class Reader:
-    """A browser as far as the server can tell: it takes every event. events, octets : that came."""
+class Reader(threading.Thread):
+    """A browser as far as the server can tell: it takes every event. events : the live ones that came."""
 
     def __init__(self, address: str) -> None:
-        parts = urlsplit(address)
-        self._connection = http.client.HTTPConnection(parts.netloc, timeout=30)
-        self._connection.request("GET", f"/?{parts.query}")
-        answer = self._connection.getresponse()
-        answer.read()
-        cookie = answer.headers["set-cookie"].partition(";")[0]
-        self._connection.request("GET", "/live", headers={"Cookie": cookie})
-        self._stream = self._connection.getresponse()
-        self.events = self.octets = 0
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
+        super().__init__(daemon=True)
+        self._stream = EventStream(address)
+        self.events = 0
+        self.start()
 
-    def _read(self) -> None:
-        while line := self._stream.readline():
-            self.events += line.startswith(b"event: live")
-            self.octets += len(line)
+    def run(self) -> None:
+        """Until the other end hangs up."""
+        for event in self._stream:
+            self.events += event.name == "live"
 
-    def close(self) -> None:
-        """Hang up."""
-        if self._connection.sock is not None:
-            self._connection.sock.close()
+
+def costs() -> None:
+    """Of the page and of the daemon, a row for each number of clients."""
+    rows: list[list[str]] = []
+    base = 0.0
+    with running_machine() as (directory, _), connect(directory / "compd.sock", timeout_s=30.0) as daemon:
+        pids = [process["pid"] for process in daemon.status()["processes"].values()]
+
+        def measured(name: str, page_pid: int, address: str, browsers: int) -> None:
+            nonlocal base
+            readers = [Reader(address) for _ in range(browsers)]
+            time.sleep(1.0)
+
+            def now() -> list[float]:
+                loop = daemon.status()["loop"]
+                missed = loop["missed_cycles"]
+                own = cpu_s(page_pid) if page_pid else 0.0
+                return [own, sum(map(cpu_s, pids)), missed, loop["cycles"], sum(reader.events for reader in readers)]
+
+            before = now()
+            time.sleep(MEASURED_S)
+            own_s, its_s, missed, cycles, events = (end - start for start, end in zip(before, now(), strict=True))
+            base = base or its_s
+            rate = f"{events / MEASURED_S / browsers:.1f}" if browsers else ""
+            memory = f"{memory_mb(page_pid):.0f}" if page_pid else ""
+            own = f"{100 * own_s / MEASURED_S:.1f}" if page_pid else ""
+            loop = [f"{100 * its_s / MEASURED_S:.1f}", f"{its_s / base:.2f}", f"{missed:.0f} of {missed + cycles:.0f}"]
+            rows.append([name, own, memory, rate, *loop])
+
+        measured("no page", 0, "", 0)
+        with page_process(directory / "compd.sock", directory / "recordings") as (address, pid):
+            for browsers in BROWSERS:
+                measured(f"page, {browsers} clients", pid, address, browsers)
+    header = ["", "page, % of a core", "page, MB", "events/s each", "daemon, %", "ratio", "cycles missed"]
+    load = os.getloadavg()[0]
+    show(
+        f"Load of the computer {load:.1f}. One daemon at 200 Hz; the page makes {LIVE_HZ:g} events a second",
+        header,
+        rows,
+    )
+
+
+def paints() -> None:
+    """What one Chromium receives and paints of a hexapod."""
+    if not CHROMIUM:
+        print("Chromium is not there: what it paints is not measured")
+        return
+    counted = """async (measured_s) => {
+      let [received, painted, frames] = [0, 0, 0];
+      let [newest, ends] = [compd.live, false];
+      const look = () => {
+        frames += 1;
+        if (compd.live !== newest) {
+          newest = compd.live;
+          painted += !compd.unpainted;
+        }
+        if (!ends) requestAnimationFrame(look);
+      };
+      const source = new EventSource('live');
+      source.addEventListener('live', () => { received += 1; });
+      await new Promise((resolve) => source.addEventListener('hello', resolve, { once: true }));
+      requestAnimationFrame(look);
+      const began_ms = performance.now();
+      received = 0;
+      await new Promise((resolve) => setTimeout(resolve, 1000 * measured_s));
+      ends = true;
+      source.close();
+      const took_s = (performance.now() - began_ms) / 1000;
+      return [received / took_s, painted / took_s, frames / took_s];
+    }"""
+    with served(name="hexapod.yaml") as page, browser() as chromium, opened(chromium, page) as tab:
+        until(tab, "compd.live.setpoint?.correction_mm && compd.live.connected")
+        series = tab.evaluate("compd.machine.wiring.length + compd.live.setpoint.correction_mm.length")
+        received, painted, frames = tab.evaluate(counted, MEASURED_S)
+        load = os.getloadavg()[0]
+    row = [
+        f"hexapod, {series} series",
+        f"{received:.1f}",
+        f"{painted:.1f}",
+        f"{painted / LIVE_HZ:.2f}",
+        f"{frames:.0f}",
+    ]
+    title = f"One Chromium without a graphics processor; load of the computer {load:.1f}"
+    show(title, ["", "events/s received", "updates/s painted", "ratio to sent", "frames/s"], [row])
+
+
+async def hour() -> list[list[str]]:
+    """Memory of this process while an hour of events is made for ten clients, one of which reads nothing."""
+    clock_s = [0.0]
+    link = ScriptedLink("/no/socket")
+    link.tell(State.OK, "")
+    browsers = Browsers(_Clock(clock_s))
+    broadcast = Broadcast(link, browsers, Recordings(Path("/nowhere"), "/no/socket"))
+    token = Token("a person", LOOKS, "")
+    streams = [broadcast.events(browsers.connect(token.name, "127.0.0.1", token.role)) for _ in range(10)]
+    await anext(streams[0])  # and it reads no more
+    taken = [0] * len(streams[1:])
+    readers = [asyncio.create_task(_read(stream, taken, k)) for k, stream in enumerate(streams[1:])]
+    await asyncio.sleep(0)
+    rows, base = [], 0.0
+    for count in range(1, EVENTS + 1):
+        clock_s[0] = count / LIVE_HZ
+        link.tell(State.OK, "", clock_s[0])
+        await broadcast.make(clock_s[0], count % LIVE_HZ == 0)
+        for _ in range(_TURNS):
+            await asyncio.sleep(0)
+        if count in LOOKED_AT:
+            own_mb = memory_mb(os.getpid())
+            base = base or own_mb
+            rows.append([f"{count:,}", f"{own_mb:.1f}", f"{own_mb / base:.3f}"])
+    for reader in readers:
+        reader.cancel()
+    await asyncio.gather(*readers, return_exceptions=True)
+    print(f"of {EVENTS} events, made without pauses, each client that reads took {min(taken)} or more")
+    return rows
+
+
+async def _read(stream: Any, taken: list[int], k: int) -> None:
+    async for event in stream:
+        taken[k] += event.startswith(b"event: live")
+
+
+class _Clock:
+    def __init__(self, now_s: list[float]) -> None:
+        self._now_s = now_s
+
+    def monotonic(self) -> float:
+        return self._now_s[0]
+
+    def wait(self, event: threading.Event, timeout_s: float) -> bool:
+        raise NotImplementedError
 
 
 def main() -> None:
+    quiet()
     files = [path for path in STATIC.rglob("*") if path.suffix in (".html", ".css", ".js", ".svg")]
     print(f"a browser loads {sum(path.stat().st_size for path in files) / 1e3:.0f} kB, {len(files)} files")
-    with served() as page, connect(page.socket) as daemon:
-        pids = [process["pid"] for process in daemon.status()["processes"].values()]
-        base = None
-        for browsers in BROWSERS:
-            with ExitStack() as stack:
-                readers = [Reader(page.address) for _ in range(browsers)]
-                for reader in readers:
-                    stack.callback(reader.close)
-                time.sleep(1.0)
-                before = cpu_s(page.pid), sum(map(cpu_s, pids)), sum(reader.events for reader in readers)
-                time.sleep(MEASURED_S)
-                after = cpu_s(page.pid), sum(map(cpu_s, pids)), sum(reader.events for reader in readers)
-                own, its, events = (end - start for start, end in zip(before, after, strict=True))
-            base = base or own
-            rate = events / MEASURED_S / browsers if browsers else 0.0
-            print(
-                f"{browsers:2} browsers: page {100 * own / MEASURED_S:4.1f} % of a processor, x {own / base:.2f}; "
-                f"daemon {100 * its / MEASURED_S:4.1f} %; {rate:.1f} events/s each; {memory_mb(page.pid):.0f} MB"
-            )
+    costs()
+    paints()
+    rows = asyncio.run(hour())
+    show("Memory while events are made for ten clients, one of which reads none", ["events", "MB", "ratio"], rows)
     sys.stdout.flush()
 
 

@@ -49,6 +49,17 @@ class LivePage:
 @contextmanager
 def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST) -> Iterator[LivePage]:
     """A machine with its zero taken, and its page; `options`: of `compd page`, `simulate`: of `compd simulate`."""
+    with running_machine(name, simulate) as (directory, machine):
+        recordings = directory / "recordings"
+        with page_process(directory / "compd.sock", recordings, *options) as (address, pid):
+            yield LivePage(address, pid, directory, recordings, machine)
+
+
+@contextmanager
+def running_machine(
+    name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST
+) -> Iterator[tuple[Path, ControlClient]]:
+    """A simulated machine and its daemon, zero taken; their directory, and the simulation's control."""
     with run_directory() as directory:
         commands = [
             Command(
@@ -59,19 +70,21 @@ def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str]
         ]
         with run_commands(commands, log=directory / "output.log"):
             take_zero(directory / "compd.sock")
-            recordings = directory / "recordings"
-            with (
-                ControlClient(directory / "control.sock") as machine,
-                page_process(directory / "compd.sock", recordings, *options) as (address, pid),
-            ):
-                yield LivePage(address, pid, directory, recordings, machine)
+            with ControlClient(directory / "control.sock") as machine:
+                yield directory, machine
 
 
 @contextmanager
 def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator[tuple[str, int]]:
-    """`compd page` on a free port; the address that it prints, and the number of its process."""
+    """`compd page` on a free port; the address that it prints, and the number of its process.
+
+    What else it prints is in `page.log` beside the directory of recordings.
+    """
     words = ["page", str(unix_socket), "--port", "0", "--recordings", str(recordings), *options]
-    process = subprocess.Popen([sys.executable, "-m", "compd", *words], stdout=subprocess.PIPE, text=True)
+    with (recordings.parent / "page.log").open("wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "compd", *words], stdout=subprocess.PIPE, stderr=log, text=True
+        )
     try:
         assert process.stdout is not None
         address = process.stdout.readline().removeprefix("open ").strip()

@@ -10,6 +10,8 @@ import typer
 
 from compd.cli.options import DEFAULT_SOCKET
 
+_TLS = "put a proxy with TLS in front (--behind): tokens pass in the clear otherwise"
+
 
 def page(
     address: Annotated[
@@ -57,13 +59,13 @@ def page(
     else:
         known = [
             Token(token.name, "view", token.sha256) if read_only else token
-            for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen"))
+            for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen", f"; {_TLS}"))
         ]
 
     def started(origin: str) -> None:
         typer.echo(f"open {origin}/?token={own if alone else 'YOUR-TOKEN'}")
         if listen is not None and behind is None:
-            typer.echo("put a proxy with TLS in front (--behind): tokens pass in the clear otherwise", err=True)
+            typer.echo(_TLS, err=True)
 
     unix_socket = unix_address(address)
     if models is None and unix_socket != address:
@@ -83,7 +85,7 @@ def _origin(behind: str | None) -> str | None:
     return f"https://{parts.netloc.lower()}"
 
 
-def _needed(tokens: Path | None, option: str) -> Path:
+def _needed(tokens: Path | None, option: str, more: str = "") -> Path:
     if tokens is None:
-        raise typer.BadParameter(f"{option} needs --tokens FILE")
+        raise typer.BadParameter(f"{option} needs --tokens FILE{more}")
     return tokens

@@ -119,29 +119,6 @@ def test_arrows_and_points_scrub_by_a_second_and_a_tenth(tab):
     assert not tab.locator("#frozen").is_visible()
 
 
-def test_an_order_is_told_in_numbers_and_followed_only_when_armed(tab, live):
-    tab.keyboard.press("o")
-    tab.locator("#order-zero").click()
-    tab.wait_for_selector(".consequence")
-    assert "21 gauges" in text(tab, ".consequence")
-    assert f"compd zero {live.socket}" in text(tab, ".consequence code")
-    tab.locator("#confirm").click()
-    assert "Arm" in text(tab, ".said")
-    tab.locator("#arm").click()
-    until(tab, "document.getElementById('role').classList.contains('armed')")
-    tab.locator("#confirm").click()
-    until(tab, "document.querySelector('.said').textContent.startsWith('Done')")
-
-
-def test_an_order_without_arming_is_refused_by_the_server_too(tab):
-    told = tab.evaluate(
-        "fetch('orders/zero', {method: 'POST', headers: {'Content-Type': 'application/json'},"
-        " body: JSON.stringify({id: compd.id})}).then(async (r) => [r.status, await r.json()])"
-    )
-    assert told[0] == 403
-    assert "not armed" in told[1]["reason"]
-
-
 def test_everybody_sees_who_is_armed(tab, chromium, live):
     with opened(chromium, live) as other:
         tab.keyboard.press("o")

@@ -67,17 +67,27 @@ def test_a_model_is_adopted_when_its_shadow_has_told_the_change(link):
     assert told.possible
     assert told.subject == "/a.yaml", "without a name it is the shadow's, and never none"
     assert told.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
-    other = Orders(link).consequence("adopt", "/b.yaml")
-    assert not other.possible
-    assert "/a.yaml runs as a shadow" in other.text, "the numbers would be another model's"
     assert "-10.0 µm at link 1" in told.text
     assert "0.0 s" in told.text
+
+
+def test_no_model_is_adopted_but_the_one_whose_change_is_told(link):
+    """The numbers are the shadow's: another file has others."""
+    link.models = {"applied": {"effects": []}, "shadow": {"file": "/a.yaml"}}
+    link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
+    told = Orders(link).consequence("adopt", "/b.yaml")
+    assert not told.possible
+    assert "/a.yaml runs as a shadow, not /b.yaml" in told.text
 
 
 def test_without_effects_the_correction_loses_theirs(link):
     told = Orders(link).consequence("no-model", "")
     assert "-5.0 µm at link 1" in told.text
     assert told.command == "compd adopt --none --daemon /run/compd/compd.sock"
+    link.readings = {"setpoint": {"valid": False}}
+    told = Orders(link).consequence("no-model", "")
+    assert told.possible
+    assert "not known" in told.text
 
 
 def test_a_model_file_is_chosen_by_its_name_or_named_by_its_absolute_path(link, tmp_path):
