@@ -14,6 +14,7 @@ from tests.injection.rig import InjectedMachine
 from tests.injection.trial import accept
 from tests.soak.resources import resources_by_process
 from tests.soak.summary import Summary
+from tests.support.pauses import MATTERS_S, Pauses
 from tests.support.watching import Watcher
 
 # How often two faults come together, and how often none does.
@@ -36,16 +37,18 @@ def soak(machine: InjectedMachine, minutes: float, seed: int, say: Say) -> Summa
     """Run it. The faults, their order and places follow from the seed; their times are those of the computer."""
     chance = random.Random(seed)
     summary = Summary(seed)
+    pauses = Pauses()
     start_s = told_s = time.monotonic()
     episode = 0
-    while time.monotonic() < start_s + 60 * minutes:
-        if episode == WARM_EPISODES:
-            summary.before = resources_by_process(machine.daemon.pids())
-        _episode(machine, _drawn(chance), chance, summary)
-        episode += 1
-        if time.monotonic() > told_s + 60:
-            told_s = time.monotonic()
-            say(f"{(told_s - start_s) / 60:.0f} min: {episode} episodes, {sum(summary.states.values())} setpoints")
+    with pauses.watched():
+        while time.monotonic() < start_s + 60 * minutes:
+            if episode == WARM_EPISODES:
+                summary.before = resources_by_process(machine.daemon.pids())
+            _episode(machine, _drawn(chance), chance, summary, pauses)
+            episode += 1
+            if time.monotonic() > told_s + 60:
+                told_s = time.monotonic()
+                say(f"{(told_s - start_s) / 60:.0f} min: {episode} episodes, {sum(summary.states.values())} setpoints")
     machine.repair()
     machine.truth.rest_for(1.0)
     summary.after = resources_by_process(machine.daemon.pids())
@@ -67,12 +70,15 @@ def _drawn(chance: random.Random) -> list[Case]:
     return [one, chance.choice([case for case in DRAWN if not case.lost and case.id != one.id])]
 
 
-def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Random, summary: Summary) -> None:
+def _episode(
+    machine: InjectedMachine, cases: Sequence[Case], chance: random.Random, summary: Summary, pauses: Pauses
+) -> None:
     """To a place, the faults, and out of them again."""
     place_mm = [chance.uniform(-STROKE_MM, STROKE_MM) for _ in range(3)]
     lasts_s = chance.uniform(*LASTS_S)
     machine.truth.forget()
     before = _counts(machine)
+    paused_before_s = pauses.lost_s
     with machine.watched() as watcher:
         machine.truth.drive(place_mm)
         for case in cases:
@@ -91,7 +97,9 @@ def _episode(machine: InjectedMachine, cases: Sequence[Case], chance: random.Ran
     fault = summary.add(cases, verdict)
     fault.accepted += accepted
     if doubts and not any(_explains(case, doubts) for case in cases):
-        summary.false_alarms.append(f"{[case.id for case in cases]}: {doubts}")
+        paused_s = pauses.lost_s - paused_before_s
+        alarm = f"{[case.id for case in cases]}: {doubts} (the computer itself paused for {paused_s:.2f} s)"
+        (summary.alarms_in_pauses if paused_s >= MATTERS_S else summary.false_alarms).append(alarm)
     fault.restarted += restarted
     if ended and not any(case.lost for case in cases):
         summary.broken.append(f"{[case.id for case in cases]}: the connection ended")

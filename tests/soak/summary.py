@@ -30,6 +30,7 @@ class Summary:
     """All episodes of a soak.
 
     broken : rules of setpoints. false_alarms : reasons for which a person had to accept a gauge that had no fault.
+    alarms_in_pauses : such reasons where the computer itself paused: the simulated gauges did not answer meanwhile.
     """
 
     seed: int
@@ -42,6 +43,7 @@ class Summary:
     missed: int = 0
     broken: list[str] = field(default_factory=list)
     false_alarms: list[str] = field(default_factory=list)
+    alarms_in_pauses: list[str] = field(default_factory=list)
     before: dict[str, Resources] = field(default_factory=dict)
     after: dict[str, Resources] = field(default_factory=dict)
 
@@ -106,6 +108,7 @@ class Summary:
                 f"{name:14} {before.memory_mb:6.0f} to {after.memory_mb:5.0f} {before.threads:4} to {after.threads}"
                 f" {before.descriptors:6} to {after.descriptors}"
             )
+        lines += ["", *(f"does not count: {alarm}" for alarm in self.alarms_in_pauses)]
         return "\n".join(lines)
 
 

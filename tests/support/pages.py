@@ -12,7 +12,6 @@ from sybil.parsers.myst.lexers import DirectiveLexer
 from sybil.typing import Parser
 
 from tests.support.paths import ROOT
-from tests.support.pauses import again_after_a_pause
 from tests.support.simulated import run_directory
 from tests.support.terminal import Terminal
 
@@ -65,10 +64,6 @@ def page_names() -> list[str]:
 
 def run_page(name: str) -> None:
     """Run all of a page in a directory of its own."""
-    again_after_a_pause(lambda: _run_once(name))
-
-
-def _run_once(name: str) -> None:
     document = SYBIL.parse(ROOT / name)
     with run_directory() as directory:
         before = Path.cwd()

@@ -1,0 +1,66 @@
+"""What fails while the computer itself has paused is tried again: see `tests.support.pauses`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+from tests.support.pauses import MATTERS_S, Pauses
+
+_TRIES = 3
+# Of a report: it failed, and its test is tried again. Counted and listed by this word at the end.
+_TRIED_AGAIN = "tried again"
+_PAUSES = Pauses()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
+    with _PAUSES.watched():
+        return (yield)
+
+
+@pytest.hookimpl
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool:
+    """Run a test; three times at most while it fails and the computer paused meanwhile.
+
+    What runs a simulated machine beside its daemon in real time loses the gauges while neither runs, and the daemon
+    does not believe them afterwards. Without a pause, the first failure counts.
+    """
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for tries_left in reversed(range(_TRIES)):
+        before_s = _PAUSES.lost_s
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        paused_s = _PAUSES.lost_s - before_s
+        if not tries_left or paused_s < MATTERS_S or not any(report.failed for report in reports):
+            break
+        _log(item, [_tried_again(report, paused_s) for report in reports if report.failed])
+        # a machine that other tests share is not what it was
+        item.session._setupstate.teardown_exact(None)
+        item._initrequest()  # type: ignore[attr-defined]
+    _log(item, reports)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def _tried_again(report: pytest.TestReport, paused_s: float) -> pytest.TestReport:
+    report.outcome = _TRIED_AGAIN  # type: ignore[assignment]
+    report.sections.append((_TRIED_AGAIN, f"the computer itself paused for {paused_s:.2f} s meanwhile"))
+    return report
+
+
+def _log(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> None:
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+
+
+def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
+    return (_TRIED_AGAIN, "P", "PAUSED") if report.outcome == _TRIED_AGAIN else None
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    for report in terminalreporter.getreports(_TRIED_AGAIN):
+        told = "; ".join(text for name, text in report.sections if name == _TRIED_AGAIN)
+        last_line = report.longreprtext.strip().splitlines()[-1:]
+        terminalreporter.write_line(f"tried again: {report.nodeid}: {told} {last_line}")
