@@ -82,7 +82,8 @@ class DaemonLink:
 
     async def _take_readings(self, stream: _Connection) -> None:
         while True:
-            message = await asyncio.wait_for(stream.read(), SILENT_AFTER_S)
+            async with asyncio.timeout(SILENT_AFTER_S):  # wait_for of Python 3.11 may lose a cancellation
+                message = await stream.read()
             async with self.news:
                 self.readings = message
                 if not self.connected:
@@ -146,7 +147,8 @@ class _Connection:
     async def ask(self, request: Message) -> Message:
         """The answer to a request. Raises ValueError where the daemon refuses it."""
         self._writer.write(json.dumps(request).encode() + b"\n")
-        answer = await asyncio.wait_for(self.read(), SILENT_AFTER_S)
+        async with asyncio.timeout(SILENT_AFTER_S):
+            answer = await self.read()
         return _agreed(answer, request["class"])
 
 

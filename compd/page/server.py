@@ -225,5 +225,6 @@ def packed(history: History | None) -> bytes:
     return header + b"".join(numbers)
 
 
-def _refused(reason: str, code: int, value: str = "") -> JSONResponse:
-    return JSONResponse({"reason": reason, "value": value}, code)
+def _refused(reason: str, code: int, value: str = "") -> Response:
+    # in ASCII: what a client named need not be text that can be encoded
+    return Response(json.dumps({"reason": reason, "value": value}), code, media_type="application/json")

@@ -79,7 +79,9 @@ def scripted(recordings: Path) -> Iterator[ScriptedPage]:
     listener = socket.create_server(("127.0.0.1", 0))
     host = f"127.0.0.1:{listener.getsockname()[1]}"
     server = Server(link, Recordings(recordings, "/no/socket"))
-    guarded = Guard(server.app(), [Token("a person", LOOKS, hashed(TOKEN))], [host])
+    guarded = Guard(
+        server.app(), [Token("a person", LOOKS, hashed(TOKEN))], [f"http://{host}"], listener.getsockname()[1]
+    )
     running = uvicorn.Server(uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1))
     thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, name="page")
     thread.start()

@@ -28,8 +28,14 @@ export class Drawer {
   }
 
   toggle() {
-    this.place.hidden = !this.place.hidden;
-    if (!this.open) return;
+    if (this.open) {
+      document.activeElement.blur(); // a hidden button would still take the next key
+      this.opener?.focus();
+      this.place.hidden = true;
+      return;
+    }
+    this.opener = document.activeElement;
+    this.place.hidden = false;
     this.models.list();
     this.recordings.list();
     this.place.querySelector("button").focus();

@@ -98,6 +98,8 @@ export function freeze(frozen, at_s, event) {
   else past.ask(at_s);
 }
 
+// the banner stays in sight, whatever is drawn over the page
+new ResizeObserver(() => document.documentElement.style.setProperty("--top", `${at("top").offsetHeight}px`)).observe(at("top"));
 at("thaw").addEventListener("click", () => freeze(false));
 at("role").addEventListener("click", () => drawer.toggle());
 document.addEventListener("freeze", (event) => freeze(true, event.detail.at_s, event.detail.event));

@@ -33,7 +33,7 @@ def clock():
 
 @pytest.fixture
 def server(tmp_path, clock):
-    return Server(ScriptedLink("/no/socket"), Recordings(tmp_path, "/no/socket"), clock)
+    return Server(ScriptedLink("/no/socket"), Recordings(tmp_path, "/no/socket"), clock=clock)
 
 
 def run(server, conversation):
@@ -41,7 +41,7 @@ def run(server, conversation):
 
     async def all_of_it():
         app = server.app()
-        guarded = Guard(app, [Token("Anna", ORDERS, hashed("anna's"))], [HOST])
+        guarded = Guard(app, [Token("Anna", ORDERS, hashed("anna's"))], [f"http://{HOST}"], 7760)
         headers = {"Host": HOST, "Origin": f"http://{HOST}", "Cookie": f"{COOKIE}7760=anna's"}
         async with asyncio.timeout(30.0), app.router.lifespan_context(app):
             await conversation(AsgiClient(guarded, headers))
