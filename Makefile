@@ -10,7 +10,8 @@ STAMP  := $(VENV)/.installed
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
 	@echo "make live    the same machine live in the browser, until Ctrl-C"
-	@echo "make test    the tests; two hidden causes are found on wires among them (below 10 min)"
+	@echo "make test    the tests; a hidden cause is found on wires among them (10 min)"
+	@echo "make sample  some of the longer ones: the page in a real browser, drivers that misbehave, worked examples (7 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
@@ -50,11 +51,15 @@ DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 # System tests have both processors for themselves: they run the daemon in real time.
 test: $(STAMP)
 	$(BIN)/pytest -n 2 --ignore=tests/system
-	$(BIN)/pytest tests/system $(HIDDEN:%=--ignore=%)
-	$(BIN)/pytest -n 2 $(HIDDEN)
+	$(BIN)/pytest tests/system
 
 long: $(STAMP)
 	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
+
+# Of the long ones those that .ci/run runs, but for the targets below.
+sample: $(STAMP)
+	$(BIN)/pytest -m sample -n 2 --ignore=tests/system
+	$(BIN)/pytest -m sample tests/system $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%)
 
 # The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
@@ -74,7 +79,7 @@ walks: $(STAMP)
 hidden: $(STAMP)
 	$(BIN)/pytest -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
-# The tutorial, a pair and a cause outside the library.
+# The tutorial, a cause, a pair and a cause outside the library.
 hidden-sample: $(STAMP)
 	$(BIN)/pytest -m sample -n 2 $(HIDDEN)
 

@@ -89,6 +89,8 @@ def drifting(rng: np.random.Generator, recording: AlignedRecording) -> FloatArra
     return np.asarray(drift[visit])
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_p_values_are_uniform_where_nothing_is_hidden_in_a_sample(tmp_path: Path) -> None:
     """Of 20 numbers the Kolmogorov-Smirnov test sees a distribution that is off by 0.29; these seeds do not change."""
     assert kstest(smallest_p_values(tmp_path, 20), "uniform").pvalue > 0.05

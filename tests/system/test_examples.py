@@ -42,6 +42,8 @@ def test_the_comparators_of_the_first_recording_bring_the_error_to_the_floor(tmp
     assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".yaml", ".json"}
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.parametrize("number", [(), (7,)], ids=["the printed number", "another number"])
 def test_a_hidden_effect_is_found_and_the_error_falls_on_other_days(number: tuple[int, ...], tmp_path: Path) -> None:
     before_um, after_um, floor_um = fall_um(run("find_missing_effect.py", tmp_path, *number))

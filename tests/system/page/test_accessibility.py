@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.live_page import opened, until
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

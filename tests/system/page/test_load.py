@@ -16,7 +16,7 @@ from tests.support.event_stream import EventStream, cookie_of, host_of, request
 from tests.support.live_page import page_process
 from tests.support.scripted_page import LOOKS, ORDERS
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
 BROWSERS = 10
 # What the system, the server and the client may keep for a client that does not read.

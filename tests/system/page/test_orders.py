@@ -11,7 +11,7 @@ from compd.errors import DaemonError
 from tests.support.live_models import file_with
 from tests.support.live_page import opened, until
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
 # Where the computer has too much to do, a gauge may be late just when zero is taken; a person tries again, too.
 TRIES = 5

@@ -10,7 +10,7 @@ import pytest
 from compd.client import connect
 from tests.support.live_page import opened, served, until
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
 
 def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(chromium):

@@ -15,6 +15,9 @@ from tests.support.process_checks import check_undisturbed, cycles_kept, is_ok, 
 from tests.support.processes import Machine
 from tests.support.watching import until
 
+# Two minutes in all.
+pytestmark = [pytest.mark.long, pytest.mark.sample]
+
 # How long a misdeed is watched after its first effect.
 WATCHED_S = 2.0
 AT_ZERO_B0_MM = [0.0, 0.0, -510.0]

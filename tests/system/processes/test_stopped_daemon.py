@@ -66,6 +66,8 @@ def test_the_daemon_goes_on_after_ctrl_z(apart: Daemon) -> None:
     assert now["service"] == pids["service"]
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.skipif(shutil.which("gdb") is None, reason="gdb is not installed")
 @pytest.mark.parametrize("process", ["supervisor", "service"])
 def test_a_debugger_may_look(apart: Daemon, process: str) -> None:

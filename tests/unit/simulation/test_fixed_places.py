@@ -19,9 +19,9 @@ from compd.simulation.truth.mechanism import Mechanism
 from tests.support.measured import aligned, tripod
 
 KINDS = [
-    ("ballbar", "tripod-cmm"),
+    pytest.param("ballbar", "tripod-cmm", marks=[pytest.mark.long, pytest.mark.sample]),
     pytest.param("ball", "tripod-cmm", marks=pytest.mark.long),
-    ("pin", "tripod-cmm"),
+    pytest.param("pin", "tripod-cmm", marks=[pytest.mark.long, pytest.mark.sample]),
     pytest.param("pin", "hexapod", marks=pytest.mark.long),
     ("pose", "hexapod"),
 ]
