@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from collections.abc import AsyncIterator, Mapping
 from typing import Any
+
+import orjson
 
 from compd.gauge import Quality
 from compd.page.browsers import Browser, Browsers
@@ -169,7 +170,7 @@ def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any
 
 def plain(event: Event) -> bytes:
     """An event as JSON."""
-    return json.dumps(event, separators=(",", ":")).encode()
+    return orjson.dumps(event)
 
 
 def encoded(name: str, data: bytes) -> bytes:

@@ -7,11 +7,11 @@ One connection watches READINGS, another asks for STATUS, MODEL and BUDGET. Both
 from __future__ import annotations
 
 import asyncio
-import json
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+import orjson
 import structlog
 
 Message = dict[str, Any]
@@ -141,12 +141,12 @@ class _Connection:
         line = await self._reader.readline()
         if not line.endswith(b"\n"):
             raise EOFError("it closed the connection")
-        message: Message = json.loads(line)
+        message: Message = orjson.loads(line)
         return message
 
     async def ask(self, request: Message) -> Message:
         """The answer to a request. Raises ValueError where the daemon refuses it."""
-        self._writer.write(json.dumps(request).encode() + b"\n")
+        self._writer.write(orjson.dumps(request) + b"\n")
         async with asyncio.timeout(SILENT_AFTER_S):
             answer = await self.read()
         return _agreed(answer, request["class"])

@@ -16,6 +16,7 @@ from tests.support.live_page import opened, served, until
 from tests.support.paths import ROOT
 
 PICTURE = ROOT / "docs" / "pictures" / "live-page.png"
+ORDERS = PICTURE.with_name("live-page-orders.png")
 # What the picture was made of, beside it.
 MADE_OF = PICTURE.with_suffix(".made-of.txt")
 # The machine warms up for so long before the picture, s; its weather is 60 times faster than real.
@@ -35,18 +36,23 @@ def page_files() -> str:
 def test_the_picture_is_of_the_page_as_it_is(chromium):
     if os.environ.get("COMPD_PICTURE"):
         with (
-            served("--read-only", simulate=("--speedup", "60", "--zero-hold", "20")) as page,
+            served(simulate=("--speedup", "60", "--zero-hold", "20")) as page,
             opened(chromium, page, viewport={"width": 1440, "height": 960}) as tab,
         ):
             tab.wait_for_timeout(1e3 * SHOWN_AFTER_S)
             until(tab, "document.getElementById('state').textContent === 'OK'")
             tab.screenshot(path=str(PICTURE))
+            tab.keyboard.press("o")
+            tab.locator("#order-zero").click()
+            tab.wait_for_selector("#confirm")
+            tab.screenshot(path=str(ORDERS))
         MADE_OF.write_text(page_files() + "\n", encoding="utf-8")
     assert MADE_OF.read_text(encoding="utf-8").strip() == page_files(), (
         "the page has changed: COMPD_PICTURE=1 pytest tests/system/page/test_picture.py"
     )
-    width, height = (int.from_bytes(PICTURE.read_bytes()[place : place + 4], "big") for place in (16, 20))
-    assert (width, height) == (1440, 960)
+    for picture in (PICTURE, ORDERS):
+        width, height = (int.from_bytes(picture.read_bytes()[place : place + 4], "big") for place in (16, 20))
+        assert (width, height) == (1440, 960)
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/how-to/look-at-the-machine-live.md"])
