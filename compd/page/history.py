@@ -24,6 +24,11 @@ EARLY_S = 0.025
 UNKNOWN_STATE = -1.0
 
 
+def is_due(early_s: float, every_s: float) -> bool:
+    """Whether a row is wanted that comes so much too early (s); a clock that was set back does not stop them."""
+    return early_s <= EARLY_S or early_s > 2 * every_s
+
+
 class Ring:
     """The newest rows of a table of numbers, one every `1 / rate_hz` seconds."""
 
@@ -37,9 +42,9 @@ class Ring:
 
     def note(self, time_s: float, row: Sequence[float]) -> None:
         """Put a row of `time_s` (s) in the place of the oldest, if one is due."""
-        if time_s < self._due_s - EARLY_S:
+        if not is_due(self._due_s - time_s, self._every_s):
             return
-        on_time = time_s - self._due_s < self._every_s / 2
+        on_time = abs(time_s - self._due_s) < self._every_s / 2
         self._due_s = (self._due_s if on_time else time_s) + self._every_s
         place = self._count % len(self._times_s)
         self._times_s[place], self._rows[place] = time_s, row

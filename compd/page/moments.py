@@ -13,7 +13,7 @@ from bisect import bisect_left
 from collections import deque
 from itertools import islice
 
-from compd.page.history import COARSE_HZ, COARSE_S, EARLY_S, FINE_HZ, FINE_S
+from compd.page.history import COARSE_HZ, COARSE_S, FINE_HZ, FINE_S, is_due
 
 # The quickest: a third of the bytes at a tenth of a millisecond.
 _LEVEL = 1
@@ -29,10 +29,10 @@ class _Kept:
         self.events: deque[bytes] = deque(maxlen=round(span_s * rate_hz))
 
     def is_due(self, time_s: float) -> bool:
-        return time_s >= self._due_s - EARLY_S
+        return is_due(self._due_s - time_s, self._every_s)
 
     def note(self, time_s: float, event: bytes) -> None:
-        on_time = time_s - self._due_s < self._every_s / 2
+        on_time = abs(time_s - self._due_s) < self._every_s / 2
         self._due_s = (self._due_s if on_time else time_s) + self._every_s
         self.times_s.append(time_s)
         self.events.append(event)

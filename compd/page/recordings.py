@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import re
 import shlex
 import signal
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 # Of a recording: letters and digits, so that it is a file's name on every system and never a path.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _END_WITHIN_S = 10.0
+_PIECE_BYTES = 1 << 16
 
 
 @dataclass
@@ -38,6 +39,7 @@ class Recordings:
         self._socket = socket
         self.running: Running | None = None
         self.last_words = ""
+        self._starting = asyncio.Lock()  # two browsers may ask at once
 
     def listed(self) -> list[dict[str, Any]]:
         """Every part of every recording, the newest first."""
@@ -67,6 +69,10 @@ class Recordings:
         """Record; why not, or "" where it has begun."""
         if not NAME.fullmatch(name):
             return "a name has letters, digits, - and _, at most 64 of them"
+        async with self._starting:
+            return await self._start(name, burst_s)
+
+    async def _start(self, name: str, burst_s: float | None) -> str:
         if self.running is not None:
             return f"{self.running.name} is being recorded already"
         if any(self.directory.glob(f"{name}-*.csv")):
@@ -93,16 +99,13 @@ class Recordings:
             async with asyncio.timeout(_END_WITHIN_S):
                 await self._watching
 
-    def archive(self, name: str) -> bytes | None:
-        """A part with its sidecar and what a replay needs, as a zip file; None where there is no such part."""
+    def archive(self, name: str) -> Iterator[bytes] | None:
+        """A part with its sidecar and what a replay needs, as pieces of a zip file; None where there is no such part.
+
+        It is made in a temporary file: a recording may be larger than the memory.
+        """
         paths = self._files_of(name)
-        if not paths:
-            return None
-        data = io.BytesIO()
-        with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in paths:
-                archive.write(path, path.name)
-        return data.getvalue()
+        return _zipped(paths) if paths else None
 
     def _files_of(self, name: str) -> Sequence[Path]:
         if not NAME.fullmatch(name) or not _is_own(self.directory / f"{name}.csv"):
@@ -114,6 +117,16 @@ class Recordings:
         if running.process.returncode:
             self.last_words = errors.decode(errors="replace").strip()[-500:]
         self.running = None
+
+
+def _zipped(paths: Sequence[Path]) -> Iterator[bytes]:
+    with TemporaryFile() as file:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in paths:
+                archive.write(path, path.name)
+        file.seek(0)
+        while piece := file.read(_PIECE_BYTES):
+            yield piece
 
 
 def _is_own(path: Path) -> bool:

@@ -167,11 +167,11 @@ class Server:
 
     async def _download(self, request: Request) -> Response:
         name = request.path_params["name"]
-        data = await asyncio.to_thread(self._recordings.archive, name)
-        if data is None:
+        pieces = self._recordings.archive(name)
+        if pieces is None:
             return _refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
-        return Response(data, media_type="application/zip", headers=headers)
+        return StreamingResponse(pieces, media_type="application/zip", headers=headers)
 
 
 def _moment(request: Request) -> float:

@@ -38,6 +38,17 @@ def test_times_that_jitter_leave_no_row_out():
     assert abs(len(fine_s) - 600) <= 6
 
 
+def test_a_clock_that_is_set_back_does_not_stop_it():
+    history = History(3)
+    for k in range(20 * 10):
+        history.note(1000.0 + k / 20, setpoint(k), BUDGET)
+    for k in range(20 * 10):
+        history.note(400.0 + k / 20, setpoint(k), BUDGET)
+    (coarse_s, _), (fine_s, _) = history.tables().values()
+    assert (coarse_s < 500.0).sum() == 10
+    assert (fine_s < 500.0).sum() == 100
+
+
 def test_what_is_not_known_is_nan_and_never_the_value_before():
     history = History(3)
     history.note(0.0, setpoint(1), BUDGET)

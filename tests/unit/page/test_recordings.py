@@ -1,0 +1,33 @@
+"""Recordings: one at a time, whoever asks, and downloaded as a zip file."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import zipfile
+
+from compd.page.recordings import Recordings
+
+
+def test_of_two_that_ask_at_once_one_records(tmp_path):
+    recordings = Recordings(tmp_path, "/no/socket")
+
+    async def both():
+        told = await asyncio.gather(recordings.start("a", None), recordings.start("b", None))
+        await recordings.stop()
+        return told
+
+    assert asyncio.run(both()) == ["", "a is being recorded already"]
+
+
+def test_a_part_is_downloaded_with_what_belongs_to_it_in_pieces(tmp_path):
+    for name in ("day-1.csv", "day-1.yaml", "day-10.csv", "day.csv"):
+        (tmp_path / name).write_text(name * 100_000)
+    recordings = Recordings(tmp_path, "/no/socket")
+    pieces = recordings.archive("day-1")
+    assert pieces is not None
+    with zipfile.ZipFile(io.BytesIO(b"".join(pieces))) as archive:
+        assert archive.namelist() == ["day-1.csv", "day-1.yaml"]
+        assert archive.read("day-1.yaml") == b"day-1.yaml" * 100_000
+    assert recordings.archive("day-2") is None
+    assert recordings.archive("../day") is None
