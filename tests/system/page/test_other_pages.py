@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
 from compd.client import connect
+from compd.demo.processes import Command, run_commands
 from tests.support.live_page import opened, served, until
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
@@ -30,6 +32,19 @@ def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(c
         until(tab, "document.body.dataset.state === 'gone'")
         assert tab.locator("#state").inner_text() == "NO DAEMON"
         assert tab.locator("#tip").inner_text() == "", "no number of what was"
+
+
+def test_a_daemon_that_is_killed_and_started_again_is_found_again(chromium):
+    with served() as page, opened(chromium, page) as tab:
+        with connect(page.socket) as daemon:
+            os.kill(daemon.status()["processes"]["supervisor"]["pid"], signal.SIGKILL)
+        until(tab, "document.body.dataset.state === 'gone'")
+        assert tab.locator("#tip").inner_text() == "", "no number of what was"
+        configuration, socket = page.directory / "tripod-cmm.yaml", Path(page.socket)
+        socket.unlink(missing_ok=True)
+        with run_commands([Command(["run", str(configuration)], ready=socket)], log=page.directory / "again.log"):
+            until(tab, "document.body.dataset.state === 'ok'")
+            until(tab, "document.getElementById('tip').textContent.includes('mm')")
 
 
 def test_a_hexapod_has_six_links(chromium):
