@@ -150,7 +150,7 @@ def test_a_lost_gauge_is_on_top_and_the_state_says_so(tab, live):
         until(tab, "document.body.dataset.state === 'hold'")
         until(tab, "document.querySelector('#gauge-table tr.bad')")
         assert "frame u1" in text(tab, "#reason")
-        assert "frame" in text(tab, "#gauge-table tbody tr >> nth=0")
+        until(tab, "document.querySelector('#gauge-table tbody tr').textContent.includes('frame')")
     finally:
         live.machine.ask("FAULT", line="frame_u", fault=None)
 
