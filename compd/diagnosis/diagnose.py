@@ -13,8 +13,9 @@ from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.thinning import thinned
+from compd.diagnosis import stages
 from compd.diagnosis.candidate_results import candidate_results, explained_fraction, why_nothing_else
-from compd.diagnosis.candidates.candidates import library_pool, periodic_candidates
+from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.constant_finding import describe_constant
@@ -68,12 +69,29 @@ def diagnose(
         diagnosis.verdict  # "identified"
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
-    progress("comparing the model with the recording")
+    progress(stages.COMPARISON)
     aligned = thinned(aligned, MOST_ROWS)
     before = compare(aligned, fitted, covariance)
     explanation = explain_residual(before, effects, progress, criteria)
-    progress("fitting on the real forward model")
+    progress(stages.FIT)
     return _diagnosis(explanation, covariance)
+
+
+def candidate_pool(before: Comparison, effects: Sequence[Effect]) -> CandidatePool:
+    """What may explain the residual of a comparison: effects that its model has not, also at periods that the residual
+    suggests, and what stands for effects that were not measured.
+
+    effects : the library.
+    """
+    aligned = before.aligned
+    present = [effect.effect.id for effect in before.fitted]
+    pool = library_pool(aligned, effects, present)
+    tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
+    return replace(
+        pool,
+        candidates=(*pool.candidates, *periodic_candidates(aligned, tried, before.residual_um, before.used)),
+        proxies=proxy_candidates(aligned, effects, present),
+    )
 
 
 def explain_residual(
@@ -86,16 +104,8 @@ def explain_residual(
 
     effects, progress, criteria : as of `diagnose`.
     """
-    progress("what each effect would do")
-    aligned = before.aligned
-    present = [effect.effect.id for effect in before.fitted]
-    pool = library_pool(aligned, effects, present)
-    tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
-    pool = replace(
-        pool,
-        candidates=(*pool.candidates, *periodic_candidates(aligned, tried, before.residual_um, before.used)),
-        proxies=proxy_candidates(aligned, effects, present),
-    )
+    progress(stages.CANDIDATES)
+    pool = candidate_pool(before, effects)
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
     # which rows are gross, and what explains the others, depend on one another: both are determined twice

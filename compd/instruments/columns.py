@@ -73,7 +73,7 @@ def _of_group(
     table: RawTable, roles: Roles, options: ReadOptions, taken: dict[str, str], problems: ExportProblems
 ) -> RawTable:
     """The rows of one group of points; asks where there are several and none is chosen."""
-    labels = _labels(table, roles)
+    labels = group_labels(table, roles)
     if labels is None:
         if options.group not in (None, ALL_GROUPS):
             problems.add(0, "has no column of groups", f"--group {options.group}", "no --group")
@@ -101,7 +101,7 @@ def _of_group(
     return table
 
 
-def _labels(table: RawTable, roles: Roles) -> Sequence[str] | None:
+def group_labels(table: RawTable, roles: Roles) -> Sequence[str] | None:
     """Row by row, the group: "collection::group" where there are several collections; None without any."""
     group, collection = roles.column.get("group"), roles.column.get("collection")
     if group is None or (collection is not None and len(set(table.columns[collection])) > 1):
@@ -118,7 +118,7 @@ def _names(table: RawTable, roles: Roles, taken: dict[str, str]) -> tuple[str, .
     if "name" not in roles.column:
         return None
     names = table.columns[roles.column["name"]]
-    labels = _labels(table, roles)
+    labels = group_labels(table, roles)
     if labels is not None and len(set(labels)) > 1:
         pairs = set(zip(labels, names, strict=True))
         if len(pairs) > len(set(names)):

@@ -25,6 +25,12 @@ def read_export(path: Path, options: ReadOptions | None = None) -> InstrumentExp
         Every problem with its line, and every question that only a person can answer, with the options that do.
     """
     options = options or ReadOptions()
+    table = read_table(path, options)
+    return table if isinstance(table, InstrumentExport) else to_export(table, options)
+
+
+def read_table(path: Path, options: ReadOptions) -> RawTable | InstrumentExport:
+    """As `read_export`, before it is known which column is what; a CARTO file has no columns, and is read whole."""
     if options.shape is not None and options.shape not in SHAPES:
         problems = ExportProblems(path)
         problems.add(0, "--as names no shape", options.shape, ", ".join(SHAPES))
@@ -38,8 +44,8 @@ def read_export(path: Path, options: ReadOptions | None = None) -> InstrumentExp
     if shape == "xlsx":
         from compd.instruments.workbook import read_workbook
 
-        return to_export(read_workbook(path, options), options)
-    return to_export(_read_text(path, content, options), options)
+        return read_workbook(path, options)
+    return _read_text(path, content, options)
 
 
 def _shape_of_bytes(path: Path, content: bytes) -> str | None:

@@ -44,6 +44,21 @@ def read_workbook(path: Path, options: ReadOptions) -> RawTable:
             raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
 
 
+def sheet_names(path: Path) -> tuple[str, ...]:
+    """The names of a workbook's sheets, in their order. Raises RecordingError for what is no .xlsx."""
+    from openpyxl import load_workbook
+
+    check_workbook_file(path)
+    try:
+        book = load_workbook(path, read_only=True)
+    except BROKEN as error:
+        raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
+    try:
+        return tuple(sheet.title for sheet in book.worksheets)
+    finally:
+        book.close()
+
+
 def _read(path: Path, options: ReadOptions) -> RawTable:
     from openpyxl import load_workbook
 

@@ -105,7 +105,7 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
             Problem(
                 where=f"effect {effect.id}",
                 what=f"acts at the port {effect.port}, which an external model has not",
-                allowed="effects at the ports " + ", ".join(_external_ports(links)),
+                allowed="effects at the ports " + ", ".join(external_ports(links)),
                 next_step="write a machine configuration",
             )
         )
@@ -130,10 +130,11 @@ def _reaches_prediction(effect: Effect, available: Collection[str], links: int) 
     Without known kinematics only what acts on the predicted coordinates themselves: on link lengths what their scales
     and the links add, on the tip what the reference adds.
     """
-    return "kinematics" in available or any(port in effect.ports for port in _external_ports(links))
+    return "kinematics" in available or any(port in effect.ports for port in external_ports(links))
 
 
-def _external_ports(links: int) -> tuple[Port, ...]:
+def external_ports(links: int) -> tuple[Port, ...]:
+    """Where effects can act on what an external model predicted: on lengths of so many links, or on the tip."""
     return ("scale", "link") if links else ("reference",)
 
 

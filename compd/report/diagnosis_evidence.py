@@ -39,16 +39,23 @@ def step_rows(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> list[tuple[
     rows += parameter_texts(step, links).items()
     rows += [
         ("error, rows left out", fall_text([before, step.heldout_rms_um], fall.unit)),
-        ("explains", f"{percent_text(step.explained_fraction)} of the squared error that was left{_above(fall)}"),
-        ("by noise alone", f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"),
+        ("explains", explains_text(step, fall)),
+        ("by noise alone", by_noise_text(step)),
         ("rivals", _rivals(step)),
         ("told apart by", step.effect.separated_by),
     ]
     return rows
 
 
-def _above(fall: ErrorFall) -> str:
-    return " above noise" if fall.noise_known else ""
+def explains_text(step: DiagnosisStep, fall: ErrorFall) -> str:
+    """The share of the error that an effect takes away of what those before it left."""
+    above = " above noise" if fall.noise_known else ""
+    return f"{percent_text(step.explained_fraction)} of the squared error that was left{above}"
+
+
+def by_noise_text(step: DiagnosisStep) -> str:
+    """How often noise alone would do as well as an effect."""
+    return f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"
 
 
 def _rivals(step: DiagnosisStep) -> str:
@@ -135,19 +142,21 @@ def untested_table(diagnosis: Diagnosis) -> PageTable:
 
 
 def formula_list(diagnosis: Diagnosis) -> str:
-    """What describes the rest best, as a file of effects (a YAML list); "" where nothing does.
+    """What describes the rest best, as a file of effects (a YAML list); "" where nothing does."""
+    return "".join(formula_texts(diagnosis))
 
-    Each formula is an entry of its own; its fitted numbers stand behind it as comments.
-    """
+
+def formula_texts(diagnosis: Diagnosis) -> list[str]:
+    """Each formula of `formula_list` as an entry of its own; its fitted numbers stand behind it as comments."""
     finding = described_by(diagnosis)
     if finding is None:
-        return ""
+        return []
     blocks = []
     for effect, fitted in zip(finding.formula_effects, finding.parameters, strict=True):
         text = yaml.safe_dump([_plain(effect)], sort_keys=False, default_flow_style=None, width=YAML_WIDTH)
         numbers = ", ".join(f"{name} = {value:.4g}" for name, value in fitted.items())
         blocks.append(f"{text}  # fitted: {numbers}\n")
-    return "".join(blocks)
+    return blocks
 
 
 def described_by(diagnosis: Diagnosis) -> EmpiricalFinding | None:

@@ -58,6 +58,9 @@ class MeasurementPlan:
         Of three rivals or more, the pairs that no rows within the limits tell apart; the rows are for the others.
     ways : tuple
         For each row the way on which the links come from the wanted side, for G-code; empty where it is not known.
+    difference_um : tuple of tuples of float
+        By how much two of the rivals, the first that the rows are for, differ on each row, along each measured
+        coordinate, as they are fitted on the recording; empty where there is one alone.
     """
 
     rivals: tuple[str, ...]
@@ -67,6 +70,7 @@ class MeasurementPlan:
     separated_by: str = ""
     alike: tuple[tuple[str, str], ...] = ()
     ways: tuple[Way | None, ...] = ()
+    difference_um: tuple[tuple[float, ...], ...] = ()
 
     @property
     def tells_apart(self) -> bool:

@@ -107,7 +107,8 @@ class MeasurementPlanner:
         refits, known = zip(*(self._refit(contest) for contest in contests), strict=True)
         lengths = np.where(np.all(known, axis=0), self._possible.lengths, most_rows + 1)
         choice = choose_programmes(refits, lengths, most_rows)
-        rows = [row for k in sorted(choice.programmes) for row in self._possible.rows_of(k)]
+        programmes = sorted(choice.programmes)
+        rows = [row for k in programmes for row in self._possible.rows_of(k)]
         names = dict.fromkeys(contender.name for contest in contests for contender in contest if contender is not None)
         return MeasurementPlan(
             rivals=tuple(names),
@@ -115,7 +116,18 @@ class MeasurementPlanner:
             separation=float(np.sqrt(max(choice.after, 0.0))),
             before=float(np.sqrt(max(choice.before, 0.0))),
             separated_by=separated_by,
+            difference_um=self._difference_um(contests[0], programmes),
         )
+
+    def _difference_um(self, contest: Contest, programmes: Sequence[int]) -> tuple[tuple[float, ...], ...]:
+        """Of what the two sides predict on each row of the programmes, as they are fitted."""
+        truth, rival = contest
+        if rival is None or not programmes:
+            return ()
+        ends = self._possible.ends
+        rows = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in programmes])
+        sides = [side.columns.possible[rows] @ side.theta for side in (truth, rival)]
+        return tuple(tuple(row) for row in ((sides[0] - sides[1]) * self._sigma_um).tolist())
 
     def _refit(self, contest: Contest) -> tuple[RivalRefit, BoolArray]:
         """The rival's refit, and (K,) the programmes on which it can be computed."""

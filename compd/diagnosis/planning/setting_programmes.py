@@ -52,8 +52,7 @@ def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     Raises CompdError where a limit is given for a column that none of the effects is computed from, or leaves no value.
     """
     usable = aligned.usable.mask
-    columns = {**aligned.rows.quantities, **_motion_columns(aligned.rows)}
-    recorded = {name: values for name, values in columns.items() if np.isfinite(values[usable]).any()}
+    recorded = _recorded_columns(aligned)
     names = [name for name in _column_names(aligned, effects) if name in recorded]
     _check_names(limits, names)
     if any(_SENSITIVITY.fullmatch(need) for effect in effects for need in effect.needs):
@@ -67,6 +66,18 @@ def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     if any("time" in effect.needs for effect in effects):
         programmes += [_later(settings, watched_s) for watched_s in WATCHED_S]
     return _programme_rows(aligned, programmes, recorded, names)
+
+
+def recorded_settings(aligned: AlignedRecording, effects: Sequence[Effect]) -> dict[str, FloatArray]:
+    """What was recorded of the columns that `effects` are computed from: name -> values of the usable rows."""
+    recorded, usable = _recorded_columns(aligned), aligned.usable.mask
+    return {name: recorded[name][usable] for name in _column_names(aligned, effects) if name in recorded}
+
+
+def _recorded_columns(aligned: AlignedRecording) -> dict[str, FloatArray]:
+    """Name -> (N,) of every column that has a value in a usable row."""
+    columns = {**aligned.rows.quantities, **_motion_columns(aligned.rows)}
+    return {name: values for name, values in columns.items() if np.isfinite(values[aligned.usable.mask]).any()}
 
 
 def _column_names(aligned: AlignedRecording, effects: Sequence[Effect]) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from compd.diagnosis import stages
 from compd.diagnosis.candidates.candidates import Candidate, periodic_candidates
 from compd.diagnosis.candidates.changes import ChangeCandidate, change_candidates, moments_between_s, moments_s
 from compd.diagnosis.candidates.refined_constants import refined_variants
@@ -100,15 +101,15 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
 
     A set of effects and descriptions wins by the same score; a description has the higher price.
     """
-    progress("every effect, then the next beside it, on rows left out")
+    progress(stages.EFFECTS)
     problem, library, best = _search_library(problem)
     if _beats_descriptions(problem, library, best):
         return Explanation(problem, library, _ordered(library, best.members))
-    progress("every covariate, lag, direction and time")
+    progress(stages.COVARIATES)
     competitors = _Competitors(problem, library)
     for basis in dict.fromkeys([(), best.members]):
         competitors.screen_beside(library, basis)
-    progress("effects against descriptions")
+    progress(stages.DESCRIPTIONS)
     losses = problem.losses(competitors.candidates)
     best = _search_all(losses, best.members)
     fits = competitors.screen_beside(losses, best.members)

@@ -162,17 +162,17 @@ def build_problem(
     """
     aligned = comparison.aligned
     sigma_um = _unit_um(comparison)
-    nuisance_um = _nuisance_um(comparison)
+    fitted_along_um = fitted_along_columns(comparison)
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    for columns in (nuisance_um, *(candidate.columns_um for candidate in (*pool.candidates, *pool.proxies))):
+    for columns in (fitted_along_um, *(candidate.columns_um for candidate in (*pool.candidates, *pool.proxies))):
         known &= np.isfinite(columns).all(axis=(1, 2))
-    candidates, same = split_constants(pool.candidates, nuisance_um, known)
+    candidates, same = split_constants(pool.candidates, fitted_along_um, known)
     candidates += pool.proxies
     constant = constant_candidate(aligned)
     if constant is not None:
         candidates = (*candidates, constant)
     residual = comparison.residual_um / sigma_um
-    nuisance = nuisance_um / sigma_um[:, None]
+    nuisance = fitted_along_um / sigma_um[:, None]
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
         noise = 1.0 if comparison.floor.known else 0.0
@@ -231,7 +231,7 @@ def _everything(
     return columns
 
 
-def _nuisance_um(comparison: Comparison) -> FloatArray:
+def fitted_along_columns(comparison: Comparison) -> FloatArray:
     """(N, m, Q) columns of the model's own parameters and of what is fitted along: frame, constant, starts of lags."""
     aligned = comparison.aligned
     columns = [aligned.columns(fitted.effect, fitted.constants) * UM_PER_MM for fitted in comparison.fitted]

@@ -41,6 +41,7 @@ _NEEDS_OF_LINK: Mapping[str, tuple[str, ...]] = {
     "link_mm": ("kinematics",),
 }
 _PER_LINK_COLUMN = re.compile(r"^[a-z][a-z0-9_]*_link_[A-Za-z]\w*$")
+_OF_ONE_LINK = re.compile(r"_link_\d+_")
 _QUANTITY = re.compile(r"^[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+$")
 
 
@@ -61,6 +62,11 @@ def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
             where="", what="is no column", allowed=f"a measured quantity with its unit (humidity_pct), {columns}"
         )
     return (name,)
+
+
+def link_column(quantity: str) -> str:
+    """How a formula names a quantity that each link has: temperature_link_2_degC as temperature_link_degC."""
+    return _OF_ONE_LINK.sub("_link_", quantity, count=1)
 
 
 def column_values(rows: Observations, name: str, port: Port) -> FloatArray:

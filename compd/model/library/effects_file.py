@@ -154,6 +154,16 @@ def _read_file(path: Path) -> list[Effect]:
     entries = document.data[_KEY]
     if isinstance(entries, dict):
         return [formula_effect(entries, str(path))]
+    if not isinstance(entries, list | None):
+        problems.append(
+            Problem(
+                where=document.where((_KEY,)),
+                what="is no list of effects",
+                value=str(entries)[:80],
+                allowed="- id: ...",
+            )
+        )
+        raise ConfigurationError(problems)
     effects: list[Effect] = []
     for number, entry in enumerate(entries or ()):
         try:

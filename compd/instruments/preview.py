@@ -1,0 +1,118 @@
+"""The first rows of an export with what each column is taken for: what a person checks before it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+
+from compd.errors import Problem, RecordingError
+from compd.instruments.column_roles import find_roles
+from compd.instruments.columns import group_labels, to_export
+from compd.instruments.export import InstrumentExport, ReadOptions
+from compd.instruments.export_problems import ExportProblems
+from compd.instruments.read import read_table
+from compd.instruments.text_file import decode_text, read_content
+
+SHOWN_ROWS = 20
+# Longer lines and cells, more columns and groups than these are not shown whole.
+_CELL_WIDTH = 200
+_MOST_COLUMNS = 200
+_MOST_GROUPS = 200
+
+
+@dataclass(frozen=True)
+class ExportPreview:
+    """The top of an export.
+
+    Attributes
+    ----------
+    export : the whole of it; None where `problems` say why it cannot be read.
+    shape : one of SHAPES; "" where it is not known.
+    line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
+    header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
+        nothing; empty where no columns could be told.
+    told : what was found, in words. groups, sheets : that there are to choose from.
+    """
+
+    export: InstrumentExport | None
+    shape: str = ""
+    line: Sequence[int] = ()
+    rows: Sequence[Sequence[str]] = ()
+    header: Sequence[str] = ()
+    roles: Sequence[str] = ()
+    told: Mapping[str, str] = field(default_factory=dict)
+    groups: Sequence[str] = ()
+    sheets: Sequence[str] = ()
+    problems: Sequence[Problem] = ()
+
+
+def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
+    """Read an export as `read_export` does; what is wrong with it is beside what could be read."""
+    try:
+        table = read_table(path, options)
+    except RecordingError as error:
+        line, rows = _lines_at_top(path)
+        return ExportPreview(None, line=line, rows=rows, sheets=_sheets(path), problems=error.problems)
+    if isinstance(table, InstrumentExport):
+        return _of_samples(table)
+    roles = find_roles(table, options, ExportProblems(path))
+    export, problems = None, tuple[Problem, ...]()
+    try:
+        export = to_export(table, options)
+    except RecordingError as error:
+        problems = error.problems
+    role_of = {column: role for role, column in roles.column.items()}
+    columns = table.columns[:_MOST_COLUMNS]
+    return ExportPreview(
+        export,
+        shape=table.shape,
+        line=table.line[:SHOWN_ROWS].tolist(),
+        rows=_cut(zip(*(cells[:SHOWN_ROWS] for cells in columns), strict=True)),
+        header=[name[:_CELL_WIDTH] for name in (table.header or ())[:_MOST_COLUMNS]],
+        roles=[role_of.get(k, "-") for k in range(len(columns))],
+        told=table.told if export is None else export.taken,
+        groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MOST_GROUPS],
+        sheets=_sheets(path) if table.shape == "xlsx" else (),
+        problems=problems,
+    )
+
+
+def _of_samples(export: InstrumentExport) -> ExportPreview:
+    """A file of numbers without columns of text."""
+    times = [] if export.time_s is None else ["time"]
+    first_rows = [[f"{value:.9g}" for value in row] for row in export.values[:SHOWN_ROWS]]
+    if export.time_s is not None:
+        first_rows = [[f"{at_s:.9g}", *row] for at_s, row in zip(export.time_s, first_rows, strict=False)]
+    return ExportPreview(
+        export,
+        shape=export.shape,
+        line=export.line[:SHOWN_ROWS].tolist(),
+        rows=first_rows,
+        header=[f"{role} [{'s' if role == 'time' else 'mm'}]" for role in chain(times, export.axes)],
+        told=export.taken,
+    )
+
+
+def _lines_at_top(path: Path) -> tuple[list[int], list[list[str]]]:
+    """The first lines of a text, whatever they are; none of another file."""
+    try:
+        lines = decode_text(path, read_content(path)).lines[:SHOWN_ROWS]
+    except RecordingError:
+        return [], []
+    return list(range(1, len(lines) + 1)), _cut([line] for line in lines)
+
+
+def _sheets(path: Path) -> tuple[str, ...]:
+    """Of a workbook; empty for any other file."""
+    from compd.instruments.workbook import sheet_names
+
+    try:
+        return sheet_names(path)
+    except RecordingError:
+        return ()
+
+
+def _cut(rows: Iterable[Iterable[str]]) -> list[list[str]]:
+    return [[cell[:_CELL_WIDTH] for cell in row] for row in rows]
