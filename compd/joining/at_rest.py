@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from compd.joining.by_distance import assign_by_distance
 from compd.joining.by_name import assign_by_name, check_names
 from compd.joining.by_order import assign_by_order
 from compd.joining.by_time import Instrument
+from compd.joining.distances import lay_over
 from compd.joining.dwells import Dwell, dwell_columns, find_dwells
 from compd.joining.expected_places import expected_places_mm
 from compd.joining.joined_rows import joined_columns, joined_sidecar
@@ -32,12 +33,14 @@ By = Literal["order", "name", "distance"]
 
 @dataclass(frozen=True)
 class RestJoin:
-    """What `join_at_rest` wrote.
+    """A recording of points at rest, each beside the gauges in its dwell; `write_recording` writes it.
 
     Attributes
     ----------
-    path : the CSV file. by : "order", "name" or "distance".
-    dwells : of the recording. points : of the export. joined : rows written, one for each point with a dwell.
+    columns, sidecar : of the recording. by : "order", "name" or "distance".
+    dwells : of the recording of gauges. points : of the export. joined : rows, one for each point with a dwell.
+    line, dwell_number : (G,) line of each point in the export, and the number of its dwell from 1; 0 for none.
+    residual_mm : (G,) how far each point is from its dwell once all are laid over the dwells; nan for none.
     first, last : (line of the export, dwell) of the first and the last pair.
     rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
     next_best : (shift by so many dwells, its rms in mm), of an assignment by order; None where there is no other.
@@ -45,11 +48,15 @@ class RestJoin:
     of_lengths : whether the points are lengths along a link.
     """
 
-    path: Path
+    columns: Mapping[str, FloatArray]
+    sidecar: Mapping[str, Any]
     by: By
     dwells: tuple[Dwell, ...]
     points: int
     joined: int
+    line: IntArray
+    dwell_number: IntArray
+    residual_mm: FloatArray
     first: tuple[int, Dwell]
     last: tuple[int, Dwell]
     rms_mm: float
@@ -78,7 +85,24 @@ def join_at_rest(
     by: By,
     plan: Path | None = None,
 ) -> RestJoin:
-    """Write `out` (NAME.csv and NAME.yaml): one row for each point, with the gauges' readings in its dwell.
+    """Write `out` (NAME.csv and NAME.yaml): what `match_at_rest` puts together.
+
+    Raises RecordingError as it does, and where the files cannot be written.
+    """
+    joined = match_at_rest(recording, configuration, export, instrument, by, plan)
+    write_recording(out, joined.columns, joined.sidecar)
+    return joined
+
+
+def match_at_rest(
+    recording: Recording,
+    configuration: Configuration | None,
+    export: InstrumentExport,
+    instrument: Instrument,
+    by: By,
+    plan: Path | None = None,
+) -> RestJoin:
+    """One row for each point, with the gauges' readings in its dwell; nothing is written.
 
     Parameters
     ----------
@@ -91,7 +115,7 @@ def join_at_rest(
     Raises
     ------
     RecordingError
-        Where the dwells and the points cannot be told to belong together, or the files cannot be written.
+        Where the dwells and the points cannot be told to belong together.
     """
     if problems := _problems(recording, configuration, export, instrument, by):
         raise RecordingError(problems)
@@ -122,14 +146,22 @@ def join_at_rest(
     sidecar = joined_sidecar(
         recording, export, instrument, by, number_rows, len(export.line), assigned.rms_mm, assigned.next_best
     )
-    write_recording(out, columns, sidecar)
     pairs = [(int(export.line[j]), kept[assigned.dwell[j]]) for j in (points[0], points[-1])]
+    dwell_number, residual_mm = np.zeros(len(export.line), dtype=np.int64), np.full(len(export.line), np.nan)
+    dwell_number[points] = [kept[i].number for i in assigned.dwell[points]]
+    at_mm = places_mm[assigned.dwell[points]]
+    laid_over_mm = lay_over(measured_mm[points], at_mm)(measured_mm[points])
+    residual_mm[points] = np.linalg.norm(laid_over_mm - at_mm, axis=1)
     return RestJoin(
-        out,
+        columns,
+        sidecar,
         by,
         dwells,
         len(export.line),
         number_rows,
+        export.line,
+        dwell_number,
+        residual_mm,
         pairs[0],
         pairs[1],
         assigned.rms_mm,

@@ -33,16 +33,17 @@ _INSTANTS = 9
 
 @dataclass(frozen=True)
 class JoinResult:
-    """What `join_reference` wrote.
+    """A recording with the reference that an instrument gives, on one clock; `write_recording` writes it.
 
     Attributes
     ----------
-    path : the CSV file. offset : between the clocks.
+    columns, sidecar : of the recording. offset : between the clocks.
     matched : rows that have a reference now. left_out : reason -> rows without one.
     still_mm : motion above which a row counts as in motion.
     """
 
-    path: Path
+    columns: Mapping[str, FloatArray]
+    sidecar: Mapping[str, Any]
     offset: ClockOffset
     matched: int
     left_out: Mapping[str, int]
@@ -76,7 +77,23 @@ def join_reference(
     offset_s: float | None = None,
     moving: bool = False,
 ) -> JoinResult:
-    """Write `out` (NAME.csv and NAME.yaml): the recording's columns, and the reference in further columns.
+    """Write `out` (NAME.csv and NAME.yaml): what `match_by_time` puts together.
+
+    Raises RecordingError as it does, and where the files cannot be written.
+    """
+    joined = match_by_time(recording, track, instrument, offset_s, moving)
+    write_recording(out, joined.columns, joined.sidecar)
+    return joined
+
+
+def match_by_time(
+    recording: Recording,
+    track: Track,
+    instrument: Instrument,
+    offset_s: float | None = None,
+    moving: bool = False,
+) -> JoinResult:
+    """The recording's columns, and the reference in further columns; nothing is written.
 
     Parameters
     ----------
@@ -88,7 +105,7 @@ def join_reference(
     Raises
     ------
     RecordingError
-        Where the offset cannot be estimated, no row matches, or the files cannot be written.
+        Where the offset cannot be estimated, or no row matches.
     """
     problems = _problems(recording, track, instrument, moving)
     if problems or recording.scale_mm is None:
@@ -113,8 +130,8 @@ def join_reference(
     columns = {**recording.columns, **dict(zip(_column_names(track, instrument), reference.T, strict=True))}
     if instrument.ball is not None:
         columns["ball"] = np.where(np.isfinite(reference[:, 0]), float(instrument.ball), np.nan)
-    write_recording(out, columns, _sidecar(recording, track, instrument, offset, matched))
-    return JoinResult(out, offset, matched, left_out, still_mm)
+    sidecar = _sidecar(recording, track, instrument, offset, matched)
+    return JoinResult(columns, sidecar, offset, matched, left_out, still_mm)
 
 
 def _column_names(track: Track, instrument: Instrument) -> list[str]:

@@ -19,17 +19,14 @@ At the right offset a polynomial of the scales explains what the instrument meas
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy.signal import correlate, correlation_lags
 
-from compd.arrays import BoolArray, FloatArray
-from compd.errors import Problem, RecordingError
+from compd.arrays import FloatArray
 from compd.instruments.track import Track
+from compd.joining.shared_motion import SharedMotion
 
-# Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
-MOTION_MM = 0.01
 # The least that the scales must explain of the instrument's variance. On simulated tripods the right offset
 # explains 0.995 or more; unrelated motions, with some twenty moves, reach up to 0.6 by chance.
 LEAST_AGREEMENT = 0.9
@@ -37,15 +34,14 @@ LEAST_AGREEMENT = 0.9
 # interpolation alone may miss a tenth of it), and more than this many times what the best one leaves.
 ALIKE = 0.01
 CLEARLY_WORSE = 2.0
-# Independent places per term of the polynomial: in the whole recording, and in the part that overlaps.
-_PLACES_PER_TERM = 5
-_LEAST_PLACES_PER_TERM = 2
-# Most rows in the regression, most steps of the common grid of time, most candidates.
-_MOST_ROWS = 2000
+# Most steps of the common grid of time, most candidates.
 _MOST_STEPS = 2**18
 _CANDIDATES = 8
 # Offsets in one scan of the refinement.
 _SCAN = 201
+# Offsets of a picture: over all at which the two overlap, and near each candidate.
+_OVERVIEW = 160
+_NEAR = 41
 # Blocks of time whose best offsets are compared with each other.
 _BLOCKS = 6
 
@@ -69,14 +65,26 @@ class ClockOffset:
     runner_up: tuple[float, float] | None = None
 
 
+@dataclass(frozen=True)
+class AgreementCurve:
+    """offset_s : (K,) rising. agreement : (K,) at each of them, as in `ClockOffset`; nan where too little overlaps.
+
+    window_s : how far from an offset no other counts as another one.
+    """
+
+    offset_s: FloatArray
+    agreement: FloatArray
+    window_s: float
+
+
 def estimate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> ClockOffset:
     """Estimate the offset from the recording's (N,) times and (N, n) scales, and the instrument's track.
 
     Raises RecordingError where one of them stands still, too few rows overlap, or several offsets fit.
     """
-    motion = _SharedMotion(time_s, scale_mm, track)
+    motion = SharedMotion(time_s, scale_mm, track)
     motion.check()
-    window_s = max(2.0 * motion.period_s, 5.0 * track.period_s, 2.0 * _decorrelation_time_s(track))
+    window_s = _window_s(motion)
     # (agreement, offset), best first
     maxima = sorted((_refine(motion, start_s, window_s) for start_s in _candidates_s(motion, window_s)), reverse=True)
     maxima = [maximum for maximum in maxima if np.isfinite(maximum[0])]
@@ -103,119 +111,29 @@ def estimate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> C
 
 def evaluate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track, offset_s: float) -> ClockOffset:
     """An offset that a person gave, with the agreement that it reaches; nothing is refused."""
-    return ClockOffset(offset_s, np.nan, _SharedMotion(time_s, scale_mm, track).agreement(offset_s))
+    return ClockOffset(offset_s, np.nan, SharedMotion(time_s, scale_mm, track).agreement(offset_s))
 
 
-class _SharedMotion:
-    """The motion as the scales and as the instrument recorded it, thinned where there are more rows than needed.
+def agreement_curve(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> AgreementCurve:
+    """The agreement over all offsets at which the two overlap, more closely where `estimate_offset` looks: a picture.
 
-    Attributes
-    ----------
-    all_time_s, all_scale_mm : (M,), (M, n) rows with every scale.
-    time_s : (N,) of the thinned rows. travel : (N,) path so far in units of the places' spread.
-    terms : (N, p) monomials of the scales; None where there are too few places for any.
-    period_s : median time between two rows.
+    Raises RecordingError where one of them stands still, or too few places were visited.
     """
-
-    def __init__(self, time_s: FloatArray, scale_mm: FloatArray, track: Track) -> None:
-        complete = np.isfinite(scale_mm).all(axis=1)
-        self.track = track
-        self.all_time_s, self.all_scale_mm = time_s[complete], scale_mm[complete]
-        thin = slice(None, None, -(-max(len(self.all_time_s), 1) // _MOST_ROWS))
-        self.time_s = self.all_time_s[thin]
-        self.travel = _travel(self.all_scale_mm)[thin]
-        places = min(len(self.time_s), int(self.travel.max(initial=0.0)))
-        self.terms = _monomials(self.all_scale_mm[thin], places)
-        self.period_s = float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else 0.0
-
-    def check(self) -> None:
-        """Raise RecordingError where there is too little motion for a pattern."""
-        for what, values in (("the machine", self.all_scale_mm), ("the instrument", self.track.position_mm)):
-            moved_mm = float(np.ptp(values, axis=0).max()) if len(values) else 0.0
-            if moved_mm < MOTION_MM:
-                raise self.refusal(
-                    f"{what} stands still all the time", f"{moved_mm:.6f} mm", f"a motion of more than {MOTION_MM} mm"
-                )
-        if self.terms is None:
-            scales = self.all_scale_mm.shape[1]
-            raise self.refusal(
-                "too few rows or places to see a pattern",
-                f"{len(self.time_s)} rows",
-                f"{_PLACES_PER_TERM * (scales + 1)} places far from each other",
-            )
-
-    def refusal(self, what: str, value: str, allowed: str) -> RecordingError:
-        """The error that the offset cannot be estimated."""
-        return RecordingError(
-            Problem(
-                where=str(self.track.path),
-                what=f"the clock offset cannot be told: {what}",
-                value=value,
-                allowed=allowed,
-                next_step="record with moves between dwells of different length, or give --offset S; join points at "
-                "rest --by order, name or distance",
-            )
-        )
-
-    def covered(self, earliest_s: float, latest_s: float) -> BoolArray:
-        """(N,) rows that the track covers at every offset between the two."""
-        first_s, last_s = float(self.track.time_s[0]), float(self.track.time_s[-1])
-        rows: BoolArray = (self.time_s - latest_s >= first_s) & (self.time_s - earliest_s <= last_s)
-        return rows
-
-    def agreement(self, offset_s: float) -> float:
-        """As `agreements`, of one offset on all rows that it covers."""
-        return float(self.agreements(np.array([offset_s]), self.covered(offset_s, offset_s))[0])
-
-    def agreements(self, offsets_s: FloatArray, rows: BoolArray) -> FloatArray:
-        r"""Adjusted coefficient of determination on `rows` at each offset; nan where there are too few places.
-
-        With :math:`y` the centred positions at an offset, :math:`Q` an orthonormal basis of the :math:`p` monomials and
-        :math:`m` independent places: :math:`1 - (|y - Q Q^T y|^2 / |y|^2) (m - 1) / (m - p)`.
-        """
-        travel = self.travel[rows]
-        places = min(len(travel), float(np.ptp(travel))) if len(travel) else 0.0
-        if self.terms is None or places < _LEAST_PLACES_PER_TERM * self.terms.shape[1]:
-            return np.full(len(offsets_s), np.nan)
-        basis, _ = np.linalg.qr(self.terms[rows])
-        result = np.empty(len(offsets_s))
-        for i, offset_s in enumerate(offsets_s):
-            position_mm = self.track.position_at(self.time_s[rows] - offset_s)
-            position_mm -= position_mm.mean(axis=0)
-            residual_mm = position_mm - basis @ (basis.T @ position_mm)
-            total = max(float(np.sum(position_mm**2)), 1e-30)
-            unexplained = float(np.sum(residual_mm**2)) / total
-            result[i] = 1.0 - unexplained * (places - 1.0) / (places - basis.shape[1])
-        return result
+    motion = SharedMotion(time_s, scale_mm, track)
+    motion.check()
+    window_s = _window_s(motion)
+    overlap_s = motion.time_s[0] - track.time_s[-1], motion.time_s[-1] - track.time_s[0]
+    near = [start_s + np.linspace(-window_s, window_s, _NEAR) for start_s in _candidates_s(motion, window_s)]
+    offsets_s = np.unique(np.concatenate([np.linspace(*overlap_s, _OVERVIEW), *near]))
+    return AgreementCurve(offsets_s, np.array([motion.agreement(offset_s) for offset_s in offsets_s]), window_s)
 
 
-def _travel(scale_mm: FloatArray) -> FloatArray:
-    """(N,) length of the path so far over the spread of the places: how many independent places were visited.
-
-    A row every millisecond is not a thousand places a second. For random targets a move is 1.3 times the spread.
-    """
-    if len(scale_mm) < 2:
-        return np.zeros(len(scale_mm))
-    path_mm = np.cumsum(np.linalg.norm(np.diff(scale_mm, axis=0, prepend=scale_mm[:1]), axis=1))
-    travel: FloatArray = path_mm / max(float(np.sqrt(np.var(scale_mm, axis=0).sum())), MOTION_MM)
-    return travel
+def _window_s(motion: SharedMotion) -> float:
+    """How far from a candidate its maximum may be; others are farther away."""
+    return max(2.0 * motion.period_s, 5.0 * motion.track.period_s, 2.0 * _decorrelation_time_s(motion.track))
 
 
-def _monomials(scale_mm: FloatArray, places: int) -> FloatArray | None:
-    """(N, p) monomials of the scales up to degree 3, 2 or 1, as the places allow; None where even 1 is too much."""
-    rows, scales = scale_mm.shape
-    spread_mm = np.maximum(np.std(scale_mm, axis=0), 1e-9) if rows else np.ones(scales)
-    standardised = (scale_mm - (scale_mm.mean(axis=0) if rows else 0.0)) / spread_mm
-    for degree in (3, 2, 1):
-        monomials = [
-            factors for order in range(degree + 1) for factors in combinations_with_replacement(range(scales), order)
-        ]
-        if places >= _PLACES_PER_TERM * len(monomials):
-            return np.column_stack([np.prod(standardised[:, list(factors)], axis=1) for factors in monomials])
-    return None
-
-
-def _candidates_s(motion: _SharedMotion, window_s: float) -> list[float]:
+def _candidates_s(motion: SharedMotion, window_s: float) -> list[float]:
     """Offsets at which the two speeds correlate best, each further than `window_s` from the others."""
     track = motion.track
     span_s = np.ptp(motion.all_time_s) + np.ptp(track.time_s)
@@ -282,7 +200,7 @@ def _overlap_correlation(machine: FloatArray, instrument: FloatArray) -> FloatAr
     return correlation
 
 
-def _refine(motion: _SharedMotion, start_s: float, window_s: float) -> tuple[float, float]:
+def _refine(motion: SharedMotion, start_s: float, window_s: float) -> tuple[float, float]:
     """(agreement, offset) of the best offset within the window, by scans of an ever smaller span."""
     centre_s, half_span_s = start_s, window_s
     agreement = np.nan
@@ -299,7 +217,7 @@ def _refine(motion: _SharedMotion, start_s: float, window_s: float) -> tuple[flo
         half_span_s = 4.0 * step_s
 
 
-def _indistinguishable_range_s(motion: _SharedMotion, offset_s: float, window_s: float) -> tuple[float, float]:
+def _indistinguishable_range_s(motion: SharedMotion, offset_s: float, window_s: float) -> tuple[float, float]:
     """(earlier, later) how far the offset may move before the rows' positions change by more than can be seen."""
     rows = motion.covered(offset_s - window_s, offset_s + window_s)
     position_mm = motion.track.position_at(motion.time_s[rows] - offset_s)
@@ -319,7 +237,7 @@ def _indistinguishable_range_s(motion: _SharedMotion, offset_s: float, window_s:
     return reach_s(-1.0), reach_s(1.0)
 
 
-def _standard_error_s(motion: _SharedMotion, offset_s: float, window_s: float) -> float:
+def _standard_error_s(motion: SharedMotion, offset_s: float, window_s: float) -> float:
     """Standard error of the offset from blocks of time, each with its own best offset on the common polynomial."""
     rows = motion.covered(offset_s - window_s, offset_s + window_s)
     if motion.terms is None:

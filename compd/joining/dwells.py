@@ -15,7 +15,7 @@ from compd.recording.recording import Recording
 # The scales of a machine at rest stay within this, or within what their own noise can imitate.
 STILL_MM = 0.001
 NOISE_SIGMAS = 6.0
-# More is motion, however noisy the scales are: `clock_offset.MOTION_MM` for a recording without an instrument.
+# More is motion, however noisy the scales are: `shared_motion.MOTION_MM` for a recording without an instrument.
 LARGEST_LIMIT_MM = 0.01
 # Shorter than a measurement takes: a machine that reverses also stands still for a moment.
 LEAST_ROWS = 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -20,8 +19,16 @@ from compd.cli.export_options import (
     SheetOption,
     UnitOption,
 )
-from compd.cli.join_at_rest import ByChoice
 from compd.cli.options import MachineOption
+
+
+class ByChoice(StrEnum):
+    """What puts a row of the export beside the gauges."""
+
+    TIME = "time"
+    ORDER = "order"
+    NAME = "name"
+    DISTANCE = "distance"
 
 
 class FrameChoice(StrEnum):
@@ -84,38 +91,23 @@ def join(
 ) -> None:
     """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
     from compd.cli.export_options import echo_taken, read_options
-    from compd.cli.join_at_rest import check_options, choose_by, join_points
     from compd.instruments.read import read_export
-    from compd.instruments.track import track_of
-    from compd.joining.by_time import Instrument, join_reference
-    from compd.recording.reader import read_recording
+    from compd.joining.by_time import Instrument
+    from compd.joining.join import JoinOptions, choose_by, match_export, unfit_option
+    from compd.joining.summary import summary_lines
+    from compd.recording.writer import write_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
-    options = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
-    exported = read_export(export, options)
+    read_as = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
+    exported = read_export(export, read_as)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
     instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball)
-    chosen = choose_by(by, exported)
-    check_options(chosen, offset, moving, plan)
-    if chosen != ByChoice.TIME:
-        join_points(gauges, exported, out, instrument, chosen, machine, plan)
-        return
-    recording = read_recording(gauges, needs_reference=False)
-    track = track_of(exported)
-    joined = join_reference(recording, track, out, instrument, offset, moving)
-    clock = joined.offset
-    if math.isnan(clock.std_s):
-        agreement = "not known" if math.isnan(clock.agreement) else f"{clock.agreement:.4f}"
-        typer.echo(f"clock offset {clock.offset_s:+.4f} s, given; agreement with the scales {agreement}")
-    else:
-        typer.echo(
-            f"clock offset {clock.offset_s:+.4f} s +- {clock.std_s:.4f} s (one standard uncertainty); "
-            f"agreement with the scales {clock.agreement:.4f}"
-            + (f", next best {clock.runner_up[1]:.4f} at {clock.runner_up[0]:+.2f} s" if clock.runner_up else "")
-        )
-    typer.echo(
-        f"{joined.matched} of {recording.rows} rows have a reference now (still within {joined.still_mm * 1e3:.1f} um)"
-    )
-    for reason, count in joined.left_out.items():
-        typer.echo(f"    {count} rows without: {reason}")
-    typer.echo(f"written: {joined.path} and {joined.path.with_suffix('.yaml')}")
+    options = JoinOptions(instrument, by.value if by else None, offset, moving, machine, plan)
+    chosen = choose_by(options.by, exported)
+    if option := unfit_option(chosen, options):
+        raise typer.BadParameter(f"does not go with --by {chosen}", param_hint=option)
+    joined = match_export(gauges, exported, options)
+    write_recording(out, joined.columns, joined.sidecar)
+    for line in summary_lines(joined):
+        typer.echo(line)
+    typer.echo(f"written: {out} and {out.with_suffix('.yaml')}")

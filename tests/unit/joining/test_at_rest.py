@@ -90,6 +90,9 @@ def test_by_order_from_dwells_that_nobody_numbered(tmp_path: Path) -> None:
     assert (joined.first[0], joined.first[1].number) == (2, 2)
     assert joined.left_out == {"dwells without a point": "1, 22"}
     assert joined.rms_mm < 5 * NOISE_MM
+    assert joined.line.tolist() == list(range(2, 22))
+    assert joined.dwell_number.tolist() == list(range(2, 22))
+    assert 0 < joined.residual_mm.max() < 10 * NOISE_MM
     recording = read_recording(tmp_path / "joined.csv")
     middle_s = np.arange(1, 21) * (DWELL_S + MOVE_S) + DWELL_S / 2
     assert recording.time_s == pytest.approx(middle_s, abs=0.25)

@@ -18,7 +18,7 @@ from compd.instruments.read import read_export
 from compd.instruments.track import Track
 from compd.instruments.track import track_of as track_of_export
 from compd.joining.by_time import Instrument, join_reference
-from compd.joining.clock_offset import estimate_offset
+from compd.joining.clock_offset import agreement_curve, estimate_offset
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
 from tests.support.two_clocks import TipPath, random_path, track_of
@@ -95,6 +95,25 @@ def test_offset_from_one_link_by_interferometer() -> None:
     track = Track(Path("laser.csv"), instrument_s - 12.345, length_mm, ("length",))
     time_s = np.arange(5.0, motion.end_s - 5.0, 0.1)
     assert abs(estimate_offset(time_s, motion.scales(time_s), track).offset_s - 12.345) < 0.001
+
+
+def test_the_curve_of_agreement_has_its_peak_at_the_offset_and_the_next_best_below() -> None:
+    rng = np.random.default_rng(12)
+    motion = random_path(rng, 60, (1.5, 4.0))
+    track, _ = track_of(motion, rng, -77.7, 0.05, TRACKER_NOISE_MM)
+    time_s = np.arange(10.0, motion.end_s, 0.1)
+    curve = agreement_curve(time_s, motion.scales(time_s), track)
+    estimated = estimate_offset(time_s, motion.scales(time_s), track)
+    best = np.nanargmax(curve.agreement)
+    assert abs(curve.offset_s[best] - estimated.offset_s) < 0.2
+    assert curve.agreement[best] == pytest.approx(estimated.agreement, abs=0.01)
+    assert (np.diff(curve.offset_s) > 0).all()
+    assert estimated.runner_up is not None
+    other = np.abs(curve.offset_s - estimated.offset_s) > curve.window_s
+    assert np.nanmax(curve.agreement[other]) < curve.agreement[best] - 0.1
+    # over all offsets at which the two overlap
+    assert curve.offset_s[0] < time_s[0] - track.time_s[-1] + 1.0
+    assert curve.offset_s[-1] > time_s[-1] - track.time_s[0] - 1.0
 
 
 def test_joined_recording_is_right_where_the_machine_dwells(tmp_path: Path) -> None:

@@ -1,0 +1,97 @@
+"""A recording of gauges and an instrument's export put together as a person asks for it: what `compd join` does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from compd.comparison.open import read_with_machine
+from compd.errors import Problem, RecordingError
+from compd.instruments.export import InstrumentExport
+from compd.instruments.track import track_of
+from compd.joining.assignment import REPEAT_MM
+from compd.joining.at_rest import RestJoin, match_at_rest
+from compd.joining.by_time import Instrument, JoinResult, match_by_time
+from compd.recording.reader import read_recording
+
+JoinBy = Literal["time", "order", "name", "distance"]
+JOIN_BY: tuple[JoinBy, ...] = get_args(JoinBy)
+# Samples further apart in time and place are points, each of its own, and no track of a target.
+_TRACK_PERIOD_S = 1.0
+
+
+@dataclass(frozen=True)
+class JoinOptions:
+    """What a person says of a join.
+
+    Attributes
+    ----------
+    instrument : what gave the reference. by : what puts rows together; None: the time, of a track in time.
+    offset_s : recording time minus instrument time, with "time"; None: estimated from the motion.
+    moving : with "time": rows in motion too. plan : with "name": the plan that was measured.
+    machine : the configuration of the machine; None: the shipped one that the recording names.
+    """
+
+    instrument: Instrument = field(default_factory=Instrument)
+    by: JoinBy | None = None
+    offset_s: float | None = None
+    moving: bool = False
+    machine: Path | None = None
+    plan: Path | None = None
+
+
+def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
+    """What was chosen; without a choice the time, of an export that is a track in time.
+
+    Raises RecordingError where that is not clear: an export without times, or of single points.
+    """
+    if by is not None:
+        return by
+    names = "" if export.name is None else ", or --by name: the points' names are those of the recording or of a plan"
+    next_step = (
+        f"say --by order: the points were measured in the order of the dwells{names}"
+        "; or --by distance: in any order, each place once"
+    )
+    if export.time_s is None:
+        raise RecordingError(
+            Problem(where=str(export.path), what="has no times, so it cannot be joined by time", next_step=next_step)
+        )
+    if len(export.values) > 1:
+        steps_mm = np.linalg.norm(np.diff(export.values[:, :3], axis=0), axis=1)
+        if np.median(np.abs(np.diff(export.time_s))) >= _TRACK_PERIOD_S and np.median(steps_mm) > REPEAT_MM:
+            raise RecordingError(
+                Problem(
+                    where=str(export.path),
+                    what="has times, but most of its rows are points by themselves, and no track in time",
+                    next_step=f"{next_step}; or --by time",
+                )
+            )
+    return "time"
+
+
+def unfit_option(by: JoinBy, options: JoinOptions) -> str:
+    """The option that does not go with what puts rows together, as it is written; "" where all do."""
+    if by != "time" and options.moving:
+        return "--moving"
+    if by != "time" and options.offset_s is not None:
+        return "--offset"
+    return "--plan" if by != "name" and options.plan is not None else ""
+
+
+def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -> JoinResult | RestJoin:
+    """What `compd join` writes, before it is written.
+
+    gauges : a recording of gauges alone, NAME.csv.
+    Raises RecordingError with every reason why the two cannot be told to belong together, or an option is not fit.
+    """
+    by = choose_by(options.by, export)
+    if option := unfit_option(by, options):
+        raise RecordingError(Problem(where=option, what=f"does not go with --by {by}", next_step="leave it out"))
+    if by == "time":
+        recording = read_recording(gauges, needs_reference=False)
+        return match_by_time(recording, track_of(export), options.instrument, options.offset_s, options.moving)
+    recording, configuration = read_with_machine(gauges, options.machine, needs_reference=False)
+    return match_at_rest(recording, configuration, export, options.instrument, by, options.plan)
