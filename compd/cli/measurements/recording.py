@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from compd.recording.recording import Recording
 
 recording = typer.Typer(
-    no_args_is_help=True, help="Check and merge recordings: readings of the machine beside a reference."
+    no_args_is_help=True, help="Check, change and merge recordings: readings of the machine beside a reference."
 )
 
 
 @recording.callback()
 def _recording() -> None:
-    """Check and merge recordings: readings of the machine beside a reference."""
+    """Check, change and merge recordings: readings of the machine beside a reference."""
 
 
 @recording.command()
@@ -77,6 +77,38 @@ def merge(
         typer.echo(f"when each began is not recorded: {ASSUMED_GAP_S / 3600:g} h is put between them")
     counts = ", ".join(f"{part.path} {rows}" for part, rows in zip(parts, merged.rows, strict=True))
     typer.echo(f"written: {path}, {sum(merged.rows)} rows ({counts})")
+
+
+RowsOption = Annotated[
+    str, typer.Option(help="Rows as a spreadsheet shows them, the header being row 1: 17-20,25.", metavar="ROWS")
+]
+
+
+@recording.command()
+def exclude(
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    rows: RowsOption,
+    reason: Annotated[str, typer.Option(help="Why they are left out; it is kept in NAME.yaml.")],
+) -> None:
+    """Leave rows out of a recording, with a reason; its sidecar is changed, and nothing else."""
+    from compd.recording.exclusions import exclude_rows, rows_of_text
+
+    numbers = rows_of_text(rows, "--rows")
+    exclude_rows(path, numbers, reason)
+    typer.echo(f"{path.with_suffix('.yaml')}: left out: {len(numbers)} rows, {reason}")
+
+
+@recording.command()
+def include(
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    rows: RowsOption,
+) -> None:
+    """Let rows count again that were left out."""
+    from compd.recording.exclusions import include_rows, rows_of_text
+
+    numbers = rows_of_text(rows, "--rows")
+    include_rows(path, numbers)
+    typer.echo(f"{path.with_suffix('.yaml')}: {len(numbers)} rows count again")
 
 
 def _summary(contents: Recording) -> list[str]:
