@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from compd.client import connect
 from compd.configuration import Configuration
-from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
+from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import DaemonError
 
 # An hour of warming up in three minutes: what moves can be seen to move.
@@ -27,19 +26,9 @@ def run_live(configuration: Configuration, seed: int, serve: Callable[[str], Non
     serve : called with the daemon's Unix socket; returns when a person has had enough.
     Raises DaemonError where one does not start.
     """
-    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
-        directory = Path(temporary)
-        options = ["--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", str(ZERO_HOLD_S)]
-        commands = [
-            Command(
-                ["simulate", str(configuration.path), "--directory", temporary, *options],
-                ready=directory / "control.sock",
-            ),
-            Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
-        ]
-        with run_commands(commands, log=directory / "output.log"):
-            take_zero(directory / "compd.sock")
-            serve(str(directory / "compd.sock"))
+    with simulated_daemon(configuration, seed, SPEEDUP, ZERO_HOLD_S) as directory:
+        take_zero(directory / "compd.sock")
+        serve(str(directory / "compd.sock"))
 
 
 def take_zero(unix_socket: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from compd.client import Client, connect
 from compd.configuration import Configuration
 from compd.configuration.geometry import ToolOnPlatformSettings
-from compd.demo.processes import Command, run_commands
+from compd.demo.simulated_daemon import simulated_daemon
 from compd.simulation.wires.control_client import ControlClient
 
 # Kinds of compensation: of nothing, of the joints, of joints and frame.
@@ -70,18 +69,8 @@ def run_demo(configuration: Configuration, seconds: float, seed: int, on_change:
 
     seed : of weather, joints and targets. on_change : see `run_session`. Raises DaemonError where one does not start.
     """
-    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
-        directory = Path(temporary)
-        options = ["--seed", str(seed), "--speedup", str(SPEEDUP), "--zero-hold", str(ZERO_HOLD_S)]
-        commands = [
-            Command(
-                ["simulate", str(configuration.path), "--directory", temporary, *options],
-                ready=directory / "control.sock",
-            ),
-            Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
-        ]
-        with run_commands(commands, log=directory / "output.log"):
-            return run_session(configuration, directory, seconds, seed, on_change)
+    with simulated_daemon(configuration, seed, SPEEDUP, ZERO_HOLD_S) as directory:
+        return run_session(configuration, directory, seconds, seed, on_change)
 
 
 def run_session(

@@ -14,6 +14,7 @@ from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.fault_counts import FaultCounts
 from compd.page.history import History, Traces
+from compd.page.model_effects import ModelEffects
 from compd.page.moments import Moments
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
@@ -41,6 +42,7 @@ class Broadcast:
         self.moments = Moments()
         self.traces = Traces(0)
         self._faults = FaultCounts()
+        self._model_effects = ModelEffects()
         self._machine: Any = None
         self._live = self._slow = b""
         self._slow_count = 0
@@ -62,6 +64,7 @@ class Broadcast:
     async def make(self, unix_s: float, slow: bool) -> None:
         """The events of now, `unix_s` (s); the slow one too where it is due."""
         self._note_machine()
+        self._model_effects.note(self._link.budget, self._link.models)
         live = self._live_event(unix_s)
         data = plain(live)
         if self.history is not None:
@@ -127,12 +130,14 @@ class Broadcast:
         return event
 
     def _slow_event(self) -> Event:
-        """Status, counts of faults, browsers and the recording that runs."""
+        """Status, models and what they do, counts of faults, browsers and the recording that runs."""
         if self._link.status is not None:
             self._faults.note(time.time(), self._link.status)
         running = self._recordings.running
         return {
             "status": self._link.status,
+            "models": self._link.models,
+            "model_effects": self._model_effects.summary(),
             "faults": self._faults.summary(),
             "browsers": self._browsers.summary(),
             "recording": None if running is None else {"name": running.name, "started": running.started_s},

@@ -43,7 +43,6 @@ class DaemonLink:
     path: str
     connected: bool = False
     reason: str = "not connected yet"
-    version: Message | None = None
     machine: Message | None = None
     columns: list[Message] = field(default_factory=list)
     readings: Message | None = None
@@ -71,8 +70,7 @@ class DaemonLink:
 
     async def _serve(self) -> None:
         """Take messages until the connection ends."""
-        async with _Connection(self.path) as stream, _Connection(self.path) as asked:
-            self.version = stream.greeting
+        async with DaemonConnection(self.path) as stream, DaemonConnection(self.path) as asked:
             self.machine = await asked.ask({"class": "MACHINE"})
             watching = await stream.ask({"class": "WATCH", "what": "readings", "rate_hz": READINGS_HZ})
             self.columns = watching["columns"]
@@ -80,7 +78,7 @@ class DaemonLink:
                 tasks.create_task(self._take_readings(stream))
                 tasks.create_task(self._ask_again_and_again(asked))
 
-    async def _take_readings(self, stream: _Connection) -> None:
+    async def _take_readings(self, stream: DaemonConnection) -> None:
         while True:
             async with asyncio.timeout(SILENT_AFTER_S):  # wait_for of Python 3.11 may lose a cancellation
                 message = await stream.read()
@@ -91,7 +89,7 @@ class DaemonLink:
                 self.connected, self.reason = True, ""
                 self.news.notify_all()
 
-    async def _ask_again_and_again(self, asked: _Connection) -> None:
+    async def _ask_again_and_again(self, asked: DaemonConnection) -> None:
         loop = asyncio.get_running_loop()
         status_due_s = loop.time()
         while True:
@@ -112,17 +110,16 @@ class DaemonLink:
             self.news.notify_all()
 
 
-class _Connection:
+class DaemonConnection:
     """Lines of JSON to and from the daemon."""
 
     def __init__(self, path: str) -> None:
         self._path = path
-        self.greeting: Message = {}
 
-    async def __aenter__(self) -> _Connection:
+    async def __aenter__(self) -> DaemonConnection:
         self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
         try:
-            self.greeting = _agreed(await self.read(), "the connection")
+            _agreed(await self.read(), "the connection")  # the greeting
         except BaseException:
             await self._close()
             raise

@@ -24,7 +24,8 @@ Role = Literal["view", "operate"]
 
 # Followed by the port: a browser sends a cookie to every port of a host.
 COOKIE = "compd_page_"
-# Everything comes from this server; styles of elements are set by scripts through the DOM, which this allows.
+# Everything comes from this server; styles of elements are set by scripts through the DOM, which this allows. An answer
+# that brings a policy of its own keeps it.
 CONTENT_SECURITY_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
 _HEADERS = {
     "Content-Security-Policy": CONTENT_SECURITY_POLICY,
@@ -110,8 +111,10 @@ class Guard:
 def _with_headers(send: Send) -> Send:
     async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
+            given = list(message.get("headers", []))
+            names = {name.lower() for name, _ in given}
             own = [(name.lower().encode(), value.encode()) for name, value in _HEADERS.items()]
-            message = {**message, "headers": [*message.get("headers", []), *own]}
+            message = {**message, "headers": [*given, *(header for header in own if header[0] not in names)]}
         await send(message)
 
     return send_with_headers

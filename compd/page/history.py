@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
 from compd.live.loop.states import state_named
+from compd.page.cadence import Cadence
 from compd.page.scene import moved_um
 
 Message = Mapping[str, Any]
@@ -18,15 +19,8 @@ Message = Mapping[str, Any]
 # One row a second of an hour, and ten of the last minute.
 COARSE_S, COARSE_HZ = 3600.0, 1.0
 FINE_S, FINE_HZ = 60.0, 10.0
-# A row that comes so much too early, s, is on time: it comes as often as it is wanted, but for jitter.
-EARLY_S = 0.025
 # In the place of a state's code.
 UNKNOWN_STATE = -1.0
-
-
-def is_due(early_s: float, every_s: float) -> bool:
-    """Whether a row is wanted that comes so much too early (s); a clock that was set back does not stop them."""
-    return early_s <= EARLY_S or early_s > 2 * every_s
 
 
 class Ring:
@@ -34,18 +28,18 @@ class Ring:
 
     def __init__(self, span_s: float, rate_hz: float, columns: int, dtype: type = np.float32) -> None:
         rows = round(span_s * rate_hz)
-        self._every_s = 1 / rate_hz
+        self._cadence = Cadence(rate_hz)
         self._rows: NDArray[Any] = np.full((rows, columns), np.nan, dtype=dtype)
         self._times_s = np.full(rows, np.nan)
         self._count = 0
-        self._due_s = -math.inf
 
-    def note(self, time_s: float, row: Sequence[float]) -> None:
-        """Put a row of `time_s` (s) in the place of the oldest, if one is due."""
-        if not is_due(self._due_s - time_s, self._every_s):
-            return
-        on_time = abs(time_s - self._due_s) < self._every_s / 2
-        self._due_s = (self._due_s if on_time else time_s) + self._every_s
+    def is_due(self, time_s: float) -> bool:
+        """Whether a row is wanted at `time_s` (s)."""
+        return self._cadence.is_due(time_s)
+
+    def put(self, time_s: float, row: Sequence[float]) -> None:
+        """Put a row of `time_s` (s) in the place of the oldest."""
+        self._cadence.kept(time_s)
         place = self._count % len(self._times_s)
         self._times_s[place], self._rows[place] = time_s, row
         self._count += 1
@@ -76,9 +70,11 @@ class History:
 
     def note(self, time_s: float, setpoint: Message | None, budget: Message | None) -> None:
         """Take a row at `time_s` (s) where one is due; `setpoint` is None while the daemon is not there."""
-        row = self._row(setpoint, budget)
-        self._coarse.note(time_s, row)
-        self._fine.note(time_s, row)
+        due = [ring for ring in (self._coarse, self._fine) if ring.is_due(time_s)]
+        if due:
+            row = self._row(setpoint, budget)
+            for ring in due:
+                ring.put(time_s, row)
 
     def tables(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Times and rows of the hour, `coarse`, and of the last minute, `fine`."""
@@ -107,8 +103,8 @@ class Traces:
 
     def note(self, time_s: float, gauges: Sequence[Message]) -> None:
         """Take the gauges of a live event at `time_s` (Unix, s); empty while the daemon is not there."""
-        if gauges:
-            self._ring.note(time_s, [gauge.get("value", math.nan) for gauge in gauges])
+        if gauges and self._ring.is_due(time_s):
+            self._ring.put(time_s, [gauge.get("value", math.nan) for gauge in gauges])
 
     def minute(self, end_s: float) -> dict[str, Any]:
         """The minute before `end_s`: `times_s`, and `values` of each channel at them, None where there was none."""

@@ -7,13 +7,13 @@ clients) is not kept.
 
 from __future__ import annotations
 
-import math
 import zlib
 from bisect import bisect_left
 from collections import deque
 from itertools import islice
 
-from compd.page.history import COARSE_HZ, COARSE_S, FINE_HZ, FINE_S, is_due
+from compd.page.cadence import Cadence
+from compd.page.history import COARSE_HZ, COARSE_S, FINE_HZ, FINE_S
 
 # The quickest: a third of the bytes at a tenth of a millisecond.
 _LEVEL = 1
@@ -23,17 +23,12 @@ class _Kept:
     """The newest events, one every `1 / rate_hz` seconds, deflated."""
 
     def __init__(self, span_s: float, rate_hz: float) -> None:
-        self._every_s = 1 / rate_hz
-        self._due_s = -math.inf
+        self.cadence = Cadence(rate_hz)
         self.times_s: deque[float] = deque(maxlen=round(span_s * rate_hz))
         self.events: deque[bytes] = deque(maxlen=round(span_s * rate_hz))
 
-    def is_due(self, time_s: float) -> bool:
-        return is_due(self._due_s - time_s, self._every_s)
-
     def note(self, time_s: float, event: bytes) -> None:
-        on_time = abs(time_s - self._due_s) < self._every_s / 2
-        self._due_s = (self._due_s if on_time else time_s) + self._every_s
+        self.cadence.kept(time_s)
         self.times_s.append(time_s)
         self.events.append(event)
 
@@ -53,7 +48,7 @@ class Moments:
 
     def note(self, time_s: float, event: bytes) -> None:
         """Keep the event (JSON) of `time_s` (Unix, s) where one is due."""
-        due = [kept for kept in self._kept if kept.is_due(time_s)]
+        due = [kept for kept in self._kept if kept.cadence.is_due(time_s)]
         if due:
             deflated = zlib.compress(event, _LEVEL)
             for kept in due:

@@ -81,7 +81,7 @@ class Orders:
 
     def _zero(self, subject: str) -> Consequence:
         status, machine = self._link.status, self._link.machine
-        command = self._command("zero", self._link.path)
+        command = self._command("zero", self._link.path, *(["--yes"] if subject == "replace" else []))
         if status is None or machine is None:
             return Consequence(False, "The daemon has not told its status yet.", command)
         gauges = sum(wire["kind"] != "quantity" for wire in machine["wiring"])

@@ -30,6 +30,7 @@ def run_page(
     started: Callable[[str], None],
     models: Path | None = None,
     behind: str | None = None,
+    machine: Path | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C.
 
@@ -37,6 +38,7 @@ def run_page(
     models : directory of the model files that are offered.
     started : called with the origin, as "http://127.0.0.1:7760", once browsers can connect.
     behind : origin of a proxy with TLS in front of this server, as "https://machine.example"; only it is used then.
+    machine : the daemon's configuration, by which recordings of this machine are opened.
     Raises DaemonError where the port is taken.
     """
     listener = _listener(host, port)
@@ -44,7 +46,7 @@ def run_page(
     origins = (
         [behind] if behind else [origin(name, port) for name in (LOOPBACK_NAMES if host in LOOPBACK_NAMES else [host])]
     )
-    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket), models)
+    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket), models, machine=machine)
     guarded = Guard(server.app(), tokens, origins, port)
     config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
     started(origins[0])

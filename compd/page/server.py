@@ -6,11 +6,10 @@ import asyncio
 import json
 import math
 import shlex
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -26,14 +25,16 @@ from compd.page.browsers import ARMED_S, Browsers
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Token
 from compd.page.history import History
+from compd.page.joining.routes import JoinRoutes
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
+from compd.page.requests import keys_of, refused
+from compd.page.workbench.routes import WorkbenchRoutes
 
 STATIC = Path(__file__).parent / "static"
 # At 1 kHz an hour is some gigabytes.
 LONGEST_BURST_S = 3600.0
-LONGEST_BODY_BYTES = 8192
 # Of the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
@@ -44,15 +45,25 @@ class Server:
     """The routes of one page. `request.scope["token"]` is from the guard in front of them."""
 
     def __init__(
-        self, link: DaemonLink, recordings: Recordings, models: Path | None = None, clock: Clock | None = None
+        self,
+        link: DaemonLink,
+        recordings: Recordings,
+        models: Path | None = None,
+        clock: Clock | None = None,
+        machine: Path | None = None,
     ) -> None:
-        """`models`: the directory whose model files are offered. `clock`: by which arming ends."""
+        """`models`: the directory whose model files are offered. `clock`: by which arming ends.
+
+        `machine`: the daemon's configuration, by which recordings of this machine are opened.
+        """
         self._link = link
         self._recordings = recordings
         self._models = ModelFiles(models)
         self._orders = Orders(link, self._models)
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
+        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html")
+        self._join = JoinRoutes(recordings, machine, STATIC / "join.html")
 
     def app(self) -> Starlette:
         """The ASGI application."""
@@ -69,6 +80,8 @@ class Server:
             Route("/recordings", self._list_recordings),
             Route("/recordings", self._record, methods=["POST"]),
             Route("/recordings/{name}", self._download),
+            *self._workbench.routes(),
+            *self._join.routes(),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
         return Starlette(routes=routes, lifespan=self._lifespan)
@@ -98,39 +111,39 @@ class Server:
 
     async def _moment(self, request: Request) -> Response:
         """The event that is nearest to `unix_s`, as it was."""
-        event = self._broadcast.moments.nearest(_moment(request))
-        return _refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
+        event = self._broadcast.moments.nearest(_unix_s(request))
+        return refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
 
     async def _traces(self, request: Request) -> Response:
         """What the gauges showed in the minute before `unix_s`."""
-        return JSONResponse(self._broadcast.traces.minute(_moment(request)))
+        return JSONResponse(self._broadcast.traces.minute(_unix_s(request)))
 
     async def _arm(self, request: Request) -> Response:
-        keys = await _keys(request)
+        keys = await keys_of(request)
         if not keys.get("arm", True):
             self._browsers.disarm(str(keys.get("id")))
             return JSONResponse({"armed_s": 0})
         if self._browsers.arm(str(keys.get("id"))) is None:
-            return _refused(f"{_LOOKS_ONLY}, or is not connected", 403)
+            return refused(f"{_LOOKS_ONLY}, or is not connected", 403)
         return JSONResponse({"armed_s": ARMED_S})
 
     async def _consequence(self, request: Request) -> Response:
         name = request.path_params["name"]
         if name not in self._orders:
-            return _refused("there is no such order", 404)
+            return refused("there is no such order", 404)
         told = self._orders.consequence(name, request.query_params.get("subject", ""))
         return JSONResponse(asdict(told))
 
     async def _order(self, request: Request) -> Response:
-        name, keys = request.path_params["name"], await _keys(request)
+        name, keys = request.path_params["name"], await keys_of(request)
         if name not in self._orders:
-            return _refused("there is no such order", 404)
+            return refused("there is no such order", 404)
         if self._browsers.armed(str(keys.get("id"))) is None:
-            return _refused("this browser is not armed", 403)
+            return refused("this browser is not armed", 403)
         try:
             answer = await self._orders.do(name, str(keys.get("subject", "")))
         except DaemonError as error:
-            return _refused(explained(error), 409, error.problems[0].value)
+            return refused(explained(error), 409, error.problems[0].value)
         return JSONResponse({"answer": answer})
 
     async def _list_models(self, request: Request) -> Response:
@@ -153,28 +166,28 @@ class Server:
         )
 
     async def _record(self, request: Request) -> Response:
-        keys = await _keys(request)
+        keys = await keys_of(request)
         if request.scope["token"].role != "operate":
-            return _refused(_LOOKS_ONLY, 403)
+            return refused(_LOOKS_ONLY, 403)
         if keys.get("stop"):
             await self._recordings.stop()
             return JSONResponse({})
         burst_s = keys.get("burst_s")
         if burst_s is not None and not (isinstance(burst_s, int | float) and 0 < burst_s <= LONGEST_BURST_S):
-            return _refused(f"a burst lasts up to {LONGEST_BURST_S:g} s", 400)
+            return refused(f"a burst lasts up to {LONGEST_BURST_S:g} s", 400)
         problem = await self._recordings.start(str(keys.get("name", "")), burst_s)
-        return _refused(problem, 409) if problem else JSONResponse({})
+        return refused(problem, 409) if problem else JSONResponse({})
 
     async def _download(self, request: Request) -> Response:
         name = request.path_params["name"]
         pieces = self._recordings.archive(name)
         if pieces is None:
-            return _refused("there is no such recording", 404)
+            return refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
         return StreamingResponse(pieces, media_type="application/zip", headers=headers)
 
 
-def _moment(request: Request) -> float:
+def _unix_s(request: Request) -> float:
     """Unix time, s, that a request names. Raises HTTPException (400) for anything else."""
     try:
         unix_s = float(request.query_params.get("unix_s", ""))
@@ -194,22 +207,6 @@ async def _ended(tasks: Sequence[asyncio.Task[None]]) -> None:
         _, running = await asyncio.wait(running, timeout=_CANCEL_EVERY_S)
 
 
-async def _keys(request: Request) -> Mapping[str, Any]:
-    """The JSON object in a request's body. Raises HTTPException (400, 413) for anything else."""
-    body = b""
-    async for piece in request.stream():
-        body += piece
-        if len(body) > LONGEST_BODY_BYTES:
-            raise HTTPException(413, "an order is short")
-    try:
-        keys = json.loads(body)
-    except (ValueError, RecursionError):
-        keys = None
-    if not isinstance(keys, dict):
-        raise HTTPException(400, "the body is one JSON object")
-    return keys
-
-
 def packed(history: History | None) -> bytes:
     """The tables of the history for a browser.
 
@@ -223,8 +220,3 @@ def packed(history: History | None) -> bytes:
     header = json.dumps({"columns": history.columns, "tables": shapes}).encode() + b"\n"
     numbers = (times.astype("<f8").tobytes() + rows.astype("<f4").tobytes() for times, rows in tables.values())
     return header + b"".join(numbers)
-
-
-def _refused(reason: str, code: int, value: str = "") -> Response:
-    # in ASCII: what a client named need not be text that can be encoded
-    return Response(json.dumps({"reason": reason, "value": value}), code, media_type="application/json")

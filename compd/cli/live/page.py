@@ -68,11 +68,12 @@ def page(
             typer.echo(_TLS, err=True)
 
     unix_socket = unix_address(address)
-    if models is None and unix_socket != address:
-        models = Path(address).parent
+    machine = Path(address) if unix_socket != address else None
+    if models is None and machine is not None:
+        models = machine.parent
     offered = None if models is None else models.absolute()
     host = listen or "127.0.0.1"
-    run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind))
+    run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind), machine)
 
 
 def _origin(behind: str | None) -> str | None:

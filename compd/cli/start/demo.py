@@ -81,6 +81,7 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
             tokens,
             lambda origin: typer.echo(f"open {origin}/?token={token} (Ctrl-C ends all three)"),
             configuration.path.absolute().parent,
+            machine=configuration.path,
         )
 
     run_live(configuration, seed, serve)

@@ -6,7 +6,8 @@ import { appearance, stateName } from "./states.js";
 const at = (id) => document.getElementById(id);
 let shown = "";
 
-function describe(page, behind_s) {
+// State of the daemon and of this page's own connection, in words.
+export function describe(page, behind_s) {
   const live = page.live;
   if (!live || behind_s > SILENT_S) {
     const text = live ? `no news from the page's server for ${ago(behind_s)}` : "waiting for the page's server";

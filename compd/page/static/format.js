@@ -60,3 +60,8 @@ export function prepared(canvas) {
 export function ink(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
+
+// Units are written without Greek letters in files and messages.
+export function micro(unit) {
+  return unit.replace(/^u(?=m|rad|in)/, "µ").replace("/um", "/µm").replace("degC", "°C");
+}

@@ -19,7 +19,7 @@ export class Links {
   }
 
   begin(machine) {
-    const count = machine.geometry.kinematics === "hexapod_6ups" ? 6 : 3;
+    const count = machine.wiring.filter(({ kind }) => kind === "scale").length;
     this.limit_um = machine.limits.correction_mm * 1000;
     this.times = [];
     this.corrections = Array.from({ length: count }, () => []);

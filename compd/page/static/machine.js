@@ -1,5 +1,6 @@
 // The machine in three dimensions on a plain canvas, with the errors drawn many times larger than they are.
 import { ink, prepared, signed } from "./format.js";
+import { Turn } from "./turn.js";
 
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
 const TRAIL_S = 10;
@@ -16,7 +17,7 @@ export function diverging(share) {
 
 export class Machine {
   constructor(canvas, colours, page) {
-    Object.assign(this, { canvas, colours, page, turn: 0.5, tilt: 0.25, zoom: 1, trail: [], largest_um: 1, parts: [], scene: null });
+    Object.assign(this, { canvas, colours, page, trail: [], largest_um: 1, parts: [], scene: null });
     const slider = document.getElementById("exaggeration");
     const say = () => {
       this.times = slider.value === "0" ? 1 : Math.round(10 ** slider.value);
@@ -25,31 +26,7 @@ export class Machine {
     };
     slider.addEventListener("input", say);
     say();
-    this.bind();
-  }
-
-  bind() {
-    const canvas = this.canvas;
-    let held = null;
-    canvas.addEventListener("pointerdown", (event) => {
-      held = [event.clientX, event.clientY];
-      canvas.setPointerCapture(event.pointerId);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      if (held) {
-        this.turn -= (event.clientX - held[0]) * 0.01;
-        this.tilt = Math.max(-1.5, Math.min(1.57, this.tilt + (event.clientY - held[1]) * 0.01));
-        held = [event.clientX, event.clientY];
-        this.draw();
-      } else this.hover(event.offsetX, event.offsetY);
-    });
-    canvas.addEventListener("pointerup", () => (held = null));
-    canvas.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      this.zoom = Math.max(0.3, Math.min(8, this.zoom * Math.exp(-event.deltaY * 0.001)));
-      this.draw();
-    }, { passive: false });
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    this.turn = new Turn(canvas, () => this.draw(), (x, y) => this.hover(x, y));
   }
 
   begin(machine) {
@@ -64,8 +41,7 @@ export class Machine {
   }
 
   view(key) {
-    [this.turn, this.tilt] = VIEWS[key];
-    this.draw();
+    this.turn.look(...VIEWS[key]);
   }
 
   // An event; with `minute` one that has been.
@@ -87,20 +63,6 @@ export class Machine {
     this.draw();
   }
 
-  // From {M} to the canvas: turned about z, tilted, and as large as fits.
-  projector(width, height) {
-    const points = [...this.scene.plate, ...this.scene.supports, ...this.scene.platform, this.scene.tip];
-    const centre = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
-    const radius = Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - centre[k]))));
-    const scale = (0.55 * Math.min(width, height) * this.zoom) / radius;
-    const [ct, st, ci, si] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
-    return (point) => {
-      const [x, y, z] = point.map((value, k) => value - centre[k]);
-      const [right, away] = [ct * x + st * y, -st * x + ct * y];
-      return [width / 2 + scale * right, height / 2 - scale * (ci * z + si * away)];
-    };
-  }
-
   draw() {
     const { context, width, height } = prepared(this.canvas);
     this.parts = [];
@@ -110,8 +72,8 @@ export class Machine {
       context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
       return;
     }
-    const place = this.projector(width, height);
     const { plate, supports, base, platform, tip, supports_moved_um, tip_moved_um } = this.scene;
+    const place = this.turn.projector([...plate, ...supports, ...platform, tip].flat(), width, height);
     const ghost = (point, moved_um) => point.map((value, k) => value - (moved_um[k] * this.times) / 1000);
     const line = (points, colour, thick, dash = []) => {
       context.beginPath();

@@ -1,5 +1,5 @@
 // The page: takes the events, paints the newest of them once a frame, and never an old one as the present.
-import { Age, SILENT_S } from "./age.js";
+import { Age, LATE_S, SILENT_S } from "./age.js";
 import { showBanner } from "./banner.js";
 import { Budget } from "./budget.js";
 import { Drawer } from "./drawer.js";
@@ -7,6 +7,7 @@ import { Gauges } from "./gauges.js";
 import { Hour } from "./hour.js";
 import { bindKeys } from "./keys.js";
 import { Links } from "./links.js";
+import { listen } from "./live_events.js";
 import { Machine } from "./machine.js";
 import { NOT_KEPT, Past, clock, tellMoment } from "./past.js";
 import { showTiming } from "./timing.js";
@@ -57,32 +58,19 @@ function showPast(event, at_s) {
   tellMoment(event, at_s);
 }
 
-function listen() {
-  const source = new EventSource("live");
-  const on = (name, take) => source.addEventListener(name, (event) => take(JSON.parse(event.data)));
-  on("hello", (told) => {
-    age.begin();
-    [page.id, page.role] = [told.id, told.role];
-    begin(told.machine);
-  });
-  on("machine", (told) => begin(told.machine));
-  on("live", (told) => {
-    const late_s = age.arrived(told.made);
-    page.live = told;
-    page.unpainted = true;
-    if (!late_s || late_s < 0.5) {
-      links.note(told);
-      hour.note(told);
-      gauges.note(told);
-    }
-  });
-  on("slow", (told) => {
-    page.slow = told;
-    drawer.show(told);
-    if (page.frozen || !told.status) return;
-    showTiming(at("timing"), told.status);
-    gauges.count(told.faults);
-  });
+function take(told, late_s) {
+  page.unpainted = true;
+  if (late_s && late_s >= LATE_S) return;
+  links.note(told);
+  hour.note(told);
+  gauges.note(told);
+}
+
+function takeSlow(told) {
+  drawer.show(told);
+  if (page.frozen || !told.status) return;
+  showTiming(at("timing"), told.status);
+  gauges.count(told.faults);
 }
 
 // Stand still at `at_s`, of which `event` is known already, or is asked for; or go on.
@@ -104,7 +92,7 @@ at("thaw").addEventListener("click", () => freeze(false));
 at("role").addEventListener("click", () => drawer.toggle());
 document.addEventListener("freeze", (event) => freeze(true, event.detail.at_s, event.detail.event));
 bindKeys({ page, machine, hour, drawer, freeze });
-listen();
+listen(page, age, { machine: begin, live: take, slow: takeSlow });
 paint();
 page.parts = { machine, links, budget, gauges, hour };
 window.compd = page; // for tests, and for the curious

@@ -5,13 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.page.browsers import ARMED_S, Browsers
-
-
-class HandClock:
-    now_s = 1000.0
-
-    def monotonic(self):
-        return self.now_s
+from tests.support.hand_clock import HandClock
 
 
 @pytest.fixture

@@ -11,19 +11,10 @@ from compd.page.guard import COOKIE, Guard, Token, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 from tests.support.asgi_client import AsgiClient
+from tests.support.hand_clock import HandClock
 from tests.support.scripted_page import ORDERS, ScriptedLink
 
 HOST = "127.0.0.1:7760"
-
-
-class HandClock:
-    now_s = 1000.0
-
-    def monotonic(self):
-        return self.now_s
-
-    def wait(self, event, timeout_s):
-        raise NotImplementedError
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""Joining a measurement in the page: `compd join` with the mouse."""

@@ -1,0 +1,137 @@
+"""What a person has chosen in the page: as the reader and the join take it, and as a command line."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from compd.errors import CompdError, Problem
+from compd.instruments.export import SHAPES, ReadOptions
+from compd.joining.by_time import Instrument
+from compd.joining.join import JOIN_BY, JoinOptions
+
+Value = TypeVar("Value", str, float, int)
+
+_LONGEST_TEXT = 200
+_MOST_COLUMNS = 500
+# Control characters, and halves of a character.
+_NO_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
+_DATES = ("dmy", "mdy", "ymd")
+_FRAMES = ("instrument", "machine")
+
+
+@dataclass(frozen=True)
+class Choices:
+    """read : how the export is read. join : how its rows are put beside the gauges."""
+
+    read: ReadOptions
+    join: JoinOptions
+
+    def command(self, gauges: Path, export: Path, out: Path) -> str:
+        """The command line that does the same."""
+        read, join = self.read, self.join
+        instrument = join.instrument
+        options = {
+            "--as": read.shape,
+            "--columns": ",".join(read.columns) or None,
+            "--unit": read.unit,
+            "--angle-unit": read.angle_unit,
+            "--decimal": read.decimal,
+            "--dates": read.dates,
+            "--rate-hz": read.rate_hz,
+            "--group": read.group,
+            "--sheet": read.sheet,
+            "--by": join.by,
+            "--offset": join.offset_s,
+            "--frame": instrument.frame if instrument.frame != Instrument().frame else None,
+            "--sigma-um": instrument.sigma_um,
+            "--sigma-urad": instrument.sigma_urad,
+            "--link": instrument.link,
+            "--ball": instrument.ball,
+            "--machine": join.machine,
+            "--plan": join.plan,
+        }
+        words = ["compd", "join", str(gauges), str(export), str(out)]
+        for option, value in options.items():
+            if value is not None:
+                words += [option, repr(value) if isinstance(value, float) else str(value)]
+        return shlex.join([*words, "--moving"] if join.moving else words)
+
+
+def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | None) -> Choices:
+    """The choices in a browser's order; a key that is missing, null or "" is left to be found.
+
+    Raises CompdError with every key that is of a wrong kind.
+    """
+    problems: list[Problem] = []
+
+    def taken(name: str, kind: type[Value], allowed: str, among: tuple[str, ...] = ()) -> Value | None:
+        value = keys.get(name)
+        if value is None or value == "":
+            return None
+        if (among and value in among) or (not among and _is(value, kind)):
+            return kind(value)
+        problems.append(Problem(where=name, what="is not understood", value=ascii(value)[:80], allowed=allowed))
+        return None
+
+    def text(name: str, among: tuple[str, ...] = ()) -> str | None:
+        return taken(name, str, ", ".join(among) or "a short text", among)
+
+    columns = keys.get("columns") or []
+    if (
+        not isinstance(columns, list)
+        or len(columns) > _MOST_COLUMNS
+        or not all(_is(role, str) and "," not in role for role in columns)
+    ):
+        problems.append(Problem(where="columns", what="is not understood", allowed="a role for each column"))
+        columns = []
+    read = ReadOptions(
+        shape=text("shape", SHAPES),
+        columns=tuple(columns),
+        unit=text("unit"),
+        angle_unit=text("angle_unit"),
+        decimal=text("decimal", (".", ",")),
+        dates=text("dates", _DATES),
+        rate_hz=taken("rate_hz", float, "a number, Hz"),
+        group=text("group"),
+        sheet=text("sheet"),
+    )
+    instrument = Instrument(
+        frame="machine" if text("frame", _FRAMES) == "machine" else "instrument",
+        sigma_um=taken("sigma_um", float, "a number, um"),
+        link=taken("link", int, "the number of a link"),
+        sigma_urad=taken("sigma_urad", float, "a number, urad"),
+        ball=_positive("ball", taken("ball", int, "the number of a ball, from 1"), problems),
+    )
+    by = text("by", JOIN_BY)
+    join = JoinOptions(
+        instrument,
+        by=next((known for known in JOIN_BY if known == by), None),
+        offset_s=taken("offset_s", float, "a number, s"),
+        moving=keys.get("moving") is True,
+        machine=machine,
+        plan=plan,
+    )
+    if problems:
+        raise CompdError(problems)
+    return Choices(read, join)
+
+
+def _is(value: Any, kind: type) -> bool:
+    """Whether a value of JSON is a short text on one line, a number that is finite, or a whole number."""
+    if kind is str:
+        return isinstance(value, str) and len(value) <= _LONGEST_TEXT and not _NO_TEXT.search(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) < 1e15 and math.isfinite(value) and (kind is float or float(value).is_integer())
+
+
+def _positive(name: str, number: int | None, problems: list[Problem]) -> int | None:
+    if number is not None and number < 1:
+        problems.append(Problem(where=name, what="is not understood", value=str(number), allowed="1 or more"))
+    return number

@@ -1,0 +1,72 @@
+"""An export as the page shows it: the first rows as a table, what each column is taken for, what there is to ask."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from compd.errors import RecordingError
+from compd.instruments.export import ReadOptions
+from compd.instruments.preview import ExportPreview, preview_export
+from compd.joining.join import choose_by
+
+# Files that are kept as they were read: two persons may look at two, and change what their columns are.
+_KEPT = 4
+
+
+class _Read(NamedTuple):
+    """A file at a time, read with these options."""
+
+    path: Path
+    stamp: tuple[int, int]
+    options: ReadOptions
+    preview: ExportPreview
+
+
+class ExportReader:
+    """Reads exports, the ones that were asked for last only once."""
+
+    def __init__(self) -> None:
+        self._kept: list[_Read] = []
+        self._lock = threading.Lock()
+
+    def read(self, path: Path, options: ReadOptions) -> ExportPreview:
+        """As `preview_export`."""
+        with self._lock:
+            stat = path.stat()
+            stamp = (stat.st_mtime_ns, stat.st_size)
+            for known in self._kept:
+                if (known.path, known.stamp, known.options) == (path, stamp, options):
+                    return known.preview
+            preview = preview_export(path, options)
+            self._kept = [_Read(path, stamp, options, preview), *self._kept][:_KEPT]
+            return preview
+
+
+def told(preview: ExportPreview) -> dict[str, Any]:
+    """What the browser shows of it. `by`: what puts the rows together without a choice; "" where that is not clear."""
+    export = preview.export
+    by, not_clear = "", ""
+    try:
+        by = "" if export is None else choose_by(None, export)
+    except RecordingError as error:
+        not_clear = str(error)
+    return {
+        "shape": preview.shape,
+        "line": list(preview.line),
+        "rows": [list(row) for row in preview.rows],
+        "header": list(preview.header),
+        "roles": list(preview.roles),
+        "told": dict(preview.told),
+        "groups": list(preview.groups),
+        "sheets": list(preview.sheets),
+        "problems": [str(problem) for problem in preview.problems],
+        "points": 0 if export is None else len(export.line),
+        "left_out": {} if export is None else dict(export.left_out),
+        "axes": [] if export is None else list(export.axes),
+        "timed": export is not None and export.time_s is not None,
+        "named": export is not None and export.name is not None,
+        "by": by,
+        "by_not_clear": not_clear,
+    }

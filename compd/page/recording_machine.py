@@ -1,0 +1,16 @@
+"""By which configuration a recording is read: the page's own, where it is of the recording's machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from compd.configuration.shipped import load_machine
+from compd.recording.sidecar import read_sidecar
+
+
+def machine_of(recording: Path, machine: Path | None) -> Path | None:
+    """`machine` where the recording NAME.csv is of it; None for the shipped one that the recording names."""
+    if machine is None:
+        return None
+    sidecar = read_sidecar(recording.with_suffix(".yaml"), [])
+    return machine if sidecar is not None and load_machine(machine).machine == sidecar.machine else None

@@ -1,0 +1,59 @@
+// The agreement of the instrument's motion with the scales, over the offset between their clocks.
+import { ink, prepared } from "../format.js";
+import { Axes } from "./axes.js";
+
+// Of the width, where the offset that is best is shown more closely.
+const NEAR = 0.35;
+
+export class AgreementPicture {
+  constructor(canvas) {
+    this.canvas = canvas;
+  }
+
+  // Draws it; what it shows, in words.
+  draw({ offset_s, agreement, window_s, peak, next_best }) {
+    const { context, width, height } = prepared(this.canvas);
+    const wide = peak ? (1 - NEAR) * width : width;
+    const all = new Axes(context, { left: 0, top: 0, width: wide, height }, [offset_s[0], offset_s.at(-1)], [0, 1]);
+    all.label("clock offset, s", "agreement", [1, 0]);
+    this.curve(all, offset_s, agreement);
+    this.mark(all, next_best, "--care", "next best");
+    this.mark(all, peak, "--good", "best");
+    if (!peak) return "No offset is clearly the best. 1: the scales explain all of the instrument's motion.";
+    const near = new Axes(context, { left: wide, top: 0, width: width - wide, height }, [peak[0] - window_s, peak[0] + window_s], [0, 1]);
+    near.label("near the best, s", "", [1, 0]);
+    this.curve(near, offset_s, agreement);
+    this.mark(near, peak, "--good", "");
+    const next = next_best ? `; the next best, ${next_best[1].toFixed(4)}, at ${next_best[0].toFixed(2)} s` : "; there is no other";
+    return `Best agreement ${peak[1] === null ? "not known" : peak[1].toFixed(4)} at an offset of ${peak[0].toFixed(3)} s${next}. 1: the scales explain all of the instrument's motion.`;
+  }
+
+  // Where too little overlaps there is none, and below 0 nothing agrees.
+  curve(axes, offset_s, agreement) {
+    const { context } = axes;
+    context.strokeStyle = ink("--line");
+    context.beginPath();
+    let pen = false;
+    offset_s.forEach((offset, k) => {
+      const inside = agreement[k] !== null && offset >= axes.x[0] && offset <= axes.x[1];
+      if (inside) context[pen ? "lineTo" : "moveTo"](...axes.at(offset, Math.max(0, agreement[k])));
+      pen = inside;
+    });
+    context.stroke();
+  }
+
+  mark(axes, point, colour, text) {
+    if (!point || point[1] === null) return;
+    const { context } = axes;
+    const [x, y] = axes.at(point[0], Math.max(0, point[1]));
+    const toLeft = x > (axes.left + axes.right) / 2;
+    context.fillStyle = ink(colour);
+    context.beginPath();
+    context.arc(x, y, 5, 0, 7);
+    context.fill();
+    context.fillStyle = ink("--ink");
+    context.textAlign = toLeft ? "right" : "left";
+    context.fillText(text, x + (toLeft ? -9 : 9), y + 14);
+    context.textAlign = "left";
+  }
+}

@@ -1,0 +1,74 @@
+// Labelled fields whose values are choices of the wizard; the first option of a list says what was found without one.
+import { element } from "../format.js";
+
+class Field {
+  constructor(wizard, key, label, control) {
+    Object.assign(this, { wizard, key, control });
+    control.id = `choice-${key}`;
+    this.label = element("label", {}, label, control);
+    control.addEventListener("change", () => wizard.change({ [key]: this.value() }));
+  }
+
+  value() {
+    return this.control.value.trim() || null;
+  }
+
+  // Hidden where it does not go with the other choices: then it is not chosen either.
+  offer(offered) {
+    this.label.hidden = !offered;
+    if (offered || this.wizard.choices[this.key] == null) return;
+    this.clear();
+    this.wizard.change({ [this.key]: null });
+  }
+
+  clear() {
+    this.control.value = "";
+  }
+}
+
+export class Choice extends Field {
+  // options: of [value, text]
+  constructor(wizard, key, label, options = []) {
+    super(wizard, key, label, element("select"));
+    this.options(options, "as found");
+  }
+
+  options(options, found) {
+    const all = [["", found], ...options];
+    const text = JSON.stringify(all);
+    if (text !== this.shown) this.control.replaceChildren(...all.map(([value, name]) => element("option", { value }, name)));
+    this.shown = text;
+    this.control.value = this.wizard.choices[this.key] ?? "";
+  }
+
+  // What stands there without a choice.
+  found(text) {
+    this.options(JSON.parse(this.shown).slice(1), text);
+  }
+}
+
+export class Quantity extends Field {
+  constructor(wizard, key, label, placeholder = "", step = "any") {
+    super(wizard, key, label, element("input", { type: "number", step, placeholder }));
+  }
+
+  value() {
+    return this.control.value === "" ? null : Number(this.control.value);
+  }
+}
+
+export class Check extends Field {
+  constructor(wizard, key, label) {
+    super(wizard, key, label, element("input", { type: "checkbox" }));
+    this.label.className = "check";
+    this.label.prepend(this.control);
+  }
+
+  value() {
+    return this.control.checked || null;
+  }
+
+  clear() {
+    this.control.checked = false;
+  }
+}

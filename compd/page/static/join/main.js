@@ -1,0 +1,19 @@
+// The join wizard: `compd join` with the mouse.
+import { Putting } from "./putting.js";
+import { Reading } from "./reading.js";
+import { Sources } from "./sources.js";
+import { Wizard } from "./wizard.js";
+import { Writing } from "./writing.js";
+
+const at = (id) => document.getElementById(id);
+const wizard = new Wizard(at("said"));
+const sources = new Sources(at("recording"), at("export"), at("file"), at("sources-note"));
+sources.begin(wizard);
+wizard.panels = [
+  sources,
+  new Reading(wizard, { fields: at("reading-fields"), problems: at("problems"), table: at("table"), taken: at("taken"), note: at("reading-note") }),
+  new Putting(wizard, { fields: at("putting-fields"), note: at("putting-note"), button: at("try"), result: at("result"), canvas: at("picture"), pictureNote: at("picture-note") }),
+  new Writing(wizard, { name: at("name"), button: at("write"), link: at("open"), note: at("writing-note"), command: at("command") }),
+];
+wizard.attempt(() => wizard.list());
+window.wizard = wizard; // for tests, and for the curious

@@ -1,0 +1,94 @@
+// How the export is read: its first rows, above each column what it is taken for, and what else a person may say of it.
+import { element } from "../format.js";
+import { Choice, Quantity } from "./fields.js";
+
+const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
+const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
+const ANGLES = ["rad", "mrad", "deg", "arcsec"];
+const SHAPES = [["csv", "text with a delimiter"], ["blanks", "text between blanks"], ["sa", "SpatialAnalyzer"], ["carto", "CARTO"], ["xlsx", "Excel"]];
+const each = (values) => values.map((value) => [value, value]);
+const bare = (role) => role.replace(/\[.*/, "");
+
+export class Reading {
+  constructor(wizard, { fields, problems, table, taken, note }) {
+    Object.assign(this, { wizard, problems, table, taken, note });
+    this.fields = {
+      shape: new Choice(wizard, "shape", "Shape", SHAPES),
+      unit: new Choice(wizard, "unit", "Unit of lengths", each(LENGTHS)),
+      angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", each(ANGLES)),
+      decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
+      dates: new Choice(wizard, "dates", "Order of dates", [["dmy", "day month year"], ["mdy", "month day year"], ["ymd", "year month day"]]),
+      rate_hz: new Quantity(wizard, "rate_hz", "Rows in a second", "Hz"),
+      group: new Choice(wizard, "group", "Group of points"),
+      sheet: new Choice(wizard, "sheet", "Sheet"),
+    };
+    this.guess = element("button", { type: "button", id: "guess", onclick: () => wizard.change({ columns: null }) }, "Guess the columns again");
+    fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.guess);
+  }
+
+  show({ table, choices }) {
+    for (const field of Object.values(this.fields)) if (choices[field.key] == null && field.control !== document.activeElement) field.clear();
+    this.guess.disabled = !choices.columns;
+    if (table === this.shown) return;
+    this.shown = table;
+    this.note.textContent = !table ? "choose an export" : table.points ? `${table.points} rows are read; the first ${table.rows.length} of the file are shown` : "not read yet: say what is asked";
+    this.problems.replaceChildren(...(table?.problems ?? []).map((problem) => element("p", { class: "problem" }, problem)));
+    this.showTaken(table);
+    this.showTable(table);
+    if (!table) return;
+    const { shape, unit, angle_unit, decimal, dates, rate_hz, group, sheet } = this.fields;
+    const { told } = table;
+    const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(told.x ?? told.y ?? told.z ?? told.length ?? "");
+    shape.found(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
+    unit.found(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
+    angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
+    angle_unit.found("as the file says");
+    decimal.found(told["decimal mark"] && !choices.decimal ? `as found: ${told["decimal mark"]}` : "as found");
+    const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(told.time ?? "");
+    dates.found(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
+    rate_hz.offer(!table.roles.includes("time"));
+    group.offer(table.groups.length > 1 || choices.group != null);
+    group.options([...each(table.groups), ["all", "all of them"]], table.groups.length > 1 ? "choose …" : "the only one");
+    sheet.offer(table.sheets.length > 1);
+    sheet.options(each(table.sheets), "the one with numbers");
+  }
+
+  showTaken(table) {
+    const left = Object.entries(table?.left_out ?? {}).map(([reason, count]) => [`${count} rows not used`, reason]);
+    this.taken.replaceChildren(...[...Object.entries(table?.told ?? {}), ...left].flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
+  }
+
+  showTable(table) {
+    const focused = this.table.contains(document.activeElement) ? document.activeElement.id : "";
+    if (!table?.rows.length) return this.table.replaceChildren();
+    const roles = this.columns(table);
+    const above = roles.map((role, k) => element("th", { scope: "col" }, this.roleOf(role, k)));
+    const names = table.header.map((name) => element("th", { scope: "col" }, name));
+    const unused = (k) => (roles[k] === "-" ? "unused" : "");
+    const rows = table.rows.map((row, i) => element("tr", {}, element("td", { class: "line" }, String(table.line[i])), ...row.map((cell, k) => element("td", { class: unused(k) }, cell))));
+    const head = [above, names].filter((cells) => cells.length).map((cells, i) => element("tr", {}, element("th", { class: "line" }, i || !above.length ? "line" : "meaning"), ...cells));
+    this.table.replaceChildren(element("table", {}, element("thead", {}, ...head), element("tbody", {}, ...rows)));
+    if (focused) document.getElementById(focused)?.focus();
+  }
+
+  // What is said of each column, or else guessed.
+  columns(table) {
+    return this.wizard.choices.columns?.length === table.roles.length ? this.wizard.choices.columns : table.roles;
+  }
+
+  roleOf(role, k) {
+    const known = ROLES.some(([value]) => value === role) ? ROLES : [[role, role], ...ROLES];
+    const select = element("select", { id: `role-${k}`, "aria-label": `Meaning of column ${k + 1}` }, ...known.map(([value, text]) => element("option", { value, selected: value === role }, text)));
+    select.addEventListener("change", () => this.change(k, select.value));
+    return select;
+  }
+
+  // A role that another column has is exchanged: there is one of each.
+  change(k, role) {
+    const columns = [...this.columns(this.wizard.table)];
+    const other = role === "-" ? -1 : columns.findIndex((own, i) => i !== k && bare(own) === bare(role));
+    if (other >= 0) columns[other] = columns[k];
+    columns[k] = role;
+    this.wizard.change({ columns });
+  }
+}

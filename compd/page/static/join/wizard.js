@@ -1,0 +1,78 @@
+// What is chosen in the join wizard, what the server reads of it, and what was tried.
+import { post } from "../post.js";
+
+export class Wizard {
+  // status: where problems are said in words
+  constructor(status) {
+    Object.assign(this, { status, panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0 });
+  }
+
+  say(text) {
+    this.status.textContent = text;
+  }
+
+  async attempt(work) {
+    try {
+      this.say("");
+      return await work();
+    } catch (error) {
+      this.say(error.message);
+    }
+  }
+
+  // An order to the server with all that is chosen. Throws its reason.
+  async ask(path) {
+    const told = await post(`join/${path}`, this.choices);
+    if (!told.ok) throw new Error(told.reason ?? "the page's server does not answer");
+    return told;
+  }
+
+  async list() {
+    const response = await fetch("join/sources");
+    if (!response.ok) throw new Error("the recordings cannot be listed");
+    this.sources = await response.json();
+    this.show();
+  }
+
+  // Other choices: the export is read anew, and what was tried with the old ones is gone.
+  async change(choices) {
+    Object.assign(this.choices, choices);
+    if (Object.keys(choices).some((key) => key !== "name")) this.trial = null;
+    const asked = ++this.asked;
+    this.show();
+    if (!this.choices.export) return;
+    const told = await this.attempt(() => this.ask("table"));
+    if (asked !== this.asked) return; // somebody has gone on choosing
+    Object.assign(this, told ? { table: told, command: told.command } : { command: "" });
+    this.show();
+  }
+
+  async try() {
+    const asked = this.asked;
+    this.say("trying …");
+    const trial = await this.attempt(() => this.ask("trial"));
+    if (asked !== this.asked) return;
+    this.trial = trial ?? null;
+    this.show();
+  }
+
+  // An export from this computer, kept beside the recordings.
+  async bring(file) {
+    if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB may be brought.`);
+    const response = await fetch(`join/exports?${new URLSearchParams({ name: file.name })}`, { method: "POST", headers: { "Content-Type": "application/octet-stream" }, body: file });
+    const told = await response.json().catch(() => ({}));
+    if (!response.ok) throw new Error(told.reason ?? `${file.name} could not be brought`);
+    await this.list();
+    await this.choose(told.name);
+  }
+
+  // Another export begins with nothing said about its columns.
+  choose(name) {
+    this.table = null;
+    return this.change({ export: name, columns: null, group: null, sheet: null });
+  }
+
+  show() {
+    for (const panel of this.panels) panel.show(this);
+  }
+}

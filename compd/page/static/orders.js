@@ -1,0 +1,78 @@
+// Orders of a browser that is armed. An order is given in two steps: its consequence in numbers, then the order itself.
+import { CommandLine } from "./command_line.js";
+import { element } from "./format.js";
+import { post } from "./post.js";
+
+const WHAT_IS_ORDERED = { zero: "Take machine zero", accept: "Accept gauges", shadow: "Run as a shadow", adopt: "Adopt the shadow's model", "no-model": "Run without effects" };
+
+export function nameOf(order, subject) {
+  return order === "shadow" && !subject ? "End the shadow" : WHAT_IS_ORDERED[order];
+}
+
+export class Orders {
+  // page: {id, role, armed_until} of this browser's connection; confirm: id of the button of the second step
+  constructor(page, confirm = "confirm") {
+    Object.assign(this, { page, confirm, consequence: element("div"), said: element("p", { class: "said", role: "status" }) });
+    this.arm = element("button", { type: "button", id: "arm", onclick: () => this.armOrNot() }, "Arm for 60 s");
+  }
+
+  get armed() {
+    return (this.page.armed_until ?? 0) > performance.now() / 1000;
+  }
+
+  async armOrNot() {
+    const armed = this.armed;
+    const told = await post("arm", { id: this.page.id, arm: !armed });
+    if (!told.ok) return this.say(told.reason);
+    this.page.armed_until = performance.now() / 1000 + told.armed_s;
+    this.say(armed ? "Not armed any more." : "");
+    this.show();
+  }
+
+  // First step: what the order will do.
+  async ask(name, subject) {
+    const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
+    const told = await response.json();
+    this.say("");
+    const title = nameOf(name, subject);
+    // what is told is what is given: the file that a name stands for now, not later
+    const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, told.subject || subject) }, title);
+    give.disabled = !told.possible;
+    this.tell(element("b", {}, title), element("p", {}, told.text), new CommandLine(told.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
+  }
+
+  tell(...parts) {
+    const box = element("div", { class: "consequence" }, ...parts);
+    this.consequence.replaceChildren(box);
+    box.scrollIntoView({ block: "nearest" });
+  }
+
+  leave() {
+    this.consequence.replaceChildren();
+  }
+
+  // Second step: the order.
+  async give(name, subject) {
+    if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser may look only.");
+    this.say("…");
+    const told = await post(`orders/${name}`, { id: this.page.id, subject });
+    if (told.value === "zero_differs") {
+      this.say(told.reason);
+      const { command } = await (await fetch("orders/zero?subject=replace")).json();
+      const replace = element("button", { type: "button", onclick: () => this.give("zero", "replace") }, "It is the zero position: take it");
+      return this.tell(element("p", {}, told.reason), new CommandLine(command).row, replace);
+    }
+    this.leave();
+    this.say(told.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${told.reason}`);
+  }
+
+  say(text) {
+    this.said.textContent = text ?? "";
+  }
+
+  // Whether this browser is armed now.
+  show() {
+    this.arm.textContent = this.armed ? "Disarm" : "Arm for 60 s";
+    this.arm.disabled = this.page.role !== "operate";
+  }
+}

@@ -1,0 +1,74 @@
+// What is open in the workbench: its numbers, its rows, what is tried on it, and what is asked of the server for it.
+import { post } from "../post.js";
+import { fetchArrays } from "./arrays.js";
+
+export class Bench {
+  // status: where problems are said in words
+  constructor(status) {
+    Object.assign(this, { status, panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null });
+  }
+
+  say(text) {
+    this.status.textContent = text;
+  }
+
+  // What goes wrong is said in words; nothing that was shown stays as if it were the answer.
+  async attempt(work) {
+    try {
+      this.say("");
+      return await work();
+    } catch (error) {
+      this.say(error.message);
+    }
+  }
+
+  // JSON of the open recording. Throws the server's reason.
+  async get(path) {
+    const response = await fetch(`workbench/${this.key}/${path}`);
+    const told = await response.json();
+    if (!response.ok) throw new Error(told.reason);
+    return told;
+  }
+
+  arrays(path) {
+    return fetchArrays(`workbench/${this.key}/${path}`);
+  }
+
+  // An order for the open recording. Throws the server's reason.
+  async post(path, keys) {
+    const told = await post(`workbench/${this.key}/${path}`, keys);
+    if (!told.ok) throw new Error(told.reason);
+    return told;
+  }
+
+  // A change of the model or of the rows, which the server refuses where somebody else was quicker.
+  async change(path, keys) {
+    await this.show(await this.post(path, { ...keys, revision: this.summary.revision }));
+  }
+
+  // libraries: names of files of effects that are tried, too
+  async open(recording, model, libraries) {
+    this.say("opening …");
+    const told = await post("workbench/open", { recording, model, libraries });
+    if (!told.ok) throw new Error(told.reason);
+    this.key = told.key;
+    await this.show(told);
+  }
+
+  // Another state of what is open: every panel begins anew.
+  async show(summary) {
+    Object.assign(this, { summary: null, trial: null, tried_rms: null });
+    this.rows = await this.arrays("rows");
+    this.summary = summary;
+    document.getElementById("opened").hidden = false;
+    this.say("");
+    await Promise.all(this.panels.map((panel) => panel.begin(this)));
+  }
+
+  // With these numbers of the effect that is tried; null for none.
+  tried(theta) {
+    const left = theta && this.trial ? this.trial.residual(theta) : null;
+    this.tried_rms = left && this.trial.rms(theta);
+    for (const panel of this.panels) panel.try?.(left);
+  }
+}

@@ -1,0 +1,111 @@
+// One effect: what it is, a slider for each of its numbers, its fit, what it may be mistaken for, and the step that adds it.
+import { CommandLine } from "../command_line.js";
+import { element, micro } from "../format.js";
+import { ConstantSlider } from "./constant_slider.js";
+import { NumberSlider } from "./number_slider.js";
+import { Proposal } from "./proposal.js";
+import { Signature } from "./signature.js";
+import { Trial } from "./trial.js";
+
+const words = (effect) => effect.replaceAll("_", " ");
+
+export class Card {
+  // plan: called with the effects that a measurement is to tell apart
+  constructor(place, plan = null) {
+    Object.assign(this, { place, plan, theta: [], card: null, variant: 0 });
+  }
+
+  begin(bench) {
+    this.bench = bench;
+    this.card = null;
+    this.place.replaceChildren(element("h2", {}, "Effect"), element("p", { class: "note" }, "Choose an effect on the left: its sliders come here, and the residual follows them."));
+  }
+
+  choose(effect) {
+    const { bench } = this;
+    this.card = bench.trial = null;
+    bench.tried(null);
+    return bench.attempt(async () => {
+      const card = await bench.get(`effects/${effect}`);
+      Object.assign(this, { card, variant: 0, theta: card.numbers.map(() => 0), trials: new Map() });
+      this.show(bench.summary.commands.add.replace("EFFECT", () => card.named));
+      if (!card.variants.length) return;
+      await this.turnTo(0);
+      // the other choices of its constants, so that they follow the hand, too
+      for (let k = 1; k < card.variants.length && this.card === card; k++) await this.trial(k);
+    });
+  }
+
+  // Its trial with one choice of its constants; each is fetched once.
+  trial(variant) {
+    const { bench, card, trials } = this;
+    if (!trials.has(variant)) trials.set(variant, bench.arrays(`effects/${card.asked}/${variant}`).then((packed) => new Trial(packed, bench.rows)));
+    return trials.get(variant);
+  }
+
+  async turnTo(variant) {
+    const { bench, card } = this;
+    this.variant = variant;
+    const trial = await this.trial(variant);
+    if (this.card !== card || this.variant !== variant) return; // another was chosen meanwhile
+    bench.trial = trial;
+    const best = card.variants[variant].left_out_rms;
+    this.left_out.textContent = `Error on rows left out, with its fit: ${best?.toFixed(2) ?? "–"} ${micro(bench.summary.unit)}.`;
+    this.signature.show(bench.rows, trial, card);
+    if (this.theta.some((value) => value !== 0)) bench.tried(this.theta);
+  }
+
+  // command: that adds the effect, as a command line
+  show(command) {
+    const { card } = this;
+    const told = card.variants[0];
+    const button = (text, act, id) => element("button", { type: "button", id, onclick: act }, text);
+    this.left_out = element("p", { class: "note", id: "left-out" });
+    this.signature = new Signature();
+    this.proposal = new Proposal();
+    this.sliders = told ? card.numbers.map((number, k) => new NumberSlider(number, { theta: told.theta[k], standard_error: told.standard_error[k] }, (theta) => this.set(k, theta))) : [];
+    const constants = card.constants.length && card.variants.length > 1 ? [new ConstantSlider(card, 0, (variant) => this.bench.attempt(() => this.turnTo(variant))).row] : [];
+    this.place.replaceChildren(
+      element("h2", {}, words(card.effect)),
+      element("p", {}, card.physics),
+      element("p", { class: "equation" }, card.equation),
+      ...Object.entries(card.symbols).map(([symbol, meaning]) => element("p", { class: "note" }, `${symbol}: ${meaning}`)),
+      ...(told
+        ? [...this.sliders.map(({ row }) => row), ...constants, this.left_out, element("div", { class: "row" }, button("Fit (0)", () => this.fit(), "fit"), button("Add (a) …", () => this.add(), "add")), new CommandLine(command).row]
+        : [element("p", { class: "note" }, `Not testable on this recording: ${card.why_not}`)]),
+      this.proposal.place,
+      ...this.rivals(),
+      ...(told ? [this.signature.place] : []),
+      element("p", { class: "note" }, `Source: ${card.source}`),
+    );
+  }
+
+  // Effects that do much the same, on these rows or in general, and what would tell them apart.
+  rivals() {
+    const { effect, alike, mistaken_for, separated_by } = this.card;
+    const here = alike.map(({ effect: other, cosine }) => element("li", {}, `${words(other)}, cosine ${cosine.toFixed(3)}`));
+    const plan = this.plan && alike.length ? [element("button", { type: "button", onclick: () => this.plan([effect, ...alike.map((other) => other.effect)]) }, "Plan what tells them apart …")] : [];
+    return [
+      ...(here.length ? [element("p", {}, "On these rows much the same is done by:"), element("ul", {}, ...here), ...plan] : []),
+      ...(mistaken_for.length ? [element("p", { class: "note" }, `May be mistaken for ${mistaken_for.map(words).join(", ")}; told apart by ${separated_by}.`)] : []),
+    ];
+  }
+
+  set(k, theta) {
+    this.theta[k] = theta;
+    this.sliders[k].show(theta);
+    this.bench.tried(this.theta);
+  }
+
+  // To what fits best, all numbers together.
+  fit() {
+    if (!this.card?.variants.length) return;
+    this.theta = [...this.card.variants[this.variant].theta];
+    this.sliders.forEach((slider, k) => slider.show(this.theta[k]));
+    this.bench.tried(this.theta);
+  }
+
+  add() {
+    if (this.card?.variants.length) this.proposal.show(this.bench, { kind: "add", effect: this.card.asked }, "Add it to the model");
+  }
+}

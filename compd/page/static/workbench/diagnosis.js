@@ -1,0 +1,111 @@
+// A diagnosis: its stages while it runs, then the verdict and the evidence. Every browser shows the newest of them.
+import { CommandLine } from "../command_line.js";
+import { copyButton } from "../copy.js";
+import { element } from "../format.js";
+import { evidence, summaryLines } from "./evidence.js";
+
+// While one runs, and otherwise: another browser may begin one.
+const LOOK_EVERY_MS = 400;
+const LOOK_AT_REST_MS = 3000;
+
+export class Diagnosis {
+  // act: named(result) marks what it has found, null for nothing; the others are those of `evidence`.
+  constructor(place, act) {
+    Object.assign(this, { act, bench: null, key: "", shown: "", turn: 0, running: false });
+    this.button = element("button", { type: "button", id: "diagnose", onclick: () => this.startOrCancel() }, "Diagnose (d)");
+    this.command = new CommandLine();
+    this.stages = element("ol", { class: "stages", "aria-label": "Stages of the diagnosis" });
+    this.said = element("p", { class: "note", role: "status", id: "diagnosis-said" });
+    this.behind = element("p", { class: "behind", id: "diagnosis-behind" });
+    this.outcome = element("div", { id: "diagnosis-outcome" });
+    this.page = element("p", { class: "note", id: "diagnosis-page" });
+    this.text = element("pre", { class: "verdict", tabindex: 0 });
+    this.whole = element("details", {}, element("summary", {}, "As the terminal prints it"), copyButton(this.text, "Copy this text"), this.text);
+    place.replaceChildren(element("div", { class: "row" }, this.button), this.command.row, this.stages, this.said, this.behind, this.outcome, this.page, this.whole);
+    this.clear();
+  }
+
+  clear() {
+    this.shown = "";
+    for (const part of [this.stages, this.said, this.behind, this.outcome, this.page]) part.replaceChildren();
+    this.whole.hidden = true;
+    this.act.named?.(null);
+  }
+
+  begin(bench) {
+    this.bench = bench;
+    this.command.write(bench.summary.commands.diagnose);
+    if (bench.key !== this.key) this.clear();
+    this.key = bench.key;
+    return this.look();
+  }
+
+  startOrCancel() {
+    if (!this.bench) return;
+    this.bench.attempt(async () => {
+      await this.bench.post("diagnosis", this.running ? { cancel: true } : {});
+      await this.look();
+    });
+  }
+
+  // The newest, again and again; a later call takes over from an earlier one.
+  async look() {
+    const turn = ++this.turn;
+    clearTimeout(this.looking);
+    try {
+      const told = await this.bench.get(`diagnosis?shown=${this.shown}`);
+      if (turn !== this.turn) return;
+      this.show(told);
+    } catch {
+      // the page's server is away, or has begun anew: what needs it says so
+      if (turn !== this.turn) return;
+    }
+    this.looking = setTimeout(() => this.look(), this.running ? LOOK_EVERY_MS : LOOK_AT_REST_MS);
+  }
+
+  show(told) {
+    const { id, state, seconds, behind } = told;
+    this.running = state === "running";
+    this.button.textContent = this.running ? `Cancel, ${seconds.toFixed(0)} s` : "Diagnose (d)";
+    if (state === "none") return;
+    if (this.running) this.clear();
+    this.tellStages(told);
+    this.said.textContent = { cancelled: `cancelled after ${seconds.toFixed(1)} s`, failed: "it failed:", done: `done in ${seconds.toFixed(1)} s` }[state] ?? "";
+    this.behind.textContent = behind && !this.running ? `Of the model before the last ${behind === 1 ? "step" : `${behind} steps`}: what is there now is not diagnosed yet.` : "";
+    if (told.evidence && !this.running && id !== this.shown) this.showOutcome(told);
+    if (state === "done") {
+      this.act.named?.(behind ? null : this.result);
+      this.tellPage(told.page);
+    }
+  }
+
+  showOutcome({ id, state, text, result, evidence: found }) {
+    Object.assign(this, { shown: id, result });
+    this.outcome.replaceChildren(...(state === "done" ? [summaryLines(found.verdict, found.lines), ...evidence(found, this.act)] : []));
+    this.text.textContent = text;
+    this.whole.hidden = !text;
+    this.whole.open = state === "failed";
+  }
+
+  // Which of the stages have been, with their times; how long the others take nobody knows.
+  tellStages({ stages, steps, seconds, state }) {
+    const ends = steps.map((_, k) => steps[k + 1]?.at_s ?? seconds);
+    const last = steps.at(-1)?.text;
+    this.stages.replaceChildren(...stages.map(({ text, only_where_needed }, place) => {
+      const took_s = steps.reduce((sum, step, k) => sum + (step.text === text ? ends[k] - step.at_s : 0), 0);
+      const begun = steps.some((step) => step.text === text);
+      const now = this.running && text === last;
+      const over = state === "done" || stages.findIndex((stage) => stage.text === last) > place;
+      const status = now ? "now" : begun ? "been" : over ? "skipped" : "";
+      const note = begun ? `${took_s.toFixed(1)} s` : over ? "not needed" : only_where_needed ? "only where effects leave more than noise" : "";
+      return element("li", { class: status, ...(now ? { "aria-current": "step" } : {}) }, text, " ", element("small", {}, note));
+    }));
+  }
+
+  // page: true, false where it could not be drawn, null while it may still come
+  tellPage(page) {
+    const link = () => element("a", { href: `workbench/${this.bench.key}/diagnosis/page`, target: "_blank", rel: "noopener" }, "Open the page with pictures in a new tab");
+    const told = { true: link, false: () => "Its pictures could not be drawn; the command line with --html tells why.", null: () => "The page with pictures is being drawn …" }[page]();
+    if (this.page.firstChild?.textContent !== (told.textContent ?? told)) this.page.replaceChildren(told);
+  }
+}

@@ -1,0 +1,87 @@
+// The effects of the library, the one that explains most first; chosen by mouse, or by j and k.
+import { element, micro } from "../format.js";
+
+export class Effects {
+  // choose: called with an effect; ranked: with what the server says of all
+  constructor(place, filter, note, { choose, ranked }) {
+    Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", said: {} });
+    filter.addEventListener("input", () => this.draw());
+  }
+
+  async begin(bench) {
+    Object.assign(this, { effects: [], draft: null, chosen: "" });
+    this.draw();
+    this.note.textContent = "what each effect would do …";
+    this.unit = bench.summary.unit;
+    const told = await bench.get("effects");
+    this.effects = told.effects;
+    this.ranked(told);
+    this.draw();
+  }
+
+  // What a diagnosis has named is marked; null for none.
+  name(result) {
+    const steps = result?.steps ?? [];
+    const rivals = steps.flatMap(({ effect, rivals }) => rivals.map((rival) => [rival, `as good as ${effect.replaceAll("_", " ")}`]));
+    const said = Object.fromEntries([...rivals, ...steps.map(({ effect }, k) => [effect, `named, number ${k + 1}`])]);
+    if (JSON.stringify(said) === JSON.stringify(this.said)) return;
+    this.said = said;
+    this.draw();
+  }
+
+  // An effect that is being written stands among the others; null for none.
+  write(draft) {
+    this.draft = draft && { ...draft, said: "being written" };
+    this.draw();
+  }
+
+  get all() {
+    if (!this.draft) return this.effects;
+    const place = this.effects.findIndex(({ left_out_rms }) => left_out_rms === null || left_out_rms > (this.draft.left_out_rms ?? Infinity));
+    return this.effects.toSpliced(place < 0 ? this.effects.length : place, 0, this.draft);
+  }
+
+  get shown() {
+    const wanted = this.filter.value.trim().toLowerCase();
+    return this.all.filter(({ effect, physics }) => `${effect} ${physics}`.toLowerCase().includes(wanted));
+  }
+
+  step(by) {
+    const names = this.shown.map(({ effect }) => effect);
+    const next = names[Math.max(0, Math.min(names.length - 1, names.indexOf(this.chosen) + by))];
+    if (next) this.pick(next);
+  }
+
+  pick(effect) {
+    this.chosen = effect;
+    this.draw();
+    this.place.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+    return this.choose(effect);
+  }
+
+  draw() {
+    const shown = this.shown;
+    this.note.textContent = `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
+    this.place.replaceChildren(...shown.map((told) => this.row(told)));
+  }
+
+  row({ effect, status, why, explained, left_out_rms, own, said = this.said[effect] }) {
+    const percent = explained === null ? 0 : Math.round(100 * Math.max(0, Math.min(1, explained)));
+    const bar = element("i");
+    bar.style.width = `${percent}%`;
+    return element(
+      "button",
+      { type: "button", class: "effect", role: "option", "aria-selected": String(effect === this.chosen), "data-effect": effect, title: why, onclick: () => this.pick(effect) },
+      element("span", { class: "name" }, element("b", {}, effect.split("@")[0].replaceAll("_", " "), ...(own ? [element("small", { class: "own" }, " own")] : [])), element("span", {}, status === "not_testable" ? "–" : `${percent} %`)),
+      element("div", { class: "share" }, bar),
+      element("small", { class: said ? "said" : "" }, said ?? this.left(status, why, left_out_rms)),
+    );
+  }
+
+  // What an effect leaves, tried alone.
+  left(status, why, rms) {
+    if (status === "not_testable") return why;
+    if (status === "no_gain") return "no gain";
+    return `alone, leaves ${rms.toFixed(2)} ${micro(this.unit)}`;
+  }
+}

@@ -1,0 +1,75 @@
+// The model: its numbers, its steps as a staircase of the error, and the way back.
+import { CommandLine } from "../command_line.js";
+import { element, ink, micro, prepared } from "../format.js";
+import { Proposal } from "./proposal.js";
+
+const words = (effect) => effect.replaceAll("_", " ");
+
+export class Ledger {
+  constructor(place) {
+    this.place = place;
+  }
+
+  undo() {
+    if (!this.button.disabled) this.bench.attempt(() => this.bench.change("step", { kind: "undo" }));
+  }
+
+  begin(bench) {
+    this.bench = bench;
+    const { ledger, numbers, floor, unit, model, commands } = bench.summary;
+    const canvas = element("canvas", { class: "staircase", role: "img", "aria-label": `The error after each step: ${ledger.map(({ after }) => after.toFixed(2)).join(", ") || "no step yet"}` });
+    const proposal = new Proposal();
+    const button = (text, act, id) => element("button", { type: "button", id, onclick: act }, text);
+    this.button = button("Undo the last step (u)", () => this.undo(), "undo");
+    this.button.disabled = !ledger.some((step) => step.kind !== "undo" && !step.undone);
+    const value = (entry) => `${Number(entry.value.toPrecision(4))}${entry.standard_error === null ? "" : ` ± ${Number(entry.standard_error.toPrecision(2))}`} ${micro(entry.unit)}`;
+    const effects = [...new Set(numbers.map(({ effect }) => effect))];
+    const removals = effects.map((effect) => button(`Remove ${words(effect)} …`, () => proposal.show(bench, { kind: "remove", effect }, "Remove it")));
+    const fit = effects.length ? [button("Fit all again …", () => proposal.show(bench, { kind: "fit" }, "Keep this fit"), "fit-all")] : [];
+    this.place.replaceChildren(
+      element("h2", {}, "Model ", element("small", {}, model)),
+      canvas,
+      table(ledger.map((step) => [`${step.kind}${step.undone ? ", undone" : ""}`, words(step.effect), `${step.before.toFixed(2)} → ${step.after.toFixed(2)} ${micro(step.unit)}`])),
+      table(numbers.map((entry) => [`${words(entry.effect)} ${entry.parameter}`, value(entry)]), numbers.map(({ plausible }) => !plausible)),
+      ...(numbers.length ? [] : [element("p", { class: "note" }, "No effect yet.")]),
+      element("div", { class: "row" }, this.button, ...fit, ...removals),
+      proposal.place,
+      ...[commands.undo, ...(effects.length ? [commands.fit, commands.remove] : []), ...(ledger.length ? [commands.ledger] : [])].map((command) => new CommandLine(command).row),
+    );
+    canvas.hidden = !ledger.length;
+    requestAnimationFrame(() => this.draw(canvas, ledger, floor, unit));
+  }
+
+  draw(canvas, ledger, floor, unit) {
+    const { context, width, height } = prepared(canvas);
+    if (!ledger.length) return;
+    const errors = [ledger[0].before, ...ledger.map(({ after }) => after)];
+    const top = Math.max(...errors) * 1.1;
+    const [x, y] = [(k) => 8 + (k * (width - 16)) / errors.length, (value) => height - 16 - (value / top) * (height - 30)];
+    context.beginPath();
+    errors.forEach((error, k) => {
+      context.lineTo(x(k), y(error));
+      context.lineTo(x(k + 1), y(error));
+    });
+    context.strokeStyle = ink("--line");
+    context.lineWidth = 2;
+    context.stroke();
+    context.beginPath();
+    context.setLineDash([4, 4]);
+    context.moveTo(8, y(floor));
+    context.lineTo(width - 8, y(floor));
+    context.strokeStyle = ink("--soft");
+    context.stroke();
+    context.setLineDash([]);
+    context.font = "11px system-ui";
+    context.fillStyle = ink("--soft");
+    context.fillText(`noise ${floor.toFixed(2)} ${micro(unit)}`, 10, y(floor) - 3);
+    ledger.forEach((step, k) => context.fillText(`${step.kind === "add" ? "+" : step.kind === "remove" ? "−" : step.kind} ${words(step.effect)}`, x(k + 1) + 3, Math.max(11, y(errors[k + 1]) - 4)));
+  }
+}
+
+// The last cell of each row is a number; bad: rows with a number outside its plausible range.
+function table(rows, bad = []) {
+  const cells = (row) => row.map((text, k) => element("td", { class: k === row.length - 1 ? "number" : "" }, text));
+  return element("table", {}, element("tbody", {}, ...rows.map((row, k) => element("tr", { class: bad[k] ? "bad" : "" }, ...cells(row)))));
+}

@@ -1,0 +1,133 @@
+// The residual of every row that is drawn, before and with what is tried, on the same axes and scale.
+import { element, ink, prepared } from "../format.js";
+import { Turn } from "../turn.js";
+import { AgainstView } from "./against_view.js";
+import { Lasso } from "./lasso.js";
+import { SpaceView, mapped } from "./space_view.js";
+import { TargetView } from "./target_view.js";
+
+const BEFORE = "#8c959f88";
+const CHOSEN = "#e69f00";
+
+export class Picture {
+  // selection: of rows, shared with all that shows rows
+  constructor({ canvas, tabs, against, note }, selection) {
+    Object.assign(this, { canvas, tabs, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false });
+    const draw = () => this.draw();
+    this.lasso = new Lasso(canvas, { wanted: (event) => event.button === 0 && (event.shiftKey || this.kind !== "3D"), draw, around: (contains) => this.pick(contains) });
+    this.turn = new Turn(canvas, draw);
+    selection.listen(draw);
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    against.addEventListener("change", () => against.value && this.choose(against.value));
+  }
+
+  // Kinds of picture follow from what was measured.
+  begin(bench) {
+    this.bench = bench;
+    const { rows } = bench;
+    this.rows = rows;
+    this.left = this.every = null;
+    const quantities = Object.keys(rows.shapes).filter((name) => name.startsWith("quantity "));
+    const turned = new SpaceView((...sizes) => this.turn.projector(...sizes), "Drag to turn; with Shift, draw around rows to choose them.");
+    const map = (name, across, up) => ({ [`map ${name}`]: new SpaceView(mapped(across, up), "Draw around rows to choose them.", name) });
+    this.views = {
+      ...(rows.labels.length === 3 ? { "3D": turned, ...map("xy", 0, 1), ...map("xz", 0, 2), ...map("yz", 1, 2), target: new TargetView() } : {}),
+      time: new AgainstView("time_s", "time, s"),
+      ...Object.fromEntries(quantities.map((name) => [name.slice(9), new AgainstView(name, name.slice(9))])),
+    };
+    this.tabbed = Object.keys(this.views).length - quantities.length;
+    this.largest = 0;
+    rows.residual.forEach((value, k) => {
+      if (this.used(Math.floor(k / rows.labels.length))) this.largest = Math.max(this.largest, Math.abs(value));
+    });
+    this.choose(this.views[this.kind] ? this.kind : Object.keys(this.views)[0]);
+  }
+
+  choose(kind) {
+    this.kind = kind;
+    const kinds = Object.keys(this.views);
+    this.tabs.replaceChildren(...kinds.slice(0, this.tabbed).map((name) => element("button", { type: "button", role: "tab", "aria-selected": String(name === kind), onclick: () => this.choose(name) }, name)));
+    this.against.replaceChildren(element("option", { value: "" }, "against …"), ...kinds.slice(this.tabbed).map((name) => element("option", { value: name, selected: name === kind }, name)));
+    this.draw();
+  }
+
+  // The next kind of picture, or the one before.
+  step(by) {
+    const kinds = Object.keys(this.views);
+    if (kinds.length) this.choose(kinds[(kinds.indexOf(this.kind) + by + kinds.length) % kinds.length]);
+  }
+
+  try(left) {
+    this.left = left;
+    this.draw();
+  }
+
+  // Only what was before, while something is tried; and back.
+  compare() {
+    this.without = !this.without;
+    this.draw();
+  }
+
+  used(row) {
+    return this.rows.state[row] === 0;
+  }
+
+  get shown() {
+    return this.left && !this.without ? this.left : this.rows.residual;
+  }
+
+  draw() {
+    const { context, width, height } = prepared(this.canvas);
+    const { rows, left } = this;
+    if (!rows) return;
+    const view = this.views[this.kind];
+    context.font = "12px system-ui";
+    view.layout(rows, this.largest, width, height);
+    view.frame(context, rows, width, height);
+    const paint = (residual, colour, shown) => {
+      context.strokeStyle = context.fillStyle = colour;
+      view.paint(context, rows, residual, view.marks(rows, residual), shown);
+    };
+    const used = (row) => this.used(row);
+    if (left) paint(rows.residual, BEFORE, used);
+    if (!left) paint(rows.residual, ink("--line"), used);
+    else if (!this.without) paint(left, ink("--bad"), used);
+    if (this.selection.rows.size) {
+      context.lineWidth = 2;
+      paint(this.shown, CHOSEN, (row) => this.used(row) && this.selection.rows.has(rows.row[row]));
+      context.lineWidth = 1;
+    }
+    this.lasso.draw(context);
+    this.note.textContent = view.note;
+  }
+
+  // Rows with a mark that is contained; of a recording that is thinned for the picture, of all its rows.
+  pick(contains) {
+    this.bench.attempt(async () => {
+      const thinned = this.rows.row.length < this.bench.summary.rows;
+      if (thinned) this.every ??= await this.bench.arrays("rows?all");
+      const rows = thinned ? this.every : this.rows;
+      const residual = thinned ? rows.residual : this.shown;
+      const marks = this.views[this.kind].marks(rows, residual);
+      const marks_per_row = marks.length / 2 / rows.row.length;
+      const chosen = new Set();
+      for (let k = 0; k < marks.length / 2; k++) {
+        const row = Math.floor(k / marks_per_row);
+        if (rows.state[row] === 0 && contains(marks[2 * k], marks[2 * k + 1])) chosen.add(rows.row[row]);
+      }
+      this.selection.set(chosen);
+    });
+  }
+
+  // Rows by keyboard, in the order of the file: the next one, with Shift as well.
+  key(event) {
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!by || !this.rows || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    const used = [...this.rows.row].filter((_, row) => this.used(row));
+    const last = [...this.selection.rows].at(-1);
+    const next = used[Math.max(0, Math.min(used.length - 1, used.indexOf(last) + by))];
+    if (event.shiftKey) this.selection.add([next]);
+    else this.selection.set([next]);
+  }
+}

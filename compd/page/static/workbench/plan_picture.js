@@ -1,0 +1,68 @@
+// The rows of a plan in space: numbered in their order, coloured by what is set, with the difference of the rivals.
+import { element, ink, prepared } from "../format.js";
+import { Turn } from "../turn.js";
+
+const NO_COLOUR = "purpose";
+const SETTLED = ["row", "purpose", "tip_x_mm", "tip_y_mm", "tip_z_mm"];
+
+export class PlanPicture {
+  constructor() {
+    this.canvas = element("canvas", { id: "plan-picture", tabindex: 0, role: "img", "aria-label": "The planned rows in space" });
+    this.by = element("select", { "aria-label": "Colour", onchange: () => this.draw() });
+    this.note = element("p", { class: "note" });
+    this.place = element("div", {}, element("label", {}, "Colour by ", this.by), this.canvas, this.note);
+    this.plan = null;
+    this.turn = new Turn(this.canvas, () => this.draw());
+  }
+
+  show(plan) {
+    this.plan = plan;
+    this.place.hidden = !plan.place.length;
+    const varied = plan.columns.filter((name, k) => !SETTLED.includes(name) && new Set(plan.rows.map((row) => row[k])).size > 1);
+    const first = varied.find((name) => /^(force|temperature)_/.test(name)) ?? varied[0];
+    this.by.replaceChildren(element("option", { value: NO_COLOUR }, "nothing"), ...varied.map((name) => element("option", { value: name, selected: name === first }, name)));
+    this.draw();
+  }
+
+  draw() {
+    const { context, width, height } = prepared(this.canvas);
+    if (!this.plan?.place.length) return;
+    const { place, columns, rows, difference_um: difference, rivals } = this.plan;
+    const project = this.turn.projector(place.flat(), width, 0.85 * height);
+    const at = place.map(project);
+    context.font = "11px system-ui";
+    context.strokeStyle = ink("--rule");
+    context.beginPath();
+    for (const point of at) context.lineTo(...point);
+    context.stroke();
+    const arrows = difference.length && difference[0].length === 3;
+    const largest = Math.max(...difference.map((row) => Math.hypot(...row)), 1e-9);
+    if (arrows) {
+      context.strokeStyle = ink("--bad");
+      context.beginPath();
+      place.forEach((point, k) => {
+        context.moveTo(...at[k]);
+        context.lineTo(...project(point.map((value, i) => value + (0.3 * project.radius * difference[k][i]) / largest)));
+      });
+      context.stroke();
+    }
+    const k = columns.indexOf(this.by.value);
+    const values = k < 0 || this.by.value === NO_COLOUR ? null : rows.map((row) => row[k]);
+    const [low, high] = values ? [Math.min(...values), Math.max(...values)] : [0, 1];
+    // several rows may be at one place: their numbers stand beside one another
+    const taken = new Map();
+    at.forEach((point, row) => {
+      const share = values ? (values[row] - low) / (high - low || 1) : 0.5;
+      context.fillStyle = values ? `color-mix(in oklab, #d55e00 ${100 * share}%, #0072b2)` : ink("--line");
+      context.beginPath();
+      context.arc(...point, 4, 0, 7);
+      context.fill();
+      const key = point.map(Math.round).join();
+      taken.set(key, [...(taken.get(key) ?? []), row + 1]);
+    });
+    context.fillStyle = ink("--ink");
+    for (const [key, numbers] of taken) context.fillText(numbers.length > 4 ? `${numbers.slice(0, 3).join(" ")} … ${numbers.at(-1)}` : numbers.join(" "), Number(key.split(",")[0]) + 6, Number(key.split(",")[1]) - 5);
+    const told = values ? `Blue is ${low}, red ${high} of ${this.by.value}. ` : "";
+    this.note.textContent = `${told}${arrows ? `Arrows: ${rivals[0].replaceAll("_", " ")} against its rival, at most ${largest.toPrecision(2)} µm. ` : ""}The line is the order. Drag to turn.`;
+  }
+}

@@ -1,0 +1,49 @@
+// The large numbers on top: the error now and with what is tried, on all rows and on rows left out, and the noise.
+import { element, micro } from "../format.js";
+
+// What the residual follows is said of so many quantities.
+const MOST_TRENDS = 3;
+
+export class Strip {
+  // verdict: where the comparison is said in words
+  constructor(place, verdict) {
+    this.verdict = verdict;
+    this.bar = element("div", { class: "falling", role: "img" });
+    this.numbers = element("div", { class: "errors" });
+    place.replaceChildren(this.numbers, this.bar);
+  }
+
+  begin(bench) {
+    this.bench = bench;
+    this.left_out_rms = null;
+    const { verdict, trends } = bench.summary;
+    this.verdict.replaceChildren(element("p", {}, verdict), ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MOST_TRENDS).join("; ")}.`)] : []));
+    this.try();
+  }
+
+  // left_out_rms: of the model on rows that it was not fitted on
+  measured({ left_out_rms }) {
+    this.left_out_rms = left_out_rms;
+    this.try();
+  }
+
+  try() {
+    const { summary, tried_rms } = this.bench;
+    if (!summary) return;
+    const { rms, floor, floor_known, unit, rows, used } = summary;
+    const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : `${value.toFixed(2)} ${micro(unit)}`), element("small", {}, text));
+    this.numbers.replaceChildren(
+      big(rms, `error now, ${used} of ${rows} rows`, "now"),
+      big(this.left_out_rms, "on rows left out", "held"),
+      big(tried_rms, tried_rms === null ? "nothing is tried" : "tried, not kept", "tried"),
+      big(floor, floor_known ? "noise alone" : "noise is not known"),
+    );
+    const part = (name, value) => {
+      const made = element("i", { class: name });
+      made.style.width = `${Math.min(100, (100 * value) / (rms || 1))}%`;
+      return made;
+    };
+    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with what is tried`}, noise ${floor?.toFixed(2) ?? "not known"}`);
+    this.bar.replaceChildren(part("left", tried_rms ?? rms), part("noise", floor ?? 0));
+  }
+}

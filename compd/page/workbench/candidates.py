@@ -1,0 +1,194 @@
+"""Effects that may explain the residual of a comparison: each alone, ranked, and one of them as a card with trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
+from compd.comparison.thinning import thinned
+from compd.diagnosis.candidate_results import candidate_results
+from compd.diagnosis.candidates.candidates import Candidate
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import MOST_ROWS, candidate_pool
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep
+from compd.diagnosis.search.gross_rows import RowWeights
+from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
+from compd.diagnosis.search.rivals import collinearity
+from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.json_text import nan_to_null
+from compd.model.effect import Effect
+from compd.page.workbench.trial import Trial, trial
+from compd.units import UM_PER_MM
+
+# Effects are told to be alike from this cosine on: a tenth of either's square is its own.
+LEAST_COSINE = 0.95
+MOST_ALIKE = 4
+
+
+class Candidates:
+    """The effects of a library against one comparison. What takes a second is computed when it is asked for."""
+
+    def __init__(
+        self, comparison: Comparison, library: Sequence[Effect], weighed: DiagnosisProblem | None = None
+    ) -> None:
+        """weighed : of the same comparison, by which rows count as they do there; None to weigh them anew."""
+        self._comparison = comparison
+        self._weighed = weighed
+        self.library = {effect.id: effect for effect in library}
+
+    @cached_property
+    def _searched(self) -> Comparison:
+        """Of the rows that effects are ranked on: evenly thinned where there are very many, as for a diagnosis."""
+        full = self._comparison
+        thin = thinned(full.aligned, MOST_ROWS)
+        return full if thin is full.aligned else compare(thin, full.fitted)
+
+    @cached_property
+    def problem(self) -> DiagnosisProblem:
+        """The residual and the columns of every effect."""
+        searched = self._searched
+        pool = candidate_pool(searched, list(self.library.values()))
+        weights = None if self._weighed is None else _weights(self._weighed)
+        return build_problem(searched, pool, Criteria(), weights)
+
+    @cached_property
+    def losses(self) -> SubsetLosses:
+        """What each leaves on rows left out."""
+        return self.problem.losses(self.problem.candidates)
+
+    def summary(self) -> dict[str, Any]:
+        """Every effect, ranked; and the error that the model has on rows that were left out, as plain data."""
+        told: dict[str, Any] = nan_to_null(
+            {
+                "effects": self.ranked(),
+                "left_out_rms": self._rms(self.losses.baseline),
+                "rows": int(self.problem.rows.sum()),
+            }
+        )
+        return told
+
+    def _rms(self, loss: float) -> float:
+        """The error per coordinate at a loss, um."""
+        return self.problem.unit_um * float(np.sqrt(max(loss, 0.0)))
+
+    def ranked(self, steps: Sequence[DiagnosisStep] = ()) -> list[dict[str, Any]]:
+        """Every effect, the one that leaves least on rows left out first, with the reason for its place.
+
+        steps : what a diagnosis has named.
+        """
+        results = candidate_results(self.problem, self.losses, steps, {})
+        told: list[dict[str, Any]] = nan_to_null([self._result(result) for result in results])
+        return told
+
+    def _result(self, result: CandidateResult) -> dict[str, Any]:
+        effect = self.library.get(result.effect)
+        return {
+            "effect": result.effect,
+            "status": result.status,
+            "why": result.why,
+            "left_out_rms": result.heldout_rms_um,
+            "explained": result.explained_fraction,
+            "physics": "" if effect is None else effect.physics,
+        }
+
+    def card(self, name: str) -> dict[str, Any]:
+        """What an effect is, its numbers with their plausible ranges, and its fit alone at each choice of constants.
+
+        Raises KeyError where there is no such effect.
+        """
+        effect, links = self.library[name], self._comparison.aligned.rows.links
+        told: dict[str, Any] = nan_to_null(
+            {
+                "effect": effect.id,
+                "physics": effect.physics,
+                "equation": effect.equation,
+                "symbols": dict(effect.symbols),
+                "source": effect.source,
+                "mistaken_for": list(effect.mistaken_for),
+                "separated_by": effect.separated_by,
+                "numbers": [
+                    {
+                        "name": column.name,
+                        "unit": column.parameter.unit,
+                        "low": column.parameter.low,
+                        "high": column.parameter.high,
+                        "range": list(column.parameter.theta_range),
+                        "reciprocal": column.parameter.reciprocal,
+                        "source": column.parameter.source,
+                    }
+                    for column in effect.columns(links)
+                ],
+                "constants": [
+                    {"name": constant.name, "unit": constant.unit, "low": constant.low, "high": constant.high}
+                    for constant in effect.constants
+                ],
+                "variants": [self._variant(k) for k in self._variants(name)],
+                "alike": self._alike(name),
+                "why_not": self.problem.pool.untestable.get(name, ""),
+            }
+        )
+        return told
+
+    def trial(self, name: str, variant: int) -> Trial:
+        """The effect at one choice of its constants, by its place in `card`.
+
+        Raises KeyError or IndexError where there is none.
+        """
+        candidate = self._candidate(self._variants(name)[variant])
+        aligned = self._comparison.aligned
+        columns_um = candidate.columns_um
+        if self._searched is not self._comparison:
+            columns_um = aligned.columns(candidate.effect, candidate.constants) * UM_PER_MM
+        return trial(self._comparison, fitted_along_columns(self._comparison), columns_um, candidate.constants)
+
+    def _candidate(self, k: int) -> Candidate:
+        return self.problem.candidates[k]
+
+    def _variants(self, name: str) -> list[int]:
+        """Places of an effect's candidates; none where it cannot be tried."""
+        candidates = self.problem.candidates
+        places = [k for k, candidate in enumerate(candidates) if candidate.name == name and candidate.kind == "effect"]
+        return sorted(places, key=lambda k: self.losses.loss((k,)))
+
+    def _alike(self, name: str) -> list[dict[str, Any]]:
+        """Effects that could do much the same on these rows, with the cosine between both, the nearest first."""
+        if name not in self.losses.best_variants:
+            return []
+        (own,) = self.losses.best_variants[name].members
+        cosine_by_effect = {
+            other: collinearity(self.losses, (), own, subset.members[0])
+            for other, subset in self.losses.best_variants.items()
+            if other != name and self.losses.candidates[subset.members[0]].kind == "effect"
+        }
+        nearest = sorted(cosine_by_effect, key=lambda other: -cosine_by_effect[other])[:MOST_ALIKE]
+        return [
+            {"effect": other, "cosine": cosine_by_effect[other]}
+            for other in nearest
+            if cosine_by_effect[other] >= LEAST_COSINE
+        ]
+
+    def _variant(self, k: int) -> dict[str, Any]:
+        candidate = self._candidate(k)
+        (theta, covariance), loss = self.losses.estimates((k,))[0], self.losses.loss((k,))
+        return {
+            "constants": dict(candidate.constants),
+            "theta": _numbers(theta),
+            "standard_error": _numbers(np.sqrt(np.diag(covariance))),
+            "left_out_rms": self._rms(loss),
+        }
+
+
+def _weights(problem: DiagnosisProblem) -> RowWeights:
+    weight = np.zeros(len(problem.rows))
+    weight[problem.rows] = problem.root_weight**2
+    return RowWeights(gross=problem.gross, weight=weight)
+
+
+def _numbers(values: FloatArray) -> list[float]:
+    return [float(value) for value in values]

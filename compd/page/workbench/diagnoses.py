@@ -1,0 +1,42 @@
+"""The diagnoses that run in one page's server: only so many at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+from compd.configuration.shipped import Machine
+from compd.errors import Problem, StateError
+from compd.page.workbench.diagnosis_job import DiagnosisJob
+
+# Each takes a processor, and the memory of a process of its own; the daemon runs on the same computer.
+MOST_RUNNING = 2
+
+
+class Diagnoses:
+    """Those that run."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running: list[DiagnosisJob] = []
+
+    def begin(
+        self, path: Path, model_path: Path | None, machine: Machine | None, revision: int, effects: Sequence[str] = ()
+    ) -> DiagnosisJob:
+        """Begin one; arguments as of `DiagnosisJob`. Raises StateError where as many run as may."""
+        with self._lock:
+            self._running = [job for job in self._running if not job.has_ended]
+            if len(self._running) >= MOST_RUNNING:
+                raise StateError(
+                    Problem(
+                        where="diagnosis",
+                        what=f"{len(self._running)} run already on this server, of other recordings or models",
+                        value=", ".join(job.path.stem for job in self._running),
+                        allowed=f"{MOST_RUNNING} at once",
+                        next_step="wait for one of them to end, or cancel it where it was begun",
+                    )
+                )
+            job = DiagnosisJob(path, model_path, machine, revision=revision, effects=effects)
+            self._running.append(job)
+            return job

@@ -1,0 +1,50 @@
+"""What a browser asks of the diagnosis of an open recording: to begin or cancel it, how far it is, its page."""
+
+from __future__ import annotations
+
+import asyncio
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from compd.page.requests import keys_of, refused
+from compd.page.workbench.handlers import Handler
+from compd.page.workbench.workbench import Workbench
+
+# The page of a diagnosis is one file with its scripts and styles inside. In its sandbox it has no cookie of this
+# server, and it asks nothing of this server nor of any other.
+_PAGE_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+async def _diagnosis(request: Request, workbench: Workbench) -> Response:
+    """How far the newest is; with what it has found, unless the browser names it as that which it shows."""
+    return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
+
+
+async def _diagnose(request: Request, workbench: Workbench) -> Response:
+    """`cancel`: end the one that runs; else begin one. It changes nothing, so that everybody may."""
+    keys = await keys_of(request)
+    if keys.get("cancel"):
+        if workbench.diagnosis is not None:
+            workbench.diagnosis.cancel()
+    else:
+        await asyncio.to_thread(workbench.diagnose)
+    return JSONResponse(workbench.diagnosis_summary())
+
+
+async def _page(request: Request, workbench: Workbench) -> Response:
+    job = workbench.diagnosis
+    page = b"" if job is None else await asyncio.to_thread(lambda: job.page)
+    if not page:
+        return refused("there is no page of a diagnosis yet", 404)
+    return Response(page, media_type="text/html", headers={"Content-Security-Policy": _PAGE_POLICY})
+
+
+DIAGNOSIS_HANDLERS = (
+    Handler("/diagnosis", _diagnosis),
+    Handler("/diagnosis", _diagnose, "POST"),
+    Handler("/diagnosis/page", _page),
+)

@@ -1,0 +1,39 @@
+"""Files of effects for kinds of machines: those that come with compd, and those beside the page's model files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from compd.configuration.shipped import shipped_effects
+from compd.errors import Problem, StateError
+
+# Of a file of effects beside the model files.
+FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}[.-]effects\.yaml")
+
+
+class EffectLibraries:
+    """What a browser may choose from, by name. directory : of the files beside the shipped ones; need not be there."""
+
+    def __init__(self, directory: Path, but: str) -> None:
+        """but : the file of one's own effects, which is there in any case."""
+        self._directory, self._but = directory, but
+
+    def names(self) -> list[str]:
+        """Shipped ones first."""
+        files = (
+            path.name for path in self._directory.glob("*effects.yaml") if path.is_file() and not path.is_symlink()
+        )
+        return [*shipped_effects(), *sorted(name for name in files if FILE_NAME.fullmatch(name) and name != self._but)]
+
+    def sources(self, names: Iterable[object]) -> list[str]:
+        """Each as `--effects` takes it. Raises StateError for a name that is none of them."""
+        known = self.names()
+        chosen = list(dict.fromkeys(names))
+        for name in chosen:
+            if name not in known:
+                raise StateError(
+                    Problem(where="library of effects", what="is not there", value=str(name), allowed=", ".join(known))
+                )
+        return [str(name) if name in shipped_effects() else str(self._directory / str(name)) for name in chosen]

@@ -1,0 +1,114 @@
+"""A diagnosis for a browser: the twelve lines, then the evidence of each effect, in the words of the report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from compd.diagnosis.findings import DiagnosisStep
+from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.summary_lines import summary_lines
+from compd.json_text import nan_to_null
+from compd.number_text import estimate_text, fall_text, number_text, percent_text
+from compd.report.diagnosis_evidence import (
+    by_noise_text,
+    candidates_table,
+    constant_table,
+    described_by,
+    explains_text,
+    findings_table,
+    formula_texts,
+    gross_rows_text,
+    next_table,
+    plan_command,
+    untested_table,
+    without_gain,
+)
+from compd.report.page_table import PageTable
+
+
+def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
+    """As plain data: `verdict`, `lines`, `effects`, tables of what else was found, and what to measure next.
+
+    A table is `head`, `rows` and `caption`; None where there is nothing to tell.
+    """
+    fall = error_fall(diagnosis)
+    told: dict[str, Any] = nan_to_null(
+        {
+            "verdict": diagnosis.verdict,
+            "lines": summary_lines(diagnosis),
+            "effects": [_effect(number, diagnosis, fall) for number in range(len(diagnosis.steps))],
+            "follows": _table(findings_table(diagnosis, fall)),
+            "formulas": _formulas(diagnosis),
+            "constant": _table(constant_table(diagnosis, fall)),
+            "gross": gross_rows_text(diagnosis, fall),
+            "tried": _table(candidates_table(diagnosis, fall)),
+            "without_gain": without_gain(diagnosis),
+            "untested": _table(untested_table(diagnosis)),
+            "next": _table(next_table(diagnosis)),
+        }
+    )
+    return told
+
+
+def _effect(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> dict[str, Any]:
+    """An effect that was named; number : from 0."""
+    step = diagnosis.steps[number]
+    before = fall.before if number == 0 else fall.steps[number - 1]
+    with_all = "with it" if len(diagnosis.steps) == 1 else "with all that is named"
+    on_all = fall_text([diagnosis.before.rms_um, diagnosis.after.rms_um], fall.unit)
+    return {
+        "effect": step.effect.id,
+        "physics": step.effect.physics,
+        "equation": step.effect.equation,
+        "numbers": _numbers(step, diagnosis.after.aligned.rows.links),
+        "facts": [
+            ["error, rows left out", fall_text([before, step.heldout_rms_um], fall.unit)],
+            ["error, all rows", f"{on_all}, {with_all}"],
+            ["explains", explains_text(step, fall)],
+            ["by noise alone", by_noise_text(step)],
+        ],
+        "rivals": [{"effect": rival.name, "alike": percent_text(rival.cosine)} for rival in step.rivals],
+        "separated_by": step.effect.separated_by,
+        "plan_command": plan_command(diagnosis, step) if step.rivals else "",
+    }
+
+
+def _numbers(step: DiagnosisStep, links: int) -> list[dict[str, Any]]:
+    """Fitted numbers with standard errors and the range that the effect calls plausible; searched constants."""
+    fitted = [
+        {
+            "name": estimate.name,
+            "text": estimate_text(estimate.value, estimate.std, estimate.unit),
+            "range": f"{column.parameter.low:g} to {column.parameter.high:g} {estimate.unit}",
+            "plausible": estimate.plausible,
+        }
+        for column, estimate in zip(step.effect.columns(links), step.parameters, strict=True)
+    ]
+    units = {constant.name: constant for constant in step.effect.constants}
+    searched = [
+        {
+            "name": name,
+            "text": f"{number_text(value, units[name].unit, 3)}, searched",
+            "range": f"{units[name].low:g} to {units[name].high:g} {units[name].unit}",
+            "plausible": True,
+        }
+        for name, value in step.fitted.constants.items()
+    ]
+    return fitted + searched
+
+
+def _formulas(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """What describes the rest best: `declaration` as `add_effect` takes it, and `text` as a file of effects has it."""
+    finding = described_by(diagnosis)
+    declarations = () if finding is None else finding.formula_effects
+    return [
+        {"id": declaration["id"], "declaration": dict(declaration), "text": text}
+        for declaration, text in zip(declarations, formula_texts(diagnosis), strict=True)
+    ]
+
+
+def _table(table: PageTable | None) -> dict[str, Any] | None:
+    if table is None or not table.rows:
+        return None
+    return {"head": list(table.head), "rows": [list(row) for row in table.rows], "caption": table.caption}

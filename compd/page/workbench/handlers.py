@@ -1,0 +1,96 @@
+"""What a browser asks of an open recording: numbers, rows to draw, effects, trials, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from compd.page.requests import keys_of, refused
+from compd.page.workbench.workbench import Workbench
+
+LOOKS_ONLY = "this browser may look only"
+# Numbers of some 100,000 rows.
+LONGEST_ROWS_BYTES = 1_000_000
+
+
+class Handler(NamedTuple):
+    """What answers at an address below that of an open recording."""
+
+    path: str
+    answer: Callable[[Request, Workbench], Awaitable[Response]]
+    method: str = "GET"
+
+
+def may_change(request: Request) -> bool:
+    """Whether the browser's token allows to write files."""
+    return bool(request.scope["token"].role == "operate")
+
+
+async def _summary(request: Request, workbench: Workbench) -> Response:
+    return JSONResponse(await workbench.ask(workbench.summary))
+
+
+async def _rows(request: Request, workbench: Workbench) -> Response:
+    """Those that pictures show; `all`: every row, to choose from."""
+    return _numbers(await workbench.ask(partial(workbench.opened.rows, every="all" in request.query_params)))
+
+
+async def _effects(request: Request, workbench: Workbench) -> Response:
+    return JSONResponse(await workbench.ask(workbench.effects))
+
+
+async def _card(request: Request, workbench: Workbench) -> Response:
+    return JSONResponse(await workbench.ask(partial(workbench.card, request.path_params["effect"])))
+
+
+async def _trial(request: Request, workbench: Workbench) -> Response:
+    def tried() -> bytes:
+        trial = workbench.trial(request.path_params["effect"], request.path_params["variant"])
+        return trial.pack(workbench.opened.pictured, {"revision": workbench.revision})
+
+    return _numbers(await workbench.ask(tried))
+
+
+async def _step(request: Request, workbench: Workbench) -> Response:
+    """`dry_run`: what it would do. Else it is done, and the summary is told."""
+    keys: Any = await keys_of(request)
+    kind, effect, revision = str(keys.get("kind")), str(keys.get("effect", "")), keys.get("revision")
+    if keys.get("dry_run"):
+        return JSONResponse(await workbench.ask(partial(workbench.propose, kind, effect)))
+    if not may_change(request):
+        return refused(LOOKS_ONLY, 403)
+    if kind == "undo":
+        return JSONResponse(await workbench.ask(partial(workbench.undo, revision)))
+    return JSONResponse(await workbench.ask(partial(workbench.make, kind, effect, revision)))
+
+
+async def _exclude(request: Request, workbench: Workbench) -> Response:
+    """`rows` with a `reason` are left out; without one they count again."""
+    keys: Any = await keys_of(request, LONGEST_ROWS_BYTES)
+    rows, reason, revision = keys.get("rows"), keys.get("reason"), keys.get("revision")
+    if not may_change(request):
+        return refused(LOOKS_ONLY, 403)
+    if not isinstance(rows, list) or not rows or not all(type(row) is int for row in rows):
+        return refused("rows is a list of numbers of rows", 400)
+    if reason is None:
+        return JSONResponse(await workbench.ask(partial(workbench.include, rows, revision)))
+    return JSONResponse(await workbench.ask(partial(workbench.exclude, rows, str(reason), revision)))
+
+
+def _numbers(data: bytes) -> Response:
+    return Response(data, media_type="application/octet-stream")
+
+
+HANDLERS = (
+    Handler("/summary", _summary),
+    Handler("/rows", _rows),
+    Handler("/effects", _effects),
+    Handler("/effects/{effect}", _card),
+    Handler("/effects/{effect}/{variant:int}", _trial),
+    Handler("/step", _step, "POST"),
+    Handler("/exclusions", _exclude, "POST"),
+)

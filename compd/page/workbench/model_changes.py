@@ -1,0 +1,76 @@
+"""Changes of the model from the page: what a step would do, as for `--dry-run`, then the step itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from compd.api.models import add_effect
+from compd.diagnosis.model_changes import refit, remove, undo
+from compd.errors import Problem, StateError
+from compd.json_text import nan_to_null
+from compd.model.effect import Effect
+from compd.model_document import read_stored, write_stored
+from compd.model_file import EffectNumber, ModelFile, read_model_file
+from compd.page.workbench.opened_recording import OpenedRecording
+
+
+def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[str, Effect]) -> OpenedRecording:
+    """The recording with the model after a step that is not written yet.
+
+    kind : "add", "remove" or "fit".  effect : the id that is added or removed.
+    Raises CompdError where the step cannot be made, StateError for another kind.
+    """
+    aligned, model = opened.aligned, opened.model
+    match kind:
+        case "add":
+            if effect not in library:  # never a path, from which code would be loaded
+                raise StateError(Problem(where="step", what="no such effect", value=effect))
+            changed = add_effect(model, library[effect], aligned)
+        case "remove":
+            changed = remove(model, effect, aligned)
+        case "fit":
+            changed = refit(model, aligned)
+        case _:
+            raise StateError(Problem(where="step", what="is not known", value=kind, allowed="add, remove, fit"))
+    return replace(opened, model=changed)
+
+
+def write(opened: OpenedRecording) -> None:
+    """Keep a proposed model. Raises StateError where the disk refuses."""
+    opened.model.write(opened.model_path)
+
+
+def undone(opened: OpenedRecording) -> OpenedRecording:
+    """Take the last step back, in the file. Raises StateError where there is none."""
+    path, model = opened.model_path, opened.model
+    if not path.exists():
+        raise StateError(Problem(where=str(path), what="has no step to undo"))
+    write_stored(path, undo(read_stored(path), str(path)))
+    return replace(opened, model=read_model_file(path, model.machine, model.links))
+
+
+def step_told(before: OpenedRecording, after: OpenedRecording) -> dict[str, Any]:
+    """The errors before and after a step, and every number's old and new value, as plain data."""
+    old = {(number.effect, number.parameter): number.value for number in before.model.numbers()}
+    told: dict[str, Any] = nan_to_null(
+        {
+            "rms": [before.comparison.rms_um, after.comparison.rms_um],
+            "floor_ratio": [before.comparison.floor_ratio, after.comparison.floor_ratio],
+            "unit": after.aligned.unit,
+            "verdict": after.comparison.verdict,
+            "numbers": [_number(number, old) for number in after.model.numbers()],
+            "gone": [f"{effect}.{name}" for effect, name in old if effect not in _ids(after.model)],
+        }
+    )
+    return told
+
+
+def _ids(model: ModelFile) -> set[str]:
+    return {fitted.effect.id for fitted in model.fitted}
+
+
+def _number(number: EffectNumber, old: Mapping[tuple[str, str], float]) -> dict[str, Any]:
+    was = old.get((number.effect, number.parameter))
+    return {**vars(number), "plausible": number.plausible, "was": was}

@@ -1,0 +1,131 @@
+"""A recording that is open in the page, with its machine's model: what a browser shows of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
+from compd.comparison.open import open_recording
+from compd.configuration.shipped import Machine
+from compd.json_text import nan_to_null
+from compd.model_file import ModelFile, read_model_file
+from compd.page.packed import packed
+
+# Pictures have about so many rows at most; numbers are always of all rows.
+MOST_PICTURED = 5000
+# What became of a row, in the order of their numbers.
+ROW_STATES = ("used", "outlier", "left out")
+_SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class OpenedRecording:
+    """One recording against one model; a change of either makes another.
+
+    path, model_path : of the recording and of the model file, which need not be there yet.
+    """
+
+    path: Path
+    model_path: Path
+    aligned: AlignedRecording
+    model: ModelFile
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """Of the recording with the model as it is."""
+        return compare(self.aligned, self.model.fitted, self.model.covariance)
+
+    @cached_property
+    def pictured(self) -> IntArray:
+        """(R,) rows that pictures show, rising: all, or evenly drawn among them."""
+        count = len(self.aligned.rows)
+        if count <= MOST_PICTURED:
+            return np.arange(count)
+        stretches = np.array_split(np.arange(count), MOST_PICTURED)
+        rng = np.random.default_rng(_SEED)
+        return np.array([rng.choice(stretch) for stretch in stretches])
+
+    @property
+    def places_mm(self) -> FloatArray:
+        """(N, 3) where the tip is without effects, mm."""
+        return self.aligned.nominal_tip_mm
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers of the comparison, the model's numbers and its ledger, as plain data."""
+        comparison = self.comparison
+        told = {
+            "recording": self.path.stem,
+            "machine": self.aligned.recording.machine,
+            "labels": self.aligned.labels,
+            "unit": self.aligned.unit,
+            "rows": len(self.aligned.rows),
+            "rms": comparison.rms_um,
+            "floor": comparison.floor.um,
+            "floor_known": comparison.floor.known,
+            "floor_how": comparison.floor.how,
+            "floor_ratio": comparison.floor_ratio,
+            "at_floor": comparison.at_floor,
+            "verdict": comparison.verdict,
+            "trends": [trend.text for trend in comparison.trends],
+            "used": int(comparison.used.sum()),
+            "left_out": dict(comparison.left_out),
+            "excluded": {str(row): reason for row, reason in self.aligned.recording.sidecar.excluded.items()},
+            "numbers": [vars(number) | {"plausible": number.plausible} for number in self.model.numbers()],
+            "ledger": [
+                {
+                    "kind": step.kind,
+                    "effect": step.effect,
+                    "date": step.date,
+                    "recording": step.recording,
+                    "before": step.rms_before_um,
+                    "after": step.rms_after_um,
+                    "floor": step.noise_floor_um,
+                    "unit": step.unit,
+                    "undone": step.undone,
+                }
+                for step in self.model.steps
+            ],
+        }
+        plain: dict[str, Any] = nan_to_null(told)
+        return plain
+
+    def rows(self, *, every: bool = False) -> bytes:
+        """What pictures show of each row: its number, time, place, residual, state, session and quantities.
+
+        every : of all rows, and not only of those that are pictured.
+        """
+        aligned, comparison = self.aligned, self.comparison
+        chosen = np.arange(len(aligned.rows)) if every else self.pictured
+        recording = aligned.recording
+        state = np.where(comparison.used, 0.0, np.where(comparison.outlier, 1.0, 2.0))
+        session = np.zeros(len(state)) if recording.session is None else recording.session
+        arrays = {
+            "row": recording.row.astype(np.float64),
+            "time_s": recording.time_s,
+            "place_mm": self.places_mm,
+            "residual": comparison.residual_um,
+            "state": state,
+            "session": session.astype(np.float64),
+            **{f"quantity {name}": values for name, values in aligned.rows.quantities.items()},
+        }
+        header = {"labels": aligned.labels, "unit": aligned.unit, "states": ROW_STATES, "rows": len(state)}
+        return packed(header, {name: values[chosen] for name, values in arrays.items()})
+
+
+def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) -> OpenedRecording:
+    """Open a recording and the model of its machine, which is begun where the file is not there.
+
+    Raises CompdError with every problem of either.
+    """
+    aligned = open_recording(path, machine)
+    name, links = aligned.recording.machine, aligned.rows.links
+    model = read_model_file(model_path, name, links) if model_path.exists() else ModelFile(name, links)
+    return OpenedRecording(path, model_path, aligned, model)

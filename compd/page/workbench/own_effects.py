@@ -1,0 +1,147 @@
+"""Effects of one's own beside the page's model files: one file that people write, and the page."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+
+from compd.configuration.yaml_reader import read_text
+from compd.errors import CompdError, Problem, StateError
+from compd.files import write_files
+from compd.model.effect import Effect
+from compd.model.formula.declaration import formula_effect
+from compd.model.library import load_library
+from compd.model.library.effects_file import gather_effects
+from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
+
+NAME = "own.effects.yaml"
+# An effect that is searched in more combinations of its constants, or has more numbers, takes a page's time.
+MOST_COMBINATIONS = 100
+MOST_NUMBERS = 36
+
+# Several workbenches may have the same file.
+_WRITING = threading.Lock()
+
+
+class OwnEffects:
+    """Those in one file, which need not be there.
+
+    Attributes
+    ----------
+    effects : by id; none where the file has a mistake.
+    declarations : by id, as the file has them.
+    problems : what is wrong with the file.
+    version : counts how often the file was read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.effects: Mapping[str, Effect] = {}
+        self.declarations: Mapping[str, Declaration] = {}
+        self.problems: tuple[Problem, ...] = ()
+        self.version = 0
+        self._stamp: tuple[int, int] | None = None
+        self.reload()
+
+    def reload(self) -> None:
+        """Read the file anew if it has changed."""
+        stamp = self._stamp_of_file()
+        if self.version and stamp == self._stamp:
+            return
+        self.version += 1
+        self._stamp = stamp
+        self.effects, self.declarations, self.problems = {}, {}, ()
+        try:
+            declared = entries_of(self._text(), self.path)
+            effects = gather_effects(self.path) if declared else {}
+            self.declarations = {str(declaration["id"]): declaration for declaration in declared}
+        except CompdError as error:
+            self.problems = error.problems
+            return
+        self.problems = tuple(problem for effect in effects.values() for problem in too_large(effect, str(self.path)))
+        self.effects = {name: effect for name, effect in effects.items() if not too_large(effect, "")}
+
+    def save(self, declaration: Declaration, replace: bool) -> None:
+        """Write an effect into the file; everything else in it stays as it is.
+
+        replace : whether one that has its id may be replaced.
+        Raises CompdError with every problem of the declaration; StateError where the id is in the file already, where
+        the file has a mistake, or where the disk refuses.
+        """
+        effect = formula_effect(declaration, "effect")
+        if problems := library_id_problems(effect.id, "effect, id"):
+            raise StateError(problems)
+        with _WRITING:
+            self._refuse_faulty()
+            if effect.id in self.declarations and not replace:
+                what, step = "has an effect of this id", "replace it, or give this one another id"
+                raise StateError(Problem(where=str(self.path), what=what, value=effect.id, next_step=step))
+            self._write(with_entry(self._text(), declaration, self.path))
+
+    def delete(self, effect: str) -> None:
+        """Take an effect out of the file; the file as well where nothing is left in it. Raises StateError as `save`."""
+        with _WRITING:
+            self._refuse_faulty()
+            self._write(without_entry(self._text(), effect, self.path))
+
+    def _refuse_faulty(self) -> None:
+        """Raise StateError where somebody wrote a mistake into the file, which this page must not write over."""
+        self.reload()
+        if self.problems and not self.declarations:
+            raise StateError(self.problems)
+
+    def _write(self, text: str) -> None:
+        try:
+            if text.strip():
+                write_files({self.path: text})
+            else:
+                self.path.unlink()
+        except OSError as error:
+            raise StateError(Problem(where=str(self.path), what=f"cannot be written: {error.strerror}")) from error
+        self.reload()
+
+    def _text(self) -> str:
+        return read_text(self.path, "a file of effects") if self.path.exists() else ""
+
+    def _stamp_of_file(self) -> tuple[int, int] | None:
+        try:
+            stat = self.path.stat()
+        except OSError:
+            return None
+        return stat.st_mtime_ns, stat.st_size
+
+
+def library_id_problems(name: object, where: str) -> list[Problem]:
+    """One where the id is that of an effect that comes with compd."""
+    if not isinstance(name, str) or name not in load_library():
+        return []
+    what, step = "this id is taken, by the library of compd", "give it another one"
+    return [Problem(where=where, what=what, value=name, next_step=step)]
+
+
+def too_large(effect: Effect, where: str) -> list[Problem]:
+    """Why a page does not try an effect: it would take a person's patience."""
+    problems = []
+    combinations = math.prod(len(constant.grid) for constant in effect.constants)
+    if combinations > MOST_COMBINATIONS:
+        problems.append(
+            Problem(
+                where=where,
+                what=f"{', '.join(constant.name for constant in effect.constants)} are searched together",
+                value=f"{combinations} combinations",
+                allowed=f"{MOST_COMBINATIONS} in the page",
+                next_step="let the formula be proportional to some of them, or write numbers for them",
+            )
+        )
+    if len(effect.parameters) > MOST_NUMBERS:
+        problems.append(
+            Problem(
+                where=where,
+                what="has more parameters than a person can judge",
+                value=str(len(effect.parameters)),
+                allowed=f"{MOST_NUMBERS} in the page",
+            )
+        )
+    return problems

@@ -1,0 +1,284 @@
+"""One recording and one model file in the page, for every browser that has them open: one change at a time."""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+import threading
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from compd.configuration.shipped import Machine
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.errors import CompdError, Problem, RecordingError, StateError
+from compd.files import write_files
+from compd.live.loop.model_loader import ModelText
+from compd.model.effect_needs import can_concern
+from compd.model.library import load_library
+from compd.model.library.effects_file import gather_effects, load_effects
+from compd.page.workbench.candidates import Candidates
+from compd.page.workbench.diagnoses import Diagnoses
+from compd.page.workbench.diagnosis_job import DiagnosisJob
+from compd.page.workbench.drafts import Drafts
+from compd.page.workbench.model_changes import proposed, step_told, undone, write
+from compd.page.workbench.opened_recording import OpenedRecording, open_for_page
+from compd.page.workbench.own_effects import NAME, OwnEffects
+from compd.page.workbench.trial import Trial
+from compd.recording.exclusions import exclude_rows, include_rows
+
+Result = TypeVar("Result")
+
+
+class Workbench:
+    """What is open, and how often it has changed: a browser that shows an older state is told so.
+
+    Attributes
+    ----------
+    revision : counts changes of the model and of the rows that count.
+    diagnosis : the newest, which may run; None before the first.
+    libraries : files of effects that are tried beside compd's, as `--effects` takes them.
+    own : effects of one's own, in a file beside the model file; they are tried as those of the library are.
+    given : the effects of `libraries` and `own`.
+    drafts : effects that are being written.
+    plans : the newest of the next measurement, by key.
+    """
+
+    def __init__(
+        self, path: Path, model_path: Path, machine: Machine | None, diagnoses: Diagnoses | None = None
+    ) -> None:
+        """diagnoses : those that run in the same server."""
+        self._path, self._model_path, self._machine = path, model_path, machine
+        self.revision = 0
+        self._lock = threading.Lock()  # numpy works in threads of its own
+        self._diagnoses = diagnoses or Diagnoses()
+        self._begin_lock = threading.Lock()
+        self.diagnosis: DiagnosisJob | None = None
+        self.libraries: list[str] = []
+        self.own = OwnEffects(model_path.parent / NAME)
+        self.plans: dict[str, MeasurementPlan] = {}
+        self._open()
+
+    def _open(self) -> None:
+        self._read = self._stamps()
+        self._set(open_for_page(self._path, self._model_path, self._machine))
+
+    def _set(self, opened: OpenedRecording) -> None:
+        self.opened = opened
+        self._gather()
+        self._proposal: tuple[str, str, OpenedRecording] | None = None
+        self.revision += 1
+
+    def refresh(self) -> None:
+        """Open it again where a command has changed one of its files meanwhile. Raises CompdError."""
+        if self._stamps() != self._read:
+            self._open()
+
+    def _stamps(self) -> list[tuple[int, int] | None]:
+        """When each file was last written, and its length; None where it is not there."""
+        paths = (self._path, self._path.with_suffix(".yaml"), self._model_path)
+        stats = [path.stat() if path.exists() else None for path in paths]
+        return [stat and (stat.st_mtime_ns, stat.st_size) for stat in stats]
+
+    def _gather(self) -> None:
+        """The effects that may be tried, anew. Raises CompdError with every problem of the libraries."""
+        own = [str(self.own.path)] if self.own.effects else []
+        given = {source: dict(load_effects(source)) for source in self.libraries} | {
+            source: dict(self.own.effects) for source in own
+        }
+        self._source_by_effect = {effect: source for source, effects in given.items() for effect in effects}
+        rows = self.opened.aligned.rows
+        library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
+        self.given = list(
+            gather_effects([effect for effects in given.values() for effect in effects.values()]).values()
+        )
+        self.candidates = Candidates(self.opened.comparison, [*library, *self.given])
+        self.drafts = Drafts(self.opened.comparison, self.candidates)
+        self._gathered = self.own.version
+
+    def use_libraries(self, sources: Sequence[str]) -> None:
+        """Try the effects of these files, too, as `--effects` takes them. Raises CompdError where one is faulty."""
+        if list(sources) == self.libraries:
+            return
+        before, self.libraries = self.libraries, list(sources)
+        try:
+            self._gather()
+        except CompdError:
+            self.libraries = before
+            self._gather()
+            raise
+        self._proposal = None
+        self.revision += 1
+
+    @property
+    def _effect_sources(self) -> list[str]:
+        return [*self.libraries, *([str(self.own.path)] if self.own.effects else [])]
+
+    async def ask(self, question: Callable[[], Result]) -> Result:
+        """The answer to a question that takes long, while the server goes on; one after another."""
+
+        def answered() -> Result:
+            with self._lock:
+                return question()
+
+        return await asyncio.to_thread(answered)
+
+    def summary(self) -> dict[str, Any]:
+        """See `OpenedRecording.summary`; with the revision, and the hash of the model file as a daemon tells it."""
+        self.own.reload()
+        if self._gathered != self.own.version:
+            self._gather()
+        return {
+            **self.opened.summary(),
+            "revision": self.revision,
+            "libraries": [source.rpartition("/")[2] for source in self.libraries],
+            "model": str(self._model_path),
+            "model_hash": ModelText.read(self._model_path).hash if self._model_path.exists() else "",
+            "commands": {name: shlex.join(words) for name, words in self._commands().items()},
+        }
+
+    def _commands(self) -> dict[str, list[str]]:
+        """What the page does as command lines; EFFECT stands for an effect's id."""
+        machine = [] if self._machine is None else ["--machine", str(self._machine)]
+        known = ["--model", str(self._model_path)] if self._model_path.exists() else []
+        effects = [word for source in self._effect_sources for word in ("--effects", source)]
+        on = ["--recording", str(self._path), "--model", str(self._model_path), *machine]
+        return {
+            "compare": ["compd", "compare", str(self._path), *known, *machine],
+            "diagnose": ["compd", "diagnose", str(self._path), *known, *effects, *machine],
+            "show": ["compd", "effect", "show", "EFFECT"],
+            "add": ["compd", "effect", "add", "EFFECT", *on],
+            "remove": ["compd", "effect", "remove", "EFFECT", *on],
+            "undo": ["compd", "effect", "undo", "--model", str(self._model_path)],
+            "fit": ["compd", "effect", "fit", *on],
+            "ledger": ["compd", "ledger", str(self._model_path)],
+            "exclude": ["compd", "recording", "exclude", str(self._path), "--rows", "ROWS", "--reason", "REASON"],
+            "include": ["compd", "recording", "include", str(self._path), "--rows", "ROWS"],
+        }
+
+    def plan_command(self, effects: Collection[str]) -> list[str]:
+        """`compd plan` without its options for these effects."""
+        words = ["compd", "plan", str(self._path)]
+        words += ["--machine", str(self._machine)] if self._machine is not None else []
+        words += ["--model", str(self._model_path)] if self._model_path.exists() else []
+        wanted = {self._source_by_effect[effect] for effect in effects if effect in self._source_by_effect}
+        return words + [word for source in self._effect_sources if source in wanted for word in ("--effects", source)]
+
+    def diagnose(self) -> None:
+        """Begin a diagnosis, unless one runs. Raises StateError where too many run in the server."""
+        with self._begin_lock:
+            last = self.diagnosis
+            if last is not None and last.state == "running":
+                return
+            if last is not None:
+                last.cancel()  # its pictures may still be drawn
+                last.join()
+            model = self._model_path if self._model_path.exists() else None
+            self.diagnosis = self._diagnoses.begin(
+                self._path, model, self._machine, self.revision, self._effect_sources
+            )
+
+    def diagnosis_summary(self, shown: str = "") -> dict[str, Any]:
+        """The newest: how many changes it is `behind`, and what it has found; `state` is "none" before the first.
+
+        shown : id of that whose outcome the browser has already, which is left out.
+        """
+        job = self.diagnosis
+        if job is None:
+            return {"state": "none"}
+        summary = {**job.summary(), "behind": self.revision - job.revision}
+        return summary if shown == job.id else summary | job.outcome()
+
+    def effects(self) -> dict[str, Any]:
+        """See `Candidates.summary`; `own` says which effects are not of the library."""
+        summary = self.candidates.summary()
+        return {
+            **summary,
+            "effects": [{**told, "own": told["effect"] in self.own.effects} for told in summary["effects"]],
+        }
+
+    def card(self, name: str) -> dict[str, Any]:
+        """See `Candidates.card`; `named` is how a command line names the effect. name : an id, or that of a draft.
+
+        Raises KeyError where there is no such effect.
+        """
+        candidates, effect = self.drafts.find(name)
+        own = name != effect or effect in self.own.effects
+        source = str(self.own.path) if own else self._source_by_effect.get(effect)
+        named = effect if source is None else shlex.quote(f"{source}:{effect}")
+        return {**candidates.card(effect), "asked": name, "named": named, "own": own}
+
+    def trial(self, name: str, variant: int) -> Trial:
+        """See `Candidates.trial`. name : as of `card`."""
+        candidates, effect = self.drafts.find(name)
+        return candidates.trial(effect, variant)
+
+    def propose(self, kind: str, effect: str) -> dict[str, Any]:
+        """What a step would do; nothing is written. Raises CompdError where it cannot be made."""
+        after = proposed(self.opened, kind, effect, {**self.candidates.library, **self.drafts.effects})
+        self._proposal = (kind, effect, after)
+        return step_told(self.opened, after)
+
+    def make(self, kind: str, effect: str, revision: int) -> dict[str, Any]:
+        """Make the step that was proposed, and write the model file; its summary.
+
+        revision : that of which the browser knows. Raises StateError where somebody else was quicker.
+        """
+        self._check(revision)
+        if self._proposal is None or self._proposal[:2] != (kind, effect):
+            self.propose(kind, effect)
+        assert self._proposal is not None
+        after = self._proposal[2]
+        write(after)
+        self._read = self._stamps()
+        self._set(after)
+        return self.summary()
+
+    def undo(self, revision: int) -> dict[str, Any]:
+        """Take the last step back; the summary. Raises StateError as `make`, and where there is no step."""
+        self._check(revision)
+        after = undone(self.opened)
+        self._read = self._stamps()
+        self._set(after)
+        return self.summary()
+
+    def exclude(self, rows: Sequence[int], reason: str, revision: int) -> dict[str, Any]:
+        """Leave rows out, with the reason in the sidecar; the summary.
+
+        Raises CompdError where they cannot be left out, StateError where somebody else was quicker.
+        """
+        self._check(revision)
+        known = set(self.opened.aligned.recording.row.tolist())
+        if strangers := [row for row in rows if row not in known]:
+            raise RecordingError(
+                Problem(where=f"row {strangers[0]}", what="is not in the recording", allowed="rows of the recording")
+            )
+        return self._with_other_rows(lambda: exclude_rows(self._path, rows, reason))
+
+    def include(self, rows: Sequence[int], revision: int) -> dict[str, Any]:
+        """Let rows count again; the summary. Raises as `exclude`."""
+        self._check(revision)
+        return self._with_other_rows(lambda: include_rows(self._path, rows))
+
+    def _with_other_rows(self, change: Callable[[], None]) -> dict[str, Any]:
+        """The summary after a change of the sidecar, which is taken back where nothing could be compared then."""
+        sidecar = self._path.with_suffix(".yaml")
+        before = sidecar.read_bytes()
+        change()
+        try:
+            self._open()
+            return self.summary()
+        except CompdError:
+            write_files({sidecar: before})
+            self._open()
+            raise
+
+    def _check(self, revision: int) -> None:
+        if revision != self.revision:
+            raise StateError(
+                Problem(
+                    where="workbench",
+                    what="somebody else has changed the model or the rows meanwhile",
+                    next_step="look at what is there now, then do it again",
+                )
+            )

@@ -1,0 +1,114 @@
+"""A diagnosis beside the page: steps, result, page, end; and only so many at once."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from compd.diagnosis.stages import STAGES
+from compd.errors import StateError
+from compd.page.workbench.diagnoses import MOST_RUNNING, Diagnoses
+from compd.page.workbench.diagnosis_job import DiagnosisJob
+from tests.support.measured import gauges, hidden, record
+from tests.support.other_process import is_alive
+
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recording"), gauges(200, 1), [hidden("link_expansion", 5.0)])
+
+
+def test_its_steps_its_result_and_its_page(path):
+    job = DiagnosisJob(path, None, None)
+    job.join(PATIENCE_S)
+    told, outcome = job.summary(), job.outcome()
+    assert told["state"] == "done", outcome["text"]
+    assert [stage["text"] for stage in told["stages"]] == list(STAGES)
+    assert told["steps"][0]["text"] == STAGES[0]
+    assert {step["text"] for step in told["steps"]} <= set(STAGES)
+    assert [step["at_s"] for step in told["steps"]] == sorted(step["at_s"] for step in told["steps"])
+    assert outcome["result"]["verdict"] == outcome["evidence"]["verdict"] == "identified"
+    assert "link_expansion" in outcome["text"]
+    assert told["page"] is True
+    page = job.page.decode()
+    assert page.startswith("<!doctype html>")
+    assert "link_expansion" in page
+    assert job.has_ended
+
+
+def test_effects_of_ones_own_are_tried_too(path, tmp_path):
+    own = tmp_path / "own.effects.yaml"
+    own.write_text(
+        "{id: swelling, port: link, formula: k * humidity_pct,"
+        " parameters: {k: {unit: um, plausible: [0, 1], source: s}}}"
+    )
+    job = DiagnosisJob(path, None, None, effects=(str(own),))
+    job.join(PATIENCE_S)
+    assert "swelling" in [candidate["effect"] for candidate in job.outcome()["result"]["candidates"]]
+
+
+def test_a_person_ends_it(path):
+    job = DiagnosisJob(path, None, None)
+    assert job.summary()["page"] is None
+    job.cancel()
+    job.join(PATIENCE_S)
+    assert job.summary()["state"] == "cancelled"
+    assert job.summary()["page"] is False
+    assert job.outcome()["text"] == ""
+
+
+def test_what_cannot_be_opened_is_told(tmp_path):
+    job = DiagnosisJob(tmp_path / "none.csv", None, None)
+    job.join(PATIENCE_S)
+    assert job.summary()["state"] == "failed"
+    assert "none.csv" in job.outcome()["text"]
+
+
+def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path):
+    diagnoses = Diagnoses()
+    jobs = [diagnoses.begin(path, None, None, 0) for _ in range(MOST_RUNNING)]
+    try:
+        with pytest.raises(StateError, match=f"{MOST_RUNNING} run already.*") as refusal:
+            diagnoses.begin(path, None, None, 0)
+        assert path.stem in str(refusal.value)
+        jobs[0].cancel()
+        jobs[0].join(PATIENCE_S)
+        jobs.append(diagnoses.begin(path, None, None, 0))
+        assert jobs[-1].state == "running"
+    finally:
+        for job in jobs:
+            job.cancel()
+            job.join(PATIENCE_S)
+
+
+PARENT = """
+import multiprocessing, time
+from compd.page.workbench.diagnosis_job import _end_with_the_parent
+child = multiprocessing.get_context("spawn").Process(target=_end_with_the_parent, daemon=True)
+child.start()
+print(child.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def test_its_process_ends_when_the_server_is_killed():
+    """Whatever it does just then: a stage may take minutes, in which it tells nobody anything."""
+    with subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True) as parent:
+        child = int(parent.stdout.readline())
+        try:
+            parent.kill()
+            parent.wait()
+            deadline_s = time.monotonic() + PATIENCE_S / 2
+            while is_alive(child) and time.monotonic() < deadline_s:
+                time.sleep(0.02)
+            assert not is_alive(child)
+        finally:
+            if is_alive(child):
+                os.kill(child, signal.SIGKILL)

@@ -1,0 +1,90 @@
+"""A recording in the page: numbers as of `compd compare`, trials that are exact, steps as of `compd effect`."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from compd.api.diagnosis import compare
+from compd.api.models import add_effect
+from compd.comparison.open import open_recording
+from compd.errors import StateError
+from compd.model_document import read_stored
+from compd.page.workbench.workbench import Workbench
+from tests.support.measured import gauges, hidden, record
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recording"), gauges(300, 1), [hidden("link_expansion", 2.0)])
+
+
+@pytest.fixture
+def workbench(path, tmp_path):
+    return Workbench(path, tmp_path / "tripod.model.yaml", None)
+
+
+def unpacked(data):
+    line, _, rest = data.partition(b"\n")
+    header, arrays, begin = json.loads(line), {}, 0
+    for array in header["arrays"]:
+        size = 4 * int(np.prod(array["shape"]))
+        arrays[array["name"]] = np.frombuffer(rest[begin : begin + size], "<f4").reshape(array["shape"])
+        begin += size
+    assert begin == len(rest)
+    return header, arrays
+
+
+def test_numbers_are_those_of_compare(workbench, path):
+    told, comparison = workbench.summary(), compare(open_recording(path))
+    assert (told["rms"], told["floor"]) == (comparison.rms_um, comparison.floor.um)
+    assert (told["rows"], told["used"]) == (300, int(comparison.used.sum()))
+    _, rows = unpacked(workbench.opened.rows())
+    assert np.allclose(rows["residual"], comparison.residual_um, atol=1e-4, equal_nan=True)
+    assert rows["place_mm"].shape == (300, 3)
+    assert "quantity temperature_room_degC" in rows
+
+
+def test_the_effect_that_is_there_is_first(workbench):
+    ranked = workbench.candidates.ranked()
+    assert ranked[0]["effect"] == "link_expansion"
+    assert ranked[0]["explained"] > 0.9
+    assert {"effect", "status", "why", "left_out_rms", "explained", "physics"} == set(ranked[0])
+
+
+def test_the_error_of_a_trial_is_that_of_its_residual(workbench):
+    trial = workbench.candidates.trial("link_expansion", 0)
+    comparison = workbench.opened.comparison
+    for theta in ([0.0], [1.3], [2.0]):
+        left = comparison.residual_um - trial.columns_um @ np.array(theta)
+        assert np.isclose(trial.rms_um(np.array(theta)), np.sqrt(np.mean(left[comparison.used] ** 2)), rtol=1e-9)
+    card = workbench.candidates.card("link_expansion")
+    best = np.array(card["variants"][0]["theta"])
+    assert abs(best[0] - 2.0) < 5 * card["variants"][0]["standard_error"][0]
+    assert trial.rms_um(best) < 1.2 * comparison.floor.um
+    _, arrays = unpacked(trial.pack(workbench.opened.pictured, {}))
+    assert np.allclose(arrays["columns"], trial.columns_um, rtol=1e-5, atol=1e-5)
+
+
+def test_a_step_is_told_first_then_made_as_the_command_makes_it(workbench, path, tmp_path):
+    model = tmp_path / "tripod.model.yaml"
+    told = workbench.propose("add", "link_expansion")
+    assert told["rms"][1] < 0.5 * told["rms"][0]
+    assert not model.exists()
+    made = workbench.make("add", "link_expansion", workbench.revision)
+    by_command = add_effect(None, "link_expansion", path)
+    assert [number["value"] for number in made["numbers"]] == [number.value for number in by_command.numbers()]
+    assert read_stored(model).steps[0].rms_after_um == by_command.steps[0].rms_after_um
+    assert made["rms"] == told["rms"][1]
+    undone = workbench.undo(workbench.revision)
+    assert undone["numbers"] == []
+    assert [step["kind"] for step in undone["ledger"]] == ["add", "undo"]
+
+
+def test_of_two_browsers_the_second_is_told_that_it_shows_what_was(workbench):
+    revision = workbench.revision
+    workbench.make("add", "link_expansion", revision)
+    with pytest.raises(StateError, match="somebody else"):
+        workbench.make("add", "scale_gain", revision)
