@@ -38,6 +38,12 @@ $(STAMP): pyproject.toml
 demo: $(STAMP)
 	@$(BIN)/compd demo
 
+# A hidden effect, to be found in the browser: out/workbench has the recording, and its answer under seal.
+workbench: $(STAMP)
+	@mkdir -p out/workbench
+	@$(BIN)/compd campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
+	@$(BIN)/compd page --recordings out/workbench --models out/workbench
+
 live: $(STAMP)
 	@$(BIN)/compd demo --live
 

@@ -25,6 +25,7 @@ from compd.page.recordings import Recordings
 from compd.page.server import STATIC
 from tests.benchmarks.figures import quiet, show
 from tests.support.event_stream import EventStream
+from tests.support.hand_clock import HandClock
 from tests.support.live_page import CHROMIUM, browser, opened, page_process, running_machine, served, until
 from tests.support.scripted_page import LOOKS, ScriptedLink
 
@@ -151,10 +152,10 @@ def paints() -> None:
 
 async def hour() -> list[list[str]]:
     """Memory of this process while an hour of events is made for ten clients, one of which reads nothing."""
-    clock_s = [0.0]
+    clock = HandClock()
     link = ScriptedLink("/no/socket")
     link.tell(State.OK, "")
-    browsers = Browsers(_Clock(clock_s))
+    browsers = Browsers(clock)
     broadcast = Broadcast(link, browsers, Recordings(Path("/nowhere"), "/no/socket"))
     token = Token("a person", LOOKS, "")
     streams = [broadcast.events(browsers.connect(token.name, "127.0.0.1", token.role)) for _ in range(10)]
@@ -164,9 +165,9 @@ async def hour() -> list[list[str]]:
     await asyncio.sleep(0)
     rows, base = [], 0.0
     for count in range(1, EVENTS + 1):
-        clock_s[0] = count / LIVE_HZ
-        link.tell(State.OK, "", clock_s[0])
-        await broadcast.make(clock_s[0], count % LIVE_HZ == 0)
+        clock.now_s = count / LIVE_HZ
+        link.tell(State.OK, "", clock.now_s)
+        await broadcast.make(clock.now_s, count % LIVE_HZ == 0)
         for _ in range(_TURNS):
             await asyncio.sleep(0)
         if count in LOOKED_AT:
@@ -183,17 +184,6 @@ async def hour() -> list[list[str]]:
 async def _read(stream: Any, taken: list[int], k: int) -> None:
     async for event in stream:
         taken[k] += event.startswith(b"event: live")
-
-
-class _Clock:
-    def __init__(self, now_s: list[float]) -> None:
-        self._now_s = now_s
-
-    def monotonic(self) -> float:
-        return self._now_s[0]
-
-    def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        raise NotImplementedError
 
 
 def main() -> None:

@@ -99,7 +99,6 @@ def test_links_and_targets_exist() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.sample
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.title)
 def test_a_walk_does_what_it_shows_and_touches_what_it_says(walk: Walk, copy: Copy) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from tests.support.live_page import opened, until
+from tests.support.live_page import opened, page_process, until
+from tests.support.measured import gauges, hidden, record
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
@@ -22,3 +25,30 @@ def test_no_rule_is_broken(chromium, live, scheme, width):
         tab.wait_for_selector(".consequence")
         found = Axe().run(tab)
         assert found.violations_count == 0, found.generate_report()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 890])
+def test_no_rule_is_broken_in_the_workbench(chromium, tmp_path, scheme, width):
+    from axe_playwright_python.sync_playwright import Axe
+
+    (tmp_path / "recordings").mkdir()
+    record(tmp_path / "recordings", gauges(200, 1), [hidden("link_expansion", 4.0)], name="monday-1")
+    with page_process(Path("/no/socket"), tmp_path / "recordings", "--models", str(tmp_path)) as (address, _):
+        tab = chromium.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}).new_page()
+        tab.goto(address)
+        for view, shown in (
+            ("join", "document.querySelector('h1')"),
+            ("workbench?recording=monday-1", "document.querySelectorAll('.effect').length > 5"),
+        ):
+            tab.goto(address.partition("?")[0] + view)
+            until(tab, shown)
+            if view != "join":
+                tab.locator(".effect").first.click()
+                until(tab, "bench.trial")
+                tab.locator("#picture").focus()
+                tab.keyboard.press("ArrowRight")
+                tab.locator("#add").click()
+                tab.wait_for_selector("#confirm")
+            found = Axe().run(tab)
+            assert found.violations_count == 0, found.generate_report()

@@ -169,6 +169,7 @@ def test_a_zero_that_is_elsewhere_is_taken_when_a_person_says_that_it_is_meant(t
         assert "0.5 mm" in answer
         assert "scale_1" in answer
         assert daemon.status()["zero"]["taken_at"] == before
+        assert f"compd zero {live.socket} --yes" in tab.locator(".consequence code").inner_text()
         tab.locator(".consequence button", has_text="It is the zero position").click()
         answer = said(tab)
         if not LATE.search(answer):

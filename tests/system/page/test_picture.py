@@ -8,15 +8,19 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from pathlib import Path
 
 import pytest
 
 from compd.page.server import STATIC
-from tests.support.live_page import opened, served, until
-from tests.support.paths import ROOT
+from tests.support.command import run_in_process
+from tests.support.live_page import opened, page_process, served, until
+from tests.support.paths import CONFIG, ROOT
+from tests.support.simulated import run_directory
 
 PICTURE = ROOT / "docs" / "pictures" / "live-page.png"
 ORDERS = PICTURE.with_name("live-page-orders.png")
+WORKBENCH = PICTURE.with_name("workbench.png")
 # What the picture was made of, beside it.
 MADE_OF = PICTURE.with_suffix(".made-of.txt")
 # The machine warms up for so long before the picture, s; its weather is 60 times faster than real.
@@ -33,6 +37,30 @@ def page_files() -> str:
     return digest.hexdigest()
 
 
+def photograph_workbench(chromium):
+    """The workbench as in the tutorial, an effect tried but not kept."""
+    with run_directory() as directory:
+        recordings = directory / "recordings"
+        recordings.mkdir()
+        config = str(CONFIG / "tripod-cmm.yaml")
+        run_in_process("campaign", config, "--hidden", "8", "--out", str(recordings / "monday.csv"))
+        photograph(chromium, directory, recordings)
+
+
+def photograph(chromium, directory, recordings):
+    with page_process(Path("/no/socket"), recordings, "--models", str(directory)) as (address, _):
+        tab = chromium.new_context(viewport={"width": 1440, "height": 960}).new_page()
+        tab.goto(address)
+        tab.goto(address.partition("?")[0] + "workbench?recording=monday")
+        until(tab, "document.querySelectorAll('.effect').length > 5")
+        tab.locator(".effect").first.click()
+        until(tab, "bench.trial")
+        slider = tab.locator("#card input[type=range]").first
+        tab.locator("#fit").click()
+        slider.evaluate("(input) => { input.value *= 0.6; input.dispatchEvent(new Event('input')); }")
+        tab.screenshot(path=str(WORKBENCH))
+
+
 def test_the_picture_is_of_the_page_as_it_is(chromium):
     if os.environ.get("COMPD_PICTURE"):
         with (
@@ -46,15 +74,25 @@ def test_the_picture_is_of_the_page_as_it_is(chromium):
             tab.locator("#order-zero").click()
             tab.wait_for_selector("#confirm")
             tab.screenshot(path=str(ORDERS))
+        photograph_workbench(chromium)
         MADE_OF.write_text(page_files() + "\n", encoding="utf-8")
     assert MADE_OF.read_text(encoding="utf-8").strip() == page_files(), (
         "the page has changed: COMPD_PICTURE=1 pytest tests/system/page/test_picture.py"
     )
-    for picture in (PICTURE, ORDERS):
+    for picture in (PICTURE, ORDERS, WORKBENCH):
         width, height = (int.from_bytes(picture.read_bytes()[place : place + 4], "big") for place in (16, 20))
         assert (width, height) == (1440, 960)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/how-to/look-at-the-machine-live.md"])
-def test_the_picture_is_shown(page):
-    assert re.search(r"!\[[^\]]+\]\([^)]*live-page\.png\)", (ROOT / page).read_text(encoding="utf-8"))
+@pytest.mark.parametrize(
+    ("page", "picture"),
+    [
+        ("README.md", PICTURE),
+        ("docs/how-to/look-at-the-machine-live.md", PICTURE),
+        ("README.md", WORKBENCH),
+        ("docs/tutorials/with-the-mouse.md", WORKBENCH),
+    ],
+)
+def test_the_picture_is_shown(page, picture):
+    shown = rf"!\[[^\]]+\]\([^)]*{re.escape(picture.name)}\)"
+    assert re.search(shown, (ROOT / page).read_text(encoding="utf-8"))
