@@ -55,6 +55,18 @@ def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -
         sync_directory(directory)
 
 
+def file_stamp(path: Path) -> tuple[int, int] | None:
+    """When a file was last written (ns) and its length (bytes), which tell whether it was changed.
+
+    None where it cannot be looked at.
+    """
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
 def read_small_file(path: Path, limit_bytes: int) -> bytes:
     """The content of a regular file of at most `limit_bytes`; a pipe or a device is never waited for.
 

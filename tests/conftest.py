@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import pytest
+import pytest_timeout
 from _pytest.runner import runtestprotocol
 
 from tests.support.pauses import MATTERS_S, Pauses
 
-_TRIES = 3
+_TRIES = 4
 # Of a report: it failed, and its test is tried again. Counted and listed by this word at the end.
 _TRIED_AGAIN = "tried again"
 _PAUSES = Pauses()
@@ -23,7 +25,7 @@ def pytest_runtestloop(session: pytest.Session) -> Iterator[None]:
 
 @pytest.hookimpl
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool:
-    """Run a test; three times at most while it fails and the computer paused meanwhile.
+    """Run a test; four times at most while it fails and the computer paused meanwhile.
 
     What runs a simulated machine beside its daemon in real time loses the gauges while neither runs, and the daemon
     does not believe them afterwards. Without a pause, the first failure counts.
@@ -38,10 +40,24 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
         _log(item, [_tried_again(report, paused_s) for report in reports if report.failed])
         # a machine that other tests share is not what it was
         item.session._setupstate.teardown_exact(None)
+        with _its_time_stopped(item):
+            _PAUSES.settle()
         item._initrequest()  # type: ignore[attr-defined]
     _log(item, reports)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+@contextmanager
+def _its_time_stopped(item: pytest.Item) -> Iterator[None]:
+    """The limit of a test's time is that of one try, which begins at the end of the block."""
+    settings = pytest_timeout._get_item_settings(item)
+    if not settings.timeout:
+        yield
+        return
+    item.ihook.pytest_timeout_cancel_timer(item=item)
+    yield
+    item.ihook.pytest_timeout_set_timer(item=item, settings=settings)
 
 
 def _tried_again(report: pytest.TestReport, paused_s: float) -> pytest.TestReport:

@@ -1,4 +1,4 @@
-"""What every order to the page has: a JSON object as its body, and a refusal in words."""
+"""What every request to the page has in common: a JSON object as its body, who may change files, and the answers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
+from compd.json_text import nan_to_null
+
 LONGEST_BODY_BYTES = 8192
+LOOKS_ONLY = "this browser may look only"
 
 
 async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> Mapping[str, Any]:
@@ -29,7 +32,18 @@ async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> 
     return keys
 
 
+def may_change(request: Request) -> bool:
+    """Whether the browser's token allows to write files."""
+    return bool(request.scope["token"].role == "operate")
+
+
+def answer(data: Any) -> Response:
+    """Plain data as JSON: null for what is not finite, and in ASCII, as what a person typed need not be encodable."""
+    return Response(json.dumps(nan_to_null(data)), media_type="application/json")
+
+
 def refused(reason: str, code: int, value: str = "") -> Response:
     """Why a request is not followed, with the status `code`."""
-    # in ASCII: what a client named need not be text that can be encoded
-    return Response(json.dumps({"reason": reason, "value": value}), code, media_type="application/json")
+    response = answer({"reason": reason, "value": value})
+    response.status_code = code
+    return response

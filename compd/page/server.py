@@ -29,7 +29,7 @@ from compd.page.joining.routes import JoinRoutes
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
-from compd.page.requests import keys_of, refused
+from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 
 STATIC = Path(__file__).parent / "static"
@@ -38,7 +38,6 @@ LONGEST_BURST_S = 3600.0
 # Of the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
-_LOOKS_ONLY = "this browser may look only"
 
 
 class Server:
@@ -124,7 +123,7 @@ class Server:
             self._browsers.disarm(str(keys.get("id")))
             return JSONResponse({"armed_s": 0})
         if self._browsers.arm(str(keys.get("id"))) is None:
-            return refused(f"{_LOOKS_ONLY}, or is not connected", 403)
+            return refused(f"{LOOKS_ONLY}, or is not connected", 403)
         return JSONResponse({"armed_s": ARMED_S})
 
     async def _consequence(self, request: Request) -> Response:
@@ -167,8 +166,8 @@ class Server:
 
     async def _record(self, request: Request) -> Response:
         keys = await keys_of(request)
-        if request.scope["token"].role != "operate":
-            return refused(_LOOKS_ONLY, 403)
+        if not may_change(request):
+            return refused(LOOKS_ONLY, 403)
         if keys.get("stop"):
             await self._recordings.stop()
             return JSONResponse({})

@@ -18,6 +18,9 @@ _PAUSE_S = 0.01
 _PRIORITY = 90
 # From so much on, s, in one test, gauges on a machine that is simulated beside may be too late for the daemon.
 MATTERS_S = 0.05
+# Without a pause for so long, s, the computer is quiet again; a neighbour's work goes on for minutes.
+_QUIET_S = 5.0
+_SETTLES_IN_S = 90.0
 
 
 class Pauses:
@@ -35,6 +38,15 @@ class Pauses:
     @property
     def lost_s(self) -> float:
         return float(self._lost_s.max())
+
+    def settle(self) -> None:
+        """Wait until the computer runs without a pause for a while; not for ever."""
+        end_s = time.monotonic() + _SETTLES_IN_S
+        while time.monotonic() < end_s:
+            before_s = self.lost_s
+            sleep_until(time.monotonic() + _QUIET_S)
+            if self.lost_s == before_s:
+                return
 
     @contextmanager
     def watched(self) -> Iterator[None]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.errors import RecordingError
+from compd.files import file_stamp
 from compd.instruments.export import ReadOptions
 from compd.instruments.preview import ExportPreview, preview_export
 from compd.joining.join import choose_by
@@ -19,7 +20,7 @@ class _Read(NamedTuple):
     """A file at a time, read with these options."""
 
     path: Path
-    stamp: tuple[int, int]
+    stamp: tuple[int, int] | None
     options: ReadOptions
     preview: ExportPreview
 
@@ -34,8 +35,7 @@ class ExportReader:
     def read(self, path: Path, options: ReadOptions) -> ExportPreview:
         """As `preview_export`."""
         with self._lock:
-            stat = path.stat()
-            stamp = (stat.st_mtime_ns, stat.st_size)
+            stamp = file_stamp(path)
             for known in self._kept:
                 if (known.path, known.stamp, known.options) == (path, stamp, options):
                     return known.preview

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,20 +16,18 @@ from compd.errors import CompdError, Problem, RecordingError
 from compd.instruments.export import InstrumentExport
 from compd.joining.join import match_export
 from compd.joining.summary import summary_lines
-from compd.json_text import nan_to_null
 from compd.page.joining.choices import Choices, read_choices
 from compd.page.joining.export_table import ExportReader, told
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.trial import tried
 from compd.page.recording_machine import machine_of
 from compd.page.recordings import NAME, Recordings
-from compd.page.requests import keys_of, refused
+from compd.page.requests import LOOKS_ONLY, answer, keys_of, may_change, refused
 from compd.recording.sidecar import read_sidecar
 from compd.recording.writer import write_recording
 
 Result = TypeVar("Result")
 
-_LOOKS_ONLY = "this browser may look only"
 EXPORTS = "exports"
 
 
@@ -77,23 +74,23 @@ class JoinRoutes:
     async def _sources(self, request: Request) -> Response:
         """Recordings of gauges alone, plans, exports, and whether this browser may write."""
         gauges, plans = await asyncio.to_thread(_gauges_and_plans, self._directory)
-        return _answer(
+        return answer(
             {
                 "directory": str(self._directory),
                 "gauges": gauges,
                 "plans": plans,
                 "exports": self._exports.listed(),
-                "may_write": _may_write(request),
+                "may_write": may_change(request),
                 "most_bytes": MOST_BYTES,
             }
         )
 
     async def _bring(self, request: Request) -> Response:
         """The body is the file; the query names it."""
-        if not _may_write(request):
-            return refused(_LOOKS_ONLY, 403)
+        if not may_change(request):
+            return refused(LOOKS_ONLY, 403)
         try:
-            return _answer(await self._exports.keep(request.query_params.get("name", ""), request.stream()))
+            return answer(await self._exports.keep(request.query_params.get("name", ""), request.stream()))
         except CompdError as error:
             return refused(str(error), 409)
         except ClientDisconnect:
@@ -120,8 +117,8 @@ class JoinRoutes:
         return await _answered(answered)
 
     async def _write(self, request: Request) -> Response:
-        if not _may_write(request):
-            return refused(_LOOKS_ONLY, 403)
+        if not may_change(request):
+            return refused(LOOKS_ONLY, 403)
         keys = await keys_of(request)
 
         def answered() -> dict[str, Any]:
@@ -187,23 +184,14 @@ def _is_own(path: Path) -> bool:
     return path.is_file() and not path.is_symlink()
 
 
-def _may_write(request: Request) -> bool:
-    return bool(request.scope["token"].role == "operate")
-
-
 def _missing(where: str, what: str, next_step: str = "") -> RecordingError:
     return RecordingError(Problem(where=where, what=what, next_step=next_step))
-
-
-def _answer(keys: Mapping[str, Any]) -> Response:
-    # in ASCII: what an export holds need not be text that can be encoded
-    return Response(json.dumps(nan_to_null(dict(keys))), media_type="application/json")
 
 
 async def _answered(question: Callable[[], dict[str, Any]]) -> Response:
     """The answer to a question that takes long, while the server goes on; 409 with the reason where there is none."""
     try:
-        return _answer(await asyncio.to_thread(question))
+        return answer(await asyncio.to_thread(question))
     except CompdError as error:
         return refused(str(error), 409)
     except FileNotFoundError:

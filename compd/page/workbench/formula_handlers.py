@@ -12,7 +12,6 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from compd.errors import Problem, StateError
-from compd.json_text import nan_to_null
 from compd.model.deltas import port_size
 from compd.model.effect import PORTS
 from compd.model.effect_needs import external_ports
@@ -22,9 +21,9 @@ from compd.model.formula.evaluator import FUNCTIONS, LAG, NUMBERS
 from compd.model.formula.keys import FormulaDeclaration
 from compd.model.formula.parser import LONGEST
 from compd.model.observations import Observations
-from compd.page.requests import keys_of, refused
+from compd.page.requests import LOOKS_ONLY, answer, keys_of, may_change, refused
 from compd.page.workbench.formula_check import check
-from compd.page.workbench.handlers import LOOKS_ONLY, Handler, may_change
+from compd.page.workbench.handlers import Handler
 from compd.page.workbench.workbench import Workbench
 
 _NUMBERS = {"pi": "3.14159...", "deg": "radians in a degree"}
@@ -78,7 +77,7 @@ def _is_met(need: str, rows: Observations) -> bool:
 
 async def _form(request: Request, workbench: Workbench) -> Response:
     def told() -> dict[str, Any]:
-        own = workbench.own
+        own = workbench.sources.own
         return {
             **offered(workbench.opened.aligned.rows),
             "file": str(own.path),
@@ -86,7 +85,7 @@ async def _form(request: Request, workbench: Workbench) -> Response:
             "problems": [str(problem) for problem in own.problems],
         }
 
-    return _json(await workbench.ask(told))
+    return answer(await workbench.ask(told))
 
 
 async def _check(request: Request, workbench: Workbench) -> Response:
@@ -103,7 +102,7 @@ async def _check(request: Request, workbench: Workbench) -> Response:
         (ranked,) = workbench.drafts.find(name)[0].ranked()
         return {**found.as_json(), "draft": {**ranked, "effect": name}}
 
-    return _json(await workbench.ask(checked))
+    return answer(await workbench.ask(checked))
 
 
 async def _save(request: Request, workbench: Workbench) -> Response:
@@ -112,9 +111,9 @@ async def _save(request: Request, workbench: Workbench) -> Response:
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)
     if "delete" in keys:
-        await workbench.ask(partial(workbench.own.delete, str(keys["delete"])))
+        await workbench.ask(partial(workbench.sources.own.delete, str(keys["delete"])))
     else:
-        await workbench.ask(partial(workbench.own.save, _declaration(keys), keys.get("replace") is True))
+        await workbench.ask(partial(workbench.sources.own.save, _declaration(keys), keys.get("replace") is True))
     return JSONResponse(await workbench.ask(workbench.summary))
 
 
@@ -129,11 +128,6 @@ def _declaration(keys: Mapping[str, Any]) -> dict[str, Any]:
         what = "a character that is none, which no file can hold"
         raise StateError(Problem(where="formula", what=what, next_step="type it anew")) from error
     return declaration
-
-
-def _json(data: Any) -> Response:
-    # in ASCII: what a person typed need not be text that can be encoded
-    return Response(json.dumps(nan_to_null(data)), media_type="application/json")
 
 
 FORMULA_HANDLERS = (

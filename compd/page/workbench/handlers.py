@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from compd.page.requests import keys_of, refused
+from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.workbench import Workbench
 
-LOOKS_ONLY = "this browser may look only"
 # Numbers of some 100,000 rows.
 LONGEST_ROWS_BYTES = 1_000_000
 
@@ -23,11 +22,6 @@ class Handler(NamedTuple):
     path: str
     answer: Callable[[Request, Workbench], Awaitable[Response]]
     method: str = "GET"
-
-
-def may_change(request: Request) -> bool:
-    """Whether the browser's token allows to write files."""
-    return bool(request.scope["token"].role == "operate")
 
 
 async def _summary(request: Request, workbench: Workbench) -> Response:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from compd.configuration.yaml_reader import read_text
 from compd.errors import CompdError, Problem, StateError
-from compd.files import write_files
+from compd.files import file_stamp, write_files
 from compd.model.effect import Effect
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import load_library
@@ -47,7 +47,7 @@ class OwnEffects:
 
     def reload(self) -> None:
         """Read the file anew if it has changed."""
-        stamp = self._stamp_of_file()
+        stamp = file_stamp(self.path)
         if self.version and stamp == self._stamp:
             return
         self.version += 1
@@ -104,13 +104,6 @@ class OwnEffects:
 
     def _text(self) -> str:
         return read_text(self.path, "a file of effects") if self.path.exists() else ""
-
-    def _stamp_of_file(self) -> tuple[int, int] | None:
-        try:
-            stat = self.path.stat()
-        except OSError:
-            return None
-        return stat.st_mtime_ns, stat.st_size
 
 
 def library_id_problems(name: object, where: str) -> list[Problem]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-import shlex
 from typing import Any, get_args
 
 import numpy as np
@@ -19,9 +17,8 @@ from compd.diagnosis.planning.measurement_programmes import recorded_limits
 from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat
 from compd.diagnosis.planning.setting_programmes import recorded_settings
 from compd.errors import CompdError, Problem
-from compd.json_text import nan_to_null
 from compd.model.effect import Effect
-from compd.page.requests import keys_of, refused
+from compd.page.requests import answer, keys_of, refused
 from compd.page.workbench.formula_check import words
 from compd.page.workbench.handlers import Handler
 from compd.page.workbench.plan_request import PlanRequest, field_of, read_request
@@ -44,7 +41,7 @@ async def _form(request: Request, workbench: Workbench) -> Response:
         chosen = [library[name] for name in names if name in effects]
         return {"effects": effects, "limits": limits_of(workbench.opened.aligned, chosen)}
 
-    return _json(await workbench.ask(told))
+    return answer(await workbench.ask(told))
 
 
 def limits_of(aligned: AlignedRecording, effects: list[Effect]) -> dict[str, Any]:
@@ -73,7 +70,7 @@ async def _plan(request: Request, workbench: Workbench) -> Response:
                 asked.rivals,
                 rows=asked.rows,
                 model=workbench.opened.model,
-                effects=workbench.given,
+                effects=workbench.sources.effects,
                 beside=asked.beside,
                 workspace_M_mm=asked.workspace_M_mm,
                 force_N=asked.force_N,
@@ -86,7 +83,7 @@ async def _plan(request: Request, workbench: Workbench) -> Response:
             return {"problems": problems}
         return _told(plan, workbench, asked)
 
-    return _json(await workbench.ask(told))
+    return answer(await workbench.ask(told))
 
 
 def _told(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> dict[str, Any]:
@@ -116,7 +113,7 @@ def _told(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> di
             for shape in get_args(PlanFormat)
             if plan.rows and (placed or shape in ("plan", "csv"))
         },
-        "command": shlex.join([*workbench.plan_command(asked.rivals + asked.beside), *asked.options()]),
+        "command": workbench.commands.plan(workbench.sources.paths_of([*asked.rivals, *asked.beside]), asked.options()),
     }
 
 
@@ -143,11 +140,6 @@ def _query_number(request: Request, name: str, least: float) -> float | None:
     if not least <= value < math.inf:
         raise CompdError(Problem(where=name, what="is not understood", value=text[:80], allowed=f"{least:g} or more"))
     return value
-
-
-def _json(data: Any) -> Response:
-    # in ASCII: what a person typed need not be text that can be encoded
-    return Response(json.dumps(nan_to_null(data)), media_type="application/json")
 
 
 PLAN_HANDLERS = (

@@ -5,22 +5,23 @@ from __future__ import annotations
 import asyncio
 import shlex
 import threading
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from compd.configuration.shipped import Machine
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.errors import CompdError, Problem, RecordingError, StateError
-from compd.files import write_files
+from compd.files import file_stamp, write_files
 from compd.live.loop.model_loader import ModelText
 from compd.model.effect_needs import can_concern
 from compd.model.library import load_library
-from compd.model.library.effects_file import gather_effects, load_effects
 from compd.page.workbench.candidates import Candidates
+from compd.page.workbench.command_lines import CommandLines
 from compd.page.workbench.diagnoses import Diagnoses
 from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workbench.drafts import Drafts
+from compd.page.workbench.effect_sources import EffectSources
 from compd.page.workbench.model_changes import proposed, step_told, undone, write
 from compd.page.workbench.opened_recording import OpenedRecording, open_for_page
 from compd.page.workbench.own_effects import NAME, OwnEffects
@@ -37,11 +38,11 @@ class Workbench:
     ----------
     revision : counts changes of the model and of the rows that count.
     diagnosis : the newest, which may run; None before the first.
-    libraries : files of effects that are tried beside compd's, as `--effects` takes them.
-    own : effects of one's own, in a file beside the model file; they are tried as those of the library are.
-    given : the effects of `libraries` and `own`.
+    sources : files of effects that are tried beside compd's.
+    candidates : the effects that may be tried.
     drafts : effects that are being written.
     plans : the newest of the next measurement, by key.
+    commands : what is done here, as command lines.
     """
 
     def __init__(
@@ -54,8 +55,8 @@ class Workbench:
         self._diagnoses = diagnoses or Diagnoses()
         self._begin_lock = threading.Lock()
         self.diagnosis: DiagnosisJob | None = None
-        self.libraries: list[str] = []
-        self.own = OwnEffects(model_path.parent / NAME)
+        self.sources = EffectSources(OwnEffects(model_path.parent / NAME))
+        self.commands = CommandLines(path, model_path, machine)
         self.plans: dict[str, MeasurementPlan] = {}
         self._open()
 
@@ -65,7 +66,8 @@ class Workbench:
 
     def _set(self, opened: OpenedRecording) -> None:
         self.opened = opened
-        self._gather()
+        self.sources.gather()
+        self._set_candidates()
         self._proposal: tuple[str, str, OpenedRecording] | None = None
         self.revision += 1
 
@@ -77,42 +79,20 @@ class Workbench:
     def _stamps(self) -> list[tuple[int, int] | None]:
         """When each file was last written, and its length; None where it is not there."""
         paths = (self._path, self._path.with_suffix(".yaml"), self._model_path)
-        stats = [path.stat() if path.exists() else None for path in paths]
-        return [stat and (stat.st_mtime_ns, stat.st_size) for stat in stats]
+        return [file_stamp(path) for path in paths]
 
-    def _gather(self) -> None:
-        """The effects that may be tried, anew. Raises CompdError with every problem of the libraries."""
-        own = [str(self.own.path)] if self.own.effects else []
-        given = {source: dict(load_effects(source)) for source in self.libraries} | {
-            source: dict(self.own.effects) for source in own
-        }
-        self._source_by_effect = {effect: source for source, effects in given.items() for effect in effects}
+    def _set_candidates(self) -> None:
         rows = self.opened.aligned.rows
         library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
-        self.given = list(
-            gather_effects([effect for effects in given.values() for effect in effects.values()]).values()
-        )
-        self.candidates = Candidates(self.opened.comparison, [*library, *self.given])
+        self.candidates = Candidates(self.opened.comparison, [*library, *self.sources.effects])
         self.drafts = Drafts(self.opened.comparison, self.candidates)
-        self._gathered = self.own.version
 
-    def use_libraries(self, sources: Sequence[str]) -> None:
+    def use_libraries(self, libraries: Sequence[str]) -> None:
         """Try the effects of these files, too, as `--effects` takes them. Raises CompdError where one is faulty."""
-        if list(sources) == self.libraries:
-            return
-        before, self.libraries = self.libraries, list(sources)
-        try:
-            self._gather()
-        except CompdError:
-            self.libraries = before
-            self._gather()
-            raise
-        self._proposal = None
-        self.revision += 1
-
-    @property
-    def _effect_sources(self) -> list[str]:
-        return [*self.libraries, *([str(self.own.path)] if self.own.effects else [])]
+        if self.sources.use(libraries):
+            self._set_candidates()
+            self._proposal = None
+            self.revision += 1
 
     async def ask(self, question: Callable[[], Result]) -> Result:
         """The answer to a question that takes long, while the server goes on; one after another."""
@@ -125,44 +105,16 @@ class Workbench:
 
     def summary(self) -> dict[str, Any]:
         """See `OpenedRecording.summary`; with the revision, and the hash of the model file as a daemon tells it."""
-        self.own.reload()
-        if self._gathered != self.own.version:
-            self._gather()
+        if self.sources.refresh():
+            self._set_candidates()
         return {
             **self.opened.summary(),
             "revision": self.revision,
-            "libraries": [source.rpartition("/")[2] for source in self.libraries],
+            "libraries": [source.rpartition("/")[2] for source in self.sources.libraries],
             "model": str(self._model_path),
             "model_hash": ModelText.read(self._model_path).hash if self._model_path.exists() else "",
-            "commands": {name: shlex.join(words) for name, words in self._commands().items()},
+            "commands": self.commands.all(self.sources.paths),
         }
-
-    def _commands(self) -> dict[str, list[str]]:
-        """What the page does as command lines; EFFECT stands for an effect's id."""
-        machine = [] if self._machine is None else ["--machine", str(self._machine)]
-        known = ["--model", str(self._model_path)] if self._model_path.exists() else []
-        effects = [word for source in self._effect_sources for word in ("--effects", source)]
-        on = ["--recording", str(self._path), "--model", str(self._model_path), *machine]
-        return {
-            "compare": ["compd", "compare", str(self._path), *known, *machine],
-            "diagnose": ["compd", "diagnose", str(self._path), *known, *effects, *machine],
-            "show": ["compd", "effect", "show", "EFFECT"],
-            "add": ["compd", "effect", "add", "EFFECT", *on],
-            "remove": ["compd", "effect", "remove", "EFFECT", *on],
-            "undo": ["compd", "effect", "undo", "--model", str(self._model_path)],
-            "fit": ["compd", "effect", "fit", *on],
-            "ledger": ["compd", "ledger", str(self._model_path)],
-            "exclude": ["compd", "recording", "exclude", str(self._path), "--rows", "ROWS", "--reason", "REASON"],
-            "include": ["compd", "recording", "include", str(self._path), "--rows", "ROWS"],
-        }
-
-    def plan_command(self, effects: Collection[str]) -> list[str]:
-        """`compd plan` without its options for these effects."""
-        words = ["compd", "plan", str(self._path)]
-        words += ["--machine", str(self._machine)] if self._machine is not None else []
-        words += ["--model", str(self._model_path)] if self._model_path.exists() else []
-        wanted = {self._source_by_effect[effect] for effect in effects if effect in self._source_by_effect}
-        return words + [word for source in self._effect_sources if source in wanted for word in ("--effects", source)]
 
     def diagnose(self) -> None:
         """Begin a diagnosis, unless one runs. Raises StateError where too many run in the server."""
@@ -174,9 +126,7 @@ class Workbench:
                 last.cancel()  # its pictures may still be drawn
                 last.join()
             model = self._model_path if self._model_path.exists() else None
-            self.diagnosis = self._diagnoses.begin(
-                self._path, model, self._machine, self.revision, self._effect_sources
-            )
+            self.diagnosis = self._diagnoses.begin(self._path, model, self._machine, self.revision, self.sources.paths)
 
     def diagnosis_summary(self, shown: str = "") -> dict[str, Any]:
         """The newest: how many changes it is `behind`, and what it has found; `state` is "none" before the first.
@@ -194,7 +144,7 @@ class Workbench:
         summary = self.candidates.summary()
         return {
             **summary,
-            "effects": [{**told, "own": told["effect"] in self.own.effects} for told in summary["effects"]],
+            "effects": [{**told, "own": told["effect"] in self.sources.own.effects} for told in summary["effects"]],
         }
 
     def card(self, name: str) -> dict[str, Any]:
@@ -203,8 +153,8 @@ class Workbench:
         Raises KeyError where there is no such effect.
         """
         candidates, effect = self.drafts.find(name)
-        own = name != effect or effect in self.own.effects
-        source = str(self.own.path) if own else self._source_by_effect.get(effect)
+        own = name != effect or effect in self.sources.own.effects
+        source = str(self.sources.own.path) if own else self.sources.path_of(effect)
         named = effect if source is None else shlex.quote(f"{source}:{effect}")
         return {**candidates.card(effect), "asked": name, "named": named, "own": own}
 

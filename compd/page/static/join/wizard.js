@@ -1,23 +1,11 @@
 // What is chosen in the join wizard, what the server reads of it, and what was tried.
 import { post } from "../post.js";
+import { Session } from "../session.js";
 
-export class Wizard {
-  // status: where problems are said in words
+export class Wizard extends Session {
   constructor(status) {
-    Object.assign(this, { status, panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0 });
-  }
-
-  say(text) {
-    this.status.textContent = text;
-  }
-
-  async attempt(work) {
-    try {
-      this.say("");
-      return await work();
-    } catch (error) {
-      this.say(error.message);
-    }
+    super(status);
+    Object.assign(this, { panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0 });
   }
 
   // An order to the server with all that is chosen. Throws its reason.

@@ -1,25 +1,12 @@
 // What is open in the workbench: its numbers, its rows, what is tried on it, and what is asked of the server for it.
 import { post } from "../post.js";
+import { Session } from "../session.js";
 import { fetchArrays } from "./arrays.js";
 
-export class Bench {
-  // status: where problems are said in words
+export class Bench extends Session {
   constructor(status) {
-    Object.assign(this, { status, panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null });
-  }
-
-  say(text) {
-    this.status.textContent = text;
-  }
-
-  // What goes wrong is said in words; nothing that was shown stays as if it were the answer.
-  async attempt(work) {
-    try {
-      this.say("");
-      return await work();
-    } catch (error) {
-      this.say(error.message);
-    }
+    super(status);
+    Object.assign(this, { panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null });
   }
 
   // JSON of the open recording. Throws the server's reason.

@@ -1,0 +1,71 @@
+"""The effects that a person tries beside those of compd: of libraries that were chosen, and of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from compd.errors import CompdError
+from compd.model.effect import Effect
+from compd.model.library.effects_file import gather_effects, load_effects
+from compd.page.workbench.own_effects import OwnEffects
+
+
+class EffectSources:
+    """Files of effects, as `--effects` takes them.
+
+    Attributes
+    ----------
+    libraries : files that were chosen.
+    own : effects of one's own, in a file beside the model file.
+    effects : those of all files, as they were gathered last.
+    """
+
+    def __init__(self, own: OwnEffects) -> None:
+        self.own = own
+        self.libraries: list[str] = []
+        self.gather()
+
+    def gather(self) -> None:
+        """Read all files. Raises CompdError with every problem of the libraries."""
+        by_source: dict[str, Mapping[str, Effect]] = {
+            **{source: dict(load_effects(source)) for source in self.libraries},
+            **({str(self.own.path): self.own.effects} if self.own.effects else {}),
+        }
+        every = [effect for effects in by_source.values() for effect in effects.values()]
+        self.effects: list[Effect] = list(gather_effects(every).values())
+        self._source_by_effect = {effect: source for source, effects in by_source.items() for effect in effects}
+        self._gathered = self.own.version
+
+    def refresh(self) -> bool:
+        """Gather anew where somebody has changed the file of one's own effects; whether it was changed."""
+        self.own.reload()
+        if self._gathered == self.own.version:
+            return False
+        self.gather()
+        return True
+
+    def use(self, libraries: Sequence[str]) -> bool:
+        """Choose other libraries; whether they are others. Raises CompdError where one is faulty: none changes then."""
+        if list(libraries) == self.libraries:
+            return False
+        before, self.libraries = self.libraries, list(libraries)
+        try:
+            self.gather()
+        except CompdError:
+            self.libraries = before
+            raise
+        return True
+
+    @property
+    def paths(self) -> list[str]:
+        """Of every file that has effects."""
+        return [*self.libraries, *([str(self.own.path)] if self.own.effects else [])]
+
+    def paths_of(self, effects: Collection[str]) -> list[str]:
+        """Of the files that have these effects."""
+        wanted = {self.path_of(effect) for effect in effects}
+        return [path for path in self.paths if path in wanted]
+
+    def path_of(self, effect: str) -> str | None:
+        """Of the file that has an effect; None where it is one of compd's, or unknown."""
+        return self._source_by_effect.get(effect)
