@@ -15,7 +15,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
-	@echo "make pages   every command and piece of Python of README and docs, run (9 min)"
+	@echo "make pages   every command and piece of Python of README and docs, run (8 min)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (6 min)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
@@ -76,7 +76,8 @@ service: $(STAMP)
 
 # Every command and every piece of Python of README and docs/, one page after the other: they run machines in real time.
 pages: $(STAMP)
-	$(BIN)/pytest -m sample tests/system/test_pages.py
+	$(BIN)/pytest -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
+	$(BIN)/pytest -m sample tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)

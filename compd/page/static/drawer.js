@@ -60,6 +60,7 @@ export class Drawer {
   // The slow event.
   show(event) {
     this.orders.show();
+    this.orders.askAgain();
     this.looking.replaceChildren(...event.browsers.map((browser) => element("li", {}, `${browser.name}, ${browser.address}, ${browser.role === "view" ? "looks only" : browser.armed_s ? `ARMED, ${Math.ceil(browser.armed_s)} s left` : "not armed"}, for ${ago(browser.connected_s)}`)));
     this.recordings.show(event, this.open);
     const models = JSON.stringify(event.status?.model);

@@ -31,9 +31,21 @@ export class Orders {
 
   // First step: what the order will do.
   async ask(name, subject) {
+    this.say("");
+    await this.inform(name, subject);
+  }
+
+  // An order that was not possible may be so now: called whenever the daemon has told something new.
+  async askAgain() {
+    if (this.impossible) await this.inform(this.impossible.name, this.impossible.subject);
+  }
+
+  async inform(name, subject) {
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
     const told = await response.json();
-    this.say("");
+    const { impossible } = this;
+    if (impossible?.name === name && impossible.subject === subject && impossible.text === told.text) return;
+    this.impossible = told.possible ? null : { name, subject, text: told.text };
     const title = nameOf(name, subject);
     // what is told is what is given: the file that a name stands for now, not later
     const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, told.subject || subject) }, title);
@@ -48,6 +60,7 @@ export class Orders {
   }
 
   leave() {
+    this.impossible = null;
     this.consequence.replaceChildren();
   }
 

@@ -133,6 +133,18 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         assert daemon.model()["applied"]["effects"] == []
 
 
+def test_an_adoption_that_is_not_possible_yet_becomes_possible_as_soon_as_the_shadow_runs(
+    chromium, live, daemon, directory
+):
+    with workbench(chromium, live, directory) as tab:
+        add_by_mouse(tab, "link_zero")
+        tab.locator("#live-adopt").click()
+        until(tab, "document.querySelector('#confirm-order')?.disabled === true")
+        daemon.model(str(directory / "tripod.model.yaml"), shadow=True)
+        until(tab, "document.querySelector('#confirm-order').disabled === false")
+        assert "The correction changes by" in tab.locator("#live-model .consequence").inner_text()
+
+
 def test_a_shadow_whose_file_has_changed_since_is_said_to_be_as_it_was(chromium, live, daemon, directory):
     with workbench(chromium, live, directory) as tab:
         add_by_mouse(tab, "link_zero")

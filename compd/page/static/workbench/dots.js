@@ -5,16 +5,16 @@ export class Dots {
   constructor() {
     this.canvas = document.createElement("canvas");
     this.context = this.canvas.getContext("2d", { willReadFrequently: true });
+    this.colours = {};
   }
 
   // Draw squares in the context's fillStyle, which prepared() has scaled; marks: x and y one after the other
   paint(context, marks, shown) {
     const { width, height } = context.canvas;
     if (!width || !height) return;
-    Object.assign(this.canvas, { width, height }); // and thereby empty
-    const image = this.context.createImageData(width, height);
+    const image = this.emptyImage(width, height);
     const pixels = new Uint32Array(image.data.buffer);
-    const colour = this.pixel(context.fillStyle);
+    const colour = (this.colours[context.fillStyle] ??= this.pixel(context.fillStyle));
     const ratio = context.getTransform().a;
     const size = Math.max(1, Math.round(SIZE_PX * ratio));
     for (let k = 0; k < marks.length / 2; k++) {
@@ -30,11 +30,22 @@ export class Dots {
     context.restore();
   }
 
+  // The same memory again where the picture is as large as before: a slider asks for it at every move.
+  emptyImage(width, height) {
+    if (this.image?.width === width && this.image.height === height) this.image.data.fill(0);
+    else {
+      Object.assign(this.canvas, { width, height });
+      this.image = this.context.createImageData(width, height);
+    }
+    return this.image;
+  }
+
   // A colour as one pixel, in the computer's own order of bytes.
   pixel(colour) {
-    this.context.clearRect(0, 0, 1, 1);
-    this.context.fillStyle = colour;
-    this.context.fillRect(0, 0, 1, 1);
-    return new Uint32Array(this.context.getImageData(0, 0, 1, 1).data.buffer)[0];
+    const canvas = document.createElement("canvas");
+    const context = canvas.getContext("2d");
+    context.fillStyle = colour;
+    context.fillRect(0, 0, 1, 1);
+    return new Uint32Array(context.getImageData(0, 0, 1, 1).data.buffer)[0];
   }
 }
