@@ -91,16 +91,29 @@ def test_what_is_wrong_stands_under_its_field(tab):
     assert tab.locator("#plan-table").count() == 0
 
 
+def chosen(tab, label):
+    """The effects in the selects with this label."""
+    return tab.eval_on_selector_all(f"#plan select[aria-label^='{label}']", "selects => selects.map((s) => s.value)")
+
+
+@pytest.mark.sample
+def test_what_a_card_says_is_alike_is_planned_from_its_button(tab):
+    tab.locator(".effect[data-effect=link_elasticity]").click()
+    tab.get_by_role("button", name="Plan what tells them apart").click()
+    rivals = chosen(tab, "Rivals")
+    assert rivals[0] == "link_elasticity"
+    assert "joint_contact" in rivals
+    assert tab.evaluate("document.activeElement.id") == "plan-button"
+    assert tab.locator("#plan .problem").all_inner_texts() == [""] * tab.locator("#plan .problem").count()
+
+
 def test_what_a_diagnosis_cannot_tell_apart_is_suggested(tab):
     found = {
         "steps": [{"effect": "tool_bending", "rivals": []}, {"effect": "link_elasticity", "rivals": ["joint_contact"]}]
     }
     tab.evaluate("(found) => bench.panels.find((panel) => panel.suggestFor).suggestFor(found)", found)
-    chosen = (
-        "(label) => [...document.querySelectorAll(`#plan select[aria-label^='${label}']`)].map((each) => each.value)"
-    )
-    assert tab.evaluate(chosen, "Rivals") == ["link_elasticity", "joint_contact"]
-    assert tab.evaluate(chosen, "Found as well") == ["tool_bending"]
+    assert chosen(tab, "Rivals") == ["link_elasticity", "joint_contact"]
+    assert chosen(tab, "Found as well") == ["tool_bending"]
     tab.locator("#plan-button").click()
     until(tab, "document.querySelectorAll('#plan-table tbody tr').length > 0")
     assert "--beside tool_bending" in tab.locator("#plan .command code").inner_text()

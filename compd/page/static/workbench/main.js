@@ -19,14 +19,14 @@ const bench = new Bench(at("said"));
 const selection = new Selection();
 const strip = new Strip(at("errors"), at("verdict"));
 const picture = new Picture({ canvas: at("picture"), tabs: at("tabs"), against: at("against"), note: at("picture-note") }, selection);
-const card = new Card(at("card"), (rivals) => plan.show(rivals));
+const card = new Card(at("card"), (rivals) => plan.planFor(rivals));
 const effects = new Effects(at("effects"), at("filter"), at("effects-note"), { choose: (effect) => card.choose(effect), ranked: (told) => strip.measured(told) });
 const diagnosis = new Diagnosis(at("diagnosis"), {
   named: (result) => {
     effects.name(result);
     if (result) plan.suggestFor(result);
   },
-  plan: (rivals) => plan.show(rivals),
+  plan: (rivals) => plan.planFor(rivals),
   formula: ({ declaration }) => formula.edit(declaration),
   choose: (effect) => effects.pick(effect),
   add: async (effect) => {

@@ -64,7 +64,7 @@ export class Plan {
   begin(bench) {
     this.bench = bench;
     this.result.hidden = true;
-    this.show([]);
+    this.showProblems([]);
     return this.offerLimits(true);
   }
 
@@ -82,7 +82,7 @@ export class Plan {
   }
 
   // What another panel asks to be planned.
-  show(effects) {
+  planFor(effects) {
     this.suggest(effects);
     this.place.scrollIntoView({ block: "start" });
     this.button.focus();
@@ -125,7 +125,7 @@ export class Plan {
       const { key } = this.bench;
       const told = await this.bench.post("plan", this.order);
       if (key !== this.bench.key) return; // another recording is open meanwhile
-      this.show(told.problems ?? []);
+      this.showProblems(told.problems ?? []);
       this.result.hidden = Boolean(told.problems);
       if (!told.problems) this.showPlan(told);
     }).finally(() => {
@@ -134,7 +134,7 @@ export class Plan {
     });
   }
 
-  show(problems) {
+  showProblems(problems) {
     const fields = new Map([["rivals", this.rivals], ["beside", this.beside], ["rows", this.count], ["workspace", this.pairs?.get("x")], ...(this.pairs ?? []), ...[...(this.numbers ?? [])].map(([name, { field }]) => [name, field])]);
     for (const field of new Set(fields.values())) field?.show();
     const texts = new Map();
