@@ -23,7 +23,7 @@ KINDS = [
     pytest.param("ball", "tripod-cmm", marks=pytest.mark.long),
     pytest.param("pin", "tripod-cmm", marks=[pytest.mark.long, pytest.mark.sample]),
     pytest.param("pin", "hexapod", marks=pytest.mark.long),
-    ("pose", "hexapod"),
+    pytest.param("pose", "hexapod", marks=pytest.mark.long),
 ]
 
 

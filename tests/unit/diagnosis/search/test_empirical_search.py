@@ -60,7 +60,7 @@ def diagnose_with_cause(path: Path, cause: Cause, effects: dict[str, tuple[float
         (swell_with_humidity, "humidity_pct", "linear"),
         (rise_with_pressure, "pressure_hPa", "linear"),
         (swing_in_time, "time_s", "periodic"),
-        (drag_at_one_side, "tip_x_mm", "knee"),
+        pytest.param(drag_at_one_side, "tip_x_mm", "knee", marks=pytest.mark.long),
     ],
 )
 def test_a_cause_outside_the_library_is_described_and_not_named(
