@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from tests.support.live_page import opened, page_process, until
+from tests.support.live_page import opened, until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import page_without_machine
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
 
@@ -34,7 +33,7 @@ def test_no_rule_is_broken_in_the_workbench(chromium, tmp_path, scheme, width):
 
     (tmp_path / "recordings").mkdir()
     record(tmp_path / "recordings", gauges(200, 1), [hidden("link_expansion", 4.0)], name="monday-1")
-    with page_process(Path("/no/socket"), tmp_path / "recordings", "--models", str(tmp_path)) as (address, _):
+    with page_without_machine(tmp_path) as (address, _):
         tab = chromium.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}).new_page()
         tab.goto(address)
         for view, shown in (

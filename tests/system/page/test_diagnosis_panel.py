@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.other_process import is_alive
+from tests.support.workbench_page import open_recording, page_without_machine, workbench_tabs
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
-SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 DONE = "document.querySelector('#diagnosis-outcome .word')"
 RUNNING = "document.getElementById('diagnose').textContent.startsWith('Cancel')"
 PANEL = "bench.panels.find((panel) => panel.constructor.name === 'Diagnosis')"
@@ -35,40 +35,15 @@ def directory(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(directory):
-    with serving(directory) as (address, _):
+    with page_without_machine(directory) as (address, _):
         yield address
-
-
-def serving(directory):
-    return page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory))
 
 
 @pytest.fixture
 def open_tab(chromium, address):
-    """Opens a tab with this model file, of a browser of its own; no script may have failed."""
-    failures, contexts = [], []
-
-    def opened(model, recording="monday-1"):
-        contexts.append(chromium.new_context(viewport={"width": 1366, "height": 900}))
-        tab = contexts[-1].new_page()
-        tab.on("pageerror", lambda error: failures.append(str(error)))
-        tab.goto(address)
-        tab.goto(address.partition("?")[0] + "workbench")
-        open_recording(tab, model, recording)
-        return tab
-
-    yield opened
-    for context in contexts:
-        context.close()
-    assert failures == []
-
-
-def open_recording(tab, model, recording="monday-1"):
-    until(tab, "document.getElementById('recording').options.length >= 2")
-    tab.locator("#recording").select_option(recording)
-    tab.locator("#model").fill(model)
-    tab.locator("#open").click()
-    until(tab, SHOWN)
+    """Opens a tab with this model file, of a browser of its own."""
+    with workbench_tabs(chromium, address, apart=True, height=900) as opened:
+        yield opened
 
 
 def diagnosed(tab):
@@ -178,7 +153,7 @@ def test_its_page_works_in_a_sandbox_of_its_own(open_tab):
 @contextmanager
 def diagnosing(directory, chromium):
     """A page whose server runs a diagnosis; the server's process and that of the diagnosis."""
-    with serving(directory) as (address, pid):
+    with page_without_machine(directory) as (address, pid):
         context = chromium.new_context()
         try:
             tab = context.new_page()

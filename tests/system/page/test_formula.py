@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
-SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 GROWTH = "k * link_mm * (temperature_link - 20) / 1000"
 
 
@@ -28,29 +27,21 @@ def directory(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(directory):
-    with page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory)) as (address, _):
+    with page_without_machine(directory) as (address, _):
         yield address
 
 
 @pytest.fixture
 def open_tab(chromium, address):
-    context = chromium.new_context(viewport={"width": 1366, "height": 768})
-    failures = []
+    """Opens a tab with this model file, and waits for the form as well."""
+    with workbench_tabs(chromium, address) as opened:
 
-    def opened(model):
-        tab = context.new_page()
-        tab.on("pageerror", lambda error: failures.append(str(error)))
-        tab.goto(address)
-        tab.goto(address.partition("?")[0] + "workbench")
-        until(tab, "document.getElementById('recording').options.length >= 1")
-        tab.locator("#model").fill(model)
-        tab.locator("#open").click()
-        until(tab, f"{SHOWN} && document.getElementById('formula-text')")
-        return tab
+        def with_form(model):
+            tab = opened(model)
+            until(tab, "document.getElementById('formula-text')")
+            return tab
 
-    yield opened
-    context.close()
-    assert failures == []
+        yield with_form
 
 
 def problem(field):

@@ -10,10 +10,10 @@ from compd.client import connect
 from compd.configuration.shipped import load_machine
 from tests.support.live_page import LivePage, page_process, until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import SHOWN, open_recording
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
-SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 ZEROS_UM = (12.0, -8.0, 5.0)
 
 
@@ -44,10 +44,7 @@ def workbench(chromium, live, directory, *options, **context_options):
         try:
             tab.goto(address)
             tab.goto(address.partition("?")[0] + "workbench")
-            until(tab, "document.getElementById('recording').options.length >= 1")
-            tab.locator("#model").fill("tripod.model.yaml")
-            tab.locator("#open").click()
-            until(tab, SHOWN)
+            open_recording(tab, "tripod.model.yaml")
             yield tab
             assert failures == []
         finally:

@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import page_without_machine, workbench_tabs
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
@@ -26,24 +27,16 @@ def directory(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(directory):
-    with page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory)) as (address, _):
+    with page_without_machine(directory) as (address, _):
         yield address
 
 
 @pytest.fixture
 def tab(chromium, address):
-    context = chromium.new_context(viewport={"width": 1366, "height": 768})
-    failures = []
-    tab = context.new_page()
-    tab.on("pageerror", lambda error: failures.append(str(error)))
-    tab.goto(address)
-    tab.goto(address.partition("?")[0] + "workbench")
-    until(tab, "document.getElementById('recording').options.length >= 1")
-    tab.locator("#open").click()
-    until(tab, "window.bench?.summary && document.querySelectorAll('#plan .limits input').length === 10")
-    yield tab
-    context.close()
-    assert failures == []
+    with workbench_tabs(chromium, address) as opened:
+        tab = opened("machine.model.yaml")
+        until(tab, "document.querySelectorAll('#plan .limits input').length === 10")
+        yield tab
 
 
 def choose(tab, *rivals):

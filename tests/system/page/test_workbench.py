@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
 from compd.api.models import add_effect
 from compd.model_document import read_stored
 from compd.recording.sidecar import read_sidecar
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
-
-SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 
 
 @pytest.fixture(scope="module")
@@ -30,31 +28,15 @@ def directory(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(directory):
-    with page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory)) as (address, _):
+    with page_without_machine(directory) as (address, _):
         yield address
 
 
 @pytest.fixture
 def open_tab(chromium, address):
-    """Opens a tab with this model file; the scripts of all tabs must not have failed."""
-    context = chromium.new_context(viewport={"width": 1366, "height": 768})
-    failures = []
-
-    def opened(model):
-        tab = context.new_page()
-        tab.on("pageerror", lambda error: failures.append(str(error)))
-        tab.goto(address)
-        tab.goto(address.partition("?")[0] + "workbench")
-        until(tab, "document.getElementById('recording').options.length >= 2")
-        tab.locator("#recording").select_option("monday-1")
-        tab.locator("#model").fill(model)
-        tab.locator("#open").click()
-        until(tab, SHOWN)
-        return tab
-
-    yield opened
-    context.close()
-    assert failures == []
+    """Opens a tab with this model file."""
+    with workbench_tabs(chromium, address) as opened:
+        yield opened
 
 
 def big(tab, name):

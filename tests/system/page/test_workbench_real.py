@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from compd.api.models import add_effect
 from compd.configuration.shipped import shipped_effects
 from compd.model_document import read_stored
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.paths import SHARED
+from tests.support.workbench_page import page_without_machine
 
 REAL = SHARED / "real"
 
@@ -36,7 +36,7 @@ def test_effects_of_a_real_machine_are_found_and_added_by_mouse(
         shutil.copy(REAL / f"{recording}{suffix}", tmp_path / "recordings")
     if library not in shipped_effects():
         shutil.copy(REAL / library, tmp_path)
-    with page_process(Path("/no/socket"), tmp_path / "recordings", "--models", str(tmp_path)) as (address, _):
+    with page_without_machine(tmp_path) as (address, _):
         tab = chromium.new_context(viewport={"width": 1366, "height": 768}).new_page()
         tab.goto(address)
         tab.locator("nav a", has_text="Workbench").click()

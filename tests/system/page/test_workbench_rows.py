@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from compd.api.diagnosis import compare
 from compd.comparison.open import open_recording
-from tests.support.live_page import page_process, until
+from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
+from tests.support.workbench_page import page_without_machine
 from tests.system.page.test_workbench import lasso
 
 pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
@@ -22,7 +21,7 @@ def test_numbers_are_of_all_rows_and_pictures_of_some(chromium, tmp_path, rows):
     (tmp_path / "recordings").mkdir()
     path = record(tmp_path / "recordings", gauges(rows, 1), [hidden("link_expansion", 4.0)], name="long-1")
     comparison = compare(open_recording(path))
-    with page_process(Path("/no/socket"), tmp_path / "recordings", "--models", str(tmp_path)) as (address, _):
+    with page_without_machine(tmp_path) as (address, _):
         tab = chromium.new_context(viewport={"width": 1366, "height": 768}).new_page()
         tab.goto(address)
         tab.goto(address.partition("?")[0] + "workbench?recording=long-1&model=long.model.yaml")

@@ -16,12 +16,12 @@ from tests.support.hidden_run import hidden_run
 from tests.support.hidden_visits import check_visits, survey_visits
 from tests.support.live_page import page_process, until
 from tests.support.simulated import run_directory
+from tests.support.workbench_page import SHOWN
 
 pytestmark = [pytest.mark.timeout(600), pytest.mark.long, pytest.mark.sample]
 
 # What the tutorial of the command line hides, too.
 HIDDEN = 125
-SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 
 
 def order(tab, name, done):
