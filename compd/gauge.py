@@ -161,6 +161,18 @@ class ByteLine(Protocol):
         """
         ...
 
+    def pulse_dtr(self, low_s: float) -> float:
+        """Ask by DTR, which is LOW for at least `low_s` (s), and HIGH again.
+
+        Returns the monotonic time (s) at which it became LOW: the `time_s` of the readings in the reply. LINE_LOST also
+        where the port has no DTR.
+        """
+        ...
+
+    def send_break(self, duration_s: float) -> None:
+        """A break of at least `duration_s` (s) on the line, for devices that want one before a request."""
+        ...
+
     def listen(self) -> float:
         """Discard what has arrived so far, of a device that sends unasked.
 
@@ -309,6 +321,14 @@ class Gauge(ABC, Generic[LineT]):
         request: see `replies_tell_whose`. Register lines tell replies apart themselves.
         """
         return None
+
+    @property
+    def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
+        """State of DTR and RTS (True is HIGH) from which the device or its cable takes its power; {} where it does not.
+
+        Its line is opened so, where the line's own keys `dtr` and `rts` are left out.
+        """
+        return {}
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         """(bytes sent, bytes received) of every exchange that one `read` makes, for planning lines; None = unknown.

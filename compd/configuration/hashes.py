@@ -22,6 +22,16 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "allow": [],
     "token_file": None,
     "target": TargetSettings().model_dump(mode="json"),
+    "pause_s": 0.0,
+    "echo": False,
+    "dtr": None,
+    "rts": None,
+    "rs485": None,
+    "ask_one_more": True,
+    "break_s": None,
+    "line_needs": {},
+    "dtr_pulse_s": None,
+    "cable": "duplex",
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

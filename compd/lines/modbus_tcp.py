@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import math
 import struct
+import threading
 
 from pymodbus.client import ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
@@ -17,7 +18,7 @@ from pymodbus.pdu import ExceptionResponse, ModbusPDU
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
-from compd.lines.modbus_rtu import EXCEPTIONS
+from compd.lines.modbus_serial import exception_fault
 
 # Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one as well.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
@@ -29,12 +30,19 @@ class ModbusTcp:
 
     last_request_s = -math.inf  # not noted: a reply names its request
     unexpected_bytes = 0  # pymodbus drops them by their transaction number, uncounted
+    request_came_back = False  # TCP has no echo
 
-    def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:
-        """Connect within `timeout_s`. Raises LineFault (LINE_LOST) when the device cannot be reached."""
+    def __init__(self, host: str, port: int, timeout_s: float, clock: Clock, pause_s: float = 0.0) -> None:
+        """Connect within `timeout_s`. `pause_s`: from a reply to the next request, s.
+
+        Raises LineFault (LINE_LOST) when the device cannot be reached.
+        """
         self._where = f"{host}:{port}"
         self._timeout_s = timeout_s
         self._clock = clock
+        self._pause_s = pause_s
+        self._last_reply_s = -math.inf
+        self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._client = ModbusTcpClient(host, port=port, timeout=timeout_s, retries=0)
         self._connect()
 
@@ -46,6 +54,7 @@ class ModbusTcp:
         if not self._client.connected:
             self._connect()
         read = self._client.read_holding_registers if function == 3 else self._client.read_input_registers
+        self._pause()
         time_s = self._clock.monotonic()
         try:
             reply = read(address, count=count, device_id=unit)
@@ -57,6 +66,7 @@ class ModbusTcp:
             raise self._fault(Quality.MISMATCH, f"not to be decoded: {error}") from error
         except OSError as error:
             raise self._fault(Quality.LINE_LOST, str(error)) from error
+        self._last_reply_s = self._clock.monotonic()
         return RegisterReply(self._registers(reply, function, count), time_s)
 
     def drain(self, quiet_s: float | None = None) -> bytes:
@@ -67,6 +77,12 @@ class ModbusTcp:
         """Close the connection."""
         self._client.close()  # type: ignore[no-untyped-call]
 
+    def _pause(self) -> None:
+        """Wait until the last reply is `pause_s` ago."""
+        rest_s = self._last_reply_s + self._pause_s - self._clock.monotonic()
+        if rest_s > 0:
+            self._clock.wait(self._no_event, rest_s)
+
     def _connect(self) -> None:
         if not self._client.connect():  # type: ignore[no-untyped-call]
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}")
@@ -74,8 +90,7 @@ class ModbusTcp:
     def _registers(self, reply: ModbusPDU, function: int, count: int) -> tuple[int, ...]:
         """The registers of a reply that fits its request. Raises LineFault for any other."""
         if isinstance(reply, ExceptionResponse):
-            code = reply.exception_code
-            raise LineFault(Quality.DEVICE_ERROR, f"exception {code}, {EXCEPTIONS.get(code, 'unknown')}")
+            raise exception_fault(reply.exception_code)
         if reply.function_code != function:
             raise self._fault(Quality.MISMATCH, f"asked function {function}, got {reply.function_code}")
         if len(reply.registers) != count:

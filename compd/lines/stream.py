@@ -7,6 +7,7 @@ import threading
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
+from compd.lines.echo import is_echo
 from compd.lines.port import Port
 
 SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
@@ -29,10 +30,10 @@ class StreamLine:
     last request, s; -inf before the first.
     """
 
-    def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock) -> None:
+    def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock, echo: bool = False) -> None:
         """`timeout_s`: for the first byte of a reply, and again for the rest beyond its time on the wire.
 
-        `gap_s`: silence before a request, s.
+        `gap_s`: silence before a request, s. `echo`: the adapter repeats every request, which is taken out.
         """
         self.unexpected_bytes = 0
         self.last_request_s = -math.inf
@@ -40,6 +41,9 @@ class StreamLine:
         self._timeout_s = timeout_s
         self._gap_s = gap_s
         self._clock = clock
+        self._echo = echo
+        self._request = b""
+        self._came = b""  # since the request, as many bytes as it has
         self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
@@ -47,12 +51,43 @@ class StreamLine:
     def send(self, request: bytes) -> float:
         """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
 
-        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST.
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST; where an echo is expected, TIMEOUT,
+        INCOMPLETE or MISMATCH for any other.
         """
         self._wait_for_silence()
+        self._request, self._came = request, b""
         self.last_request_s = self._clock.monotonic()
         self._port.write(request)
+        if self._echo:
+            self._take_echo(request)
         return self.last_request_s + len(request) * self._port.character_s
+
+    def pulse_dtr(self, low_s: float) -> float:
+        """Ask by DTR, which is LOW for at least `low_s` (s) and HIGH again; the monotonic time (s) of its beginning.
+
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST also where the port has no DTR.
+        """
+        self._wait_for_silence()
+        self._request = b""
+        self.last_request_s = self._clock.monotonic()
+        self._port.set_dtr(False)
+        try:
+            self._clock.wait(self._no_event, low_s)
+        finally:
+            self._port.set_dtr(True)
+        return self.last_request_s
+
+    def send_break(self, duration_s: float) -> None:
+        """A break of at least `duration_s` (s), once the line is quiet.
+
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST also where the port has no break.
+        """
+        self._wait_for_silence()
+        self._port.set_break(True)
+        try:
+            self._clock.wait(self._no_event, duration_s)
+        finally:
+            self._port.set_break(False)
 
     def listen(self) -> float:
         """Discard what has come so far, without waiting for silence; the monotonic time (s) now.
@@ -104,6 +139,24 @@ class StreamLine:
         """Close the port."""
         self._port.close()
 
+    @property
+    def request_came_back(self) -> bool:
+        """Whether the first bytes that came after the last request are that request: see `compd.lines.echo`."""
+        return not self._echo and is_echo(self._request, self._came)
+
+    def _take_echo(self, request: bytes) -> None:
+        """Receive the request as the adapter repeats it. Raises LineFault."""
+        try:
+            came = self.receive(len(request))
+        except LineFault as fault:
+            if fault.quality is Quality.LINE_LOST:
+                raise
+            text = f"{fault.detail}: the adapter has not repeated the request, as `echo: true` of the line says"
+            raise LineFault(fault.quality, text) from fault
+        if came != request:
+            text = f"{shown(came)} came in place of the echo of {shown(request)}: see `echo` of the line"
+            raise LineFault(Quality.MISMATCH, text)
+
     def _wait_for_silence(self) -> None:
         """Discard what comes until nothing has come for `gap_s`. Raises LineFault: MISMATCH, LINE_LOST."""
         self.unexpected_bytes += len(self._received)
@@ -138,6 +191,8 @@ class StreamLine:
     def _store(self, data: bytes) -> None:
         """Keep bytes that have come, and the time."""
         self._received += data
+        if len(self._came) < len(self._request):
+            self._came += data[: len(self._request) - len(self._came)]
         self._last_byte_s = self._clock.monotonic()
 
     def _take(self, count: int) -> bytes:

@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from compd_drivers.exchange import ExchangeOptions
+from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.reply_format import ReplyFormat, unescape
 
@@ -50,6 +50,9 @@ class SerialAsciiOptions(ExchangeOptions):
     """Options of a described ASCII gauge."""
 
     out: str = Field(default="", description="the request; left out: the device speaks unasked")
+    dtr_pulse_s: Seconds | None = Field(
+        default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
+    )
     out_terminator: str = Field(default="", description="what ends every request")
     in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
     in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
@@ -80,8 +83,10 @@ class SerialAsciiOptions(ExchangeOptions):
         if not self.in_terminator and len(set(description.lengths)) > 1:
             raise ValueError("without `in_terminator` all replies, errors too, must have the same length")
         if not self.out and (self.init or self.echo or self.silent_in_menu):
-            raise ValueError("a device that speaks unasked has no init, echo or silent_in_menu")
-        if not self.out and not self.in_terminator:
+            raise ValueError("a device that speaks unasked, or by DTR, has no init, echo or silent_in_menu")
+        if self.out and self.dtr_pulse_s is not None:
+            raise ValueError("the request is `out` or `dtr_pulse_s`, not both")
+        if not self.out and self.dtr_pulse_s is None and not self.in_terminator:
             raise ValueError("a device that speaks unasked needs an `in_terminator`")
         return self
 

@@ -38,6 +38,7 @@ Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak
       channels: [{name: force, unit: N, scale: 4.4482216152605}]
       errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
+A device that is asked by a pulse of DTR has `dtr_pulse_s` in place of `out`; `line_needs` powers its cable.
 A device that speaks unasked, as the last, has no `out`: its newest whole line counts, never a half one, and its time is
 that at which waiting for it began. `echo` is a second request whose reply looks different: asked before every
 `every`-th poll, it finds a device whose replies are one behind.
@@ -52,11 +53,11 @@ a second time, as those of all gauges are. Other quantities are not: set a parit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.ascii_description import Description, ErrorReply, SerialAsciiOptions
-from compd_drivers.exchange import MenuSilence, nothing_behind, receive, receive_line
+from compd_drivers.exchange import MenuSilence, ask, nothing_behind, receive, receive_line
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 
@@ -105,6 +106,10 @@ class SerialAscii(Gauge[ByteLine]):
     def reply_identity(self) -> str | None:
         return self._description.reply.beginning.decode("latin-1") or None
 
+    @property
+    def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
+        return self._protocol.line_needs
+
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         length = self._description.reply.length
         if length is None or not self._protocol.out:
@@ -143,16 +148,19 @@ class SerialAscii(Gauge[ByteLine]):
     def _poll(self, line: ByteLine) -> tuple[bytes, float]:
         """The reply without its terminator, and the time of asking (s)."""
         form = self._description.reply
+        if self._protocol.dtr_pulse_s is not None:
+            time_s = line.pulse_dtr(self._protocol.dtr_pulse_s)
+            return self._whole(line, form), time_s
         if not self._protocol.out:
             time_s = line.listen()
             self._line(line)  # what is left of the line that was under way
             return self._receive(line, form), time_s
-        time_s = line.send(self._description.request)
+        time_s = ask(line, self._protocol, self._description.request)
         return self._whole(line, form), time_s
 
     def _exchange(self, line: ByteLine, request: bytes, form: ReplyFormat) -> None:
         """One exchange without a value; an error reply to it is a fault of the whole poll."""
-        line.send(request)
+        ask(line, self._protocol, request)
         reply = self._whole(line, form)
         if error := self._error(reply):
             raise LineFault(Quality(error.quality), _shown(reply, error))

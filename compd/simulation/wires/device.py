@@ -26,6 +26,10 @@ class SimulatedByteDevice(ABC):
     def hear(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the reply to complete requests, or b""."""
 
+    def asked_by_dtr(self) -> bytes:
+        """The reply to a pulse of DTR; b"" for a device that is not asked so. A simulated port has no DTR."""
+        return b""
+
 
 class SimulatedRegisterDevice(ABC):
     """Registers of a Modbus slave; the line does the framing."""

@@ -48,8 +48,11 @@ class SimulatedAscii(SimulatedByteDevice):
         self._heard += data
         replies = ""
         while asked := self._next():
-            replies += self._answer(asked)
+            replies += self._answer(self._replies[asked])
         return replies.encode("latin-1")
+
+    def asked_by_dtr(self) -> bytes:
+        return self._answer(self.options.in_).encode("latin-1") if self.options.dtr_pulse_s else b""
 
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""
@@ -62,9 +65,8 @@ class SimulatedAscii(SimulatedByteDevice):
         self._heard = self._heard[requests[first] + len(first) :]
         return first
 
-    def _answer(self, request: bytes) -> str:
+    def _answer(self, form: str) -> str:
         end = plain(self.options.in_terminator)
-        form = self._replies[request]
         words = {}
         for channel in self.options.channels if form == self.options.in_ else ():
             value = self.sense(channel.name)
