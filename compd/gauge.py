@@ -201,7 +201,7 @@ class RegisterReply(NamedTuple):
 
     Attributes
     ----------
-    registers : unsigned 16-bit values, in the order of their addresses.
+    registers : unsigned 16-bit values, or bits (0 or 1), in the order of their addresses.
     time_s : monotonic time (s) at which the request had left: the `time_s` of the readings.
     """
 
@@ -216,6 +216,18 @@ class RegisterLine(Protocol):
         """`count` registers from `address` of the slave `unit`, by function code 3 (holding) or 4 (input).
 
         `address` counts from 0, as on the wire; manuals that write 40001 or 30001 mean address 0.
+        """
+        ...
+
+    def read_bits(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
+        """`count` bits from `address` of the slave `unit`, by function code 1 (coils) or 2 (discrete inputs)."""
+        ...
+
+    def write(self, unit: int, function: int, address: int, values: Sequence[int], settle_s: float = 0.0) -> float:
+        """Write to the slave `unit`, by function code 5 (one coil, 0 or 1), 6 (one register) or 16 (registers).
+
+        Unit 0 of a serial line is all slaves at once, of which none answers. The next request follows after `settle_s`
+        at the earliest. Returns the monotonic time (s) at which the request had left.
         """
         ...
 

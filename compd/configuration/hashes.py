@@ -32,6 +32,14 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "line_needs": {},
     "dtr_pulse_s": None,
     "cable": "duplex",
+    "at_byte": 0,
+    "mask": None,
+    "shift": 0,
+    "minus": None,
+    "function": None,
+    "identity": None,
+    "write_first": [],
+    "write_before_poll": [],
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

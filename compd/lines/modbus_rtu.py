@@ -6,10 +6,12 @@ Source: Modbus over Serial Line V1.02 (frame, CRC, 3.5 characters of silence).
 from __future__ import annotations
 
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_serial import SerialMaster
+from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, SerialMaster
 from compd.lines.stream import shown
 
 SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
+CONFIRMATION = 8  # unit, function, address, what was written, CRC
+WRITES = (WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS)
 
 
 def gap_s(baud: int) -> float:
@@ -45,9 +47,11 @@ def crc16(data: bytes) -> int:
 class RtuMaster(SerialMaster):
     """A `RegisterLine` over a stream of bytes: a serial port, or RTU over TCP. Used by one thread."""
 
-    def _exchange(self, unit: int, message: bytes) -> tuple[float, bytes]:
+    def _send(self, unit: int, message: bytes) -> float:
         request = bytes([unit]) + message
-        time_s = self._stream.send(request + crc16(request).to_bytes(2, "little"))
+        return self._stream.send(request + crc16(request).to_bytes(2, "little"))
+
+    def _receive(self, unit: int) -> bytes:
         frame = self._stream.receive(SHORTEST_FRAME)
         if not frame[1] & 0x80:
             frame += self._receive_rest(frame)
@@ -55,12 +59,12 @@ class RtuMaster(SerialMaster):
             raise LineFault(Quality.CRC, shown(frame))
         if frame[0] != unit:
             raise LineFault(Quality.MISMATCH, f"asked unit {unit}, unit {frame[0]} answered")
-        return time_s, frame[1:-2]
+        return frame[1:-2]
 
     def _receive_rest(self, head: bytes) -> bytes:
-        """The bytes that follow the shortest frame `head`, as many as its byte count says."""
+        """The bytes that follow the shortest frame `head`: as many as its byte count says, or as a write confirms."""
         try:
-            return self._stream.receive(head[2])
+            return self._stream.receive(CONFIRMATION - SHORTEST_FRAME if head[1] in WRITES else head[2])
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT:
                 raise

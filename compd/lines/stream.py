@@ -42,6 +42,7 @@ class StreamLine:
         self._gap_s = gap_s
         self._clock = clock
         self._echo = echo
+        self._left_s = -math.inf  # when the last bit of the last request will have left
         self._request = b""
         self._came = b""  # since the request, as many bytes as it has
         self._no_event = threading.Event()  # never set: the clock waits for it to pause
@@ -57,10 +58,11 @@ class StreamLine:
         self._wait_for_silence()
         self._request, self._came = request, b""
         self.last_request_s = self._clock.monotonic()
+        self._left_s = self.last_request_s + len(request) * self._port.character_s
         self._port.write(request)
         if self._echo:
             self._take_echo(request)
-        return self.last_request_s + len(request) * self._port.character_s
+        return self._left_s
 
     def pulse_dtr(self, low_s: float) -> float:
         """Ask by DTR, which is LOW for at least `low_s` (s) and HIGH again; the monotonic time (s) of its beginning.
@@ -88,6 +90,12 @@ class StreamLine:
             self._clock.wait(self._no_event, duration_s)
         finally:
             self._port.set_break(False)
+
+    def rest_until(self, time_s: float) -> None:
+        """Wait until the monotonic time `time_s` (s), for a device that is busy so long."""
+        rest_s = time_s - self._clock.monotonic()
+        if rest_s > 0:
+            self._clock.wait(self._no_event, rest_s)
 
     def listen(self) -> float:
         """Discard what has come so far, without waiting for silence; the monotonic time (s) now.
@@ -172,7 +180,8 @@ class StreamLine:
         """Wait for a reply's first byte; the time (s) by which the rest must be here, without its time on the wire."""
         if not self._received:
             wait_s = self._timeout_s if timeout_s is None else timeout_s
-            data = self._port.read(wait_s)
+            leaving_s = max(0.0, self._left_s - self._clock.monotonic())  # of a long request, at a low baud rate
+            data = self._port.read(wait_s + leaving_s if wait_s > 0 else 0.0)
             if not data:
                 raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
             self._store(data)

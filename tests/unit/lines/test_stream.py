@@ -117,6 +117,18 @@ def test_drain_waits_for_quiet_and_gives_what_came() -> None:
     assert clock.now_s - start_s == pytest.approx(TIMEOUT_S)
 
 
+def test_the_timeout_begins_when_the_request_has_left() -> None:
+    """A request of 15 bytes takes 0.125 s at 1200 baud, longer than this timeout."""
+    clock = InstantClock()
+    port = ScriptedPort(clock)
+    port.character_s = 10 / 1200
+    line = StreamLine(port, TIMEOUT_S, 0.001, clock)
+    sent_s = line.send(bytes(15))
+    with pytest.raises(LineFault, match=r"no byte within 0\.1 s"):
+        line.receive(1)
+    assert clock.now_s == pytest.approx(sent_s + TIMEOUT_S)
+
+
 def test_a_device_that_is_deaf_after_its_reply_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """`pause_s`: from the reply's last byte to the next request. This one hears nothing for 15 ms."""
     clock = InstantClock()
