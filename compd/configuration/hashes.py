@@ -32,6 +32,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "line_needs": {},
     "dtr_pulse_s": None,
     "cable": "duplex",
+    "decimal_mark": ".",
     "at_byte": 0,
     "mask": None,
     "shift": 0,

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.number_form import DecimalMark
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 # An error form that fits more than this share of so many values of all kinds leaves no value.
@@ -56,6 +57,7 @@ class SerialAsciiOptions(ExchangeOptions):
     out_terminator: str = Field(default="", description="what ends every request")
     in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
     in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
+    decimal_mark: DecimalMark = Field(default=".", description="of every number in the replies")
     channels: tuple[AsciiChannel, ...] = Field(min_length=1, description="the numbers in the reply, in their order")
     errors: tuple[ErrorReply, ...] = Field(
         default=(), description="looked at before the value; the first that fits counts"
@@ -106,11 +108,12 @@ class Description(NamedTuple):
         instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
         if single:
             instead[""] = instead[options.channels[0].name]
+        mark = options.decimal_mark
         for exchange in (*options.init, *([options.echo] if options.echo else [])):
-            _format(exchange.in_)
+            _format(exchange.in_, mark)
         return cls(
-            _format(options.in_, instead),
-            tuple((_format(error.in_), error) for error in options.errors),
+            _format(options.in_, mark, instead),
+            tuple((_format(error.in_, mark), error) for error in options.errors),
             unescape(options.out) + unescape(options.out_terminator),
             unescape(options.in_terminator),
         )
@@ -129,9 +132,9 @@ class Description(NamedTuple):
         return (self.reply.length, *(form.length for form, _ in self.errors))
 
 
-def _format(text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:
+def _format(text: str, mark: DecimalMark, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:
     """ValueError names the text that cannot be read."""
     try:
-        return ReplyFormat(text, instead)
+        return ReplyFormat(text, instead, mark)
     except ValueError as error:
         raise ValueError(f"in {text!r}: {error}") from error

@@ -89,7 +89,10 @@ class SerialAscii(Gauge[ByteLine]):
         self._instead = [{unescape(word): quality for word, quality in c.instead.items()} for c in options.channels]
         terminator = unescape(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
-        self._exchanges = [(unescape(exchange.out) + terminator, ReplyFormat(exchange.in_)) for exchange in exchanges]
+        self._exchanges = [
+            (unescape(exchange.out) + terminator, ReplyFormat(exchange.in_, mark=options.decimal_mark))
+            for exchange in exchanges
+        ]
         forms = [self._description.reply, *(form for _, form in self._exchanges)]
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]

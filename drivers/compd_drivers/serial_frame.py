@@ -85,6 +85,10 @@ class FrameChecksum(DescriptionSection):
 
     def check(self, frame: FrameLayout, key: str) -> None:
         """ValueError where `frame`, the option `key`, has no place for this checksum."""
+        if self.kind == "modbus_lrc":
+            raise ValueError(
+                f"`{key}` has no digits: modbus_lrc is of hexadecimal digits, in bytes it is negative_sum8"
+            )
         length = frame.checksum.stop - frame.checksum.start
         if length != CHECKSUMS[self.kind].length:
             raise ValueError(f"`{key}` has {length} bytes CS, its checksum makes {CHECKSUMS[self.kind].length}")
