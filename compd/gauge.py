@@ -180,6 +180,15 @@ class ByteLine(Protocol):
         """
         ...
 
+    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+        """The next whole line of a device that sends unasked, at its full rate, without `terminator`.
+
+        Also returns its `time_s`: when the line before it began, which is read too where nothing is known of it. More
+        than `limit` bytes raise MISMATCH. `timeout_s` is for the first byte, and must be longer than the device's
+        period. Where lines come faster than they are asked for, the newest counts.
+        """
+        ...
+
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. `timeout_s` is for the first byte; None is the line's own timeout."""
         ...

@@ -33,6 +33,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "dtr_pulse_s": None,
     "cable": "duplex",
     "decimal_mark": ".",
+    "requests": [],
     "at_byte": 0,
     "mask": None,
     "shift": 0,

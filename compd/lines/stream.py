@@ -42,6 +42,8 @@ class StreamLine:
         self._gap_s = gap_s
         self._clock = clock
         self._echo = echo
+        self._next_line_s = math.nan  # before it the next line of a device that sends unasked is not sampled, s
+        self._looks_s = (-math.inf, -math.inf)  # when the last two looks for bytes began
         self._left_s = -math.inf  # when the last bit of the last request will have left
         self._request = b""
         self._came = b""  # since the request, as many bytes as it has
@@ -103,12 +105,35 @@ class StreamLine:
         Raises LineFault: MISMATCH when bytes come faster than they are read, LINE_LOST.
         """
         self._received.clear()
+        self._next_line_s = math.nan
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(0.0):
             self._last_byte_s = self._clock.monotonic()
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"more comes than can be read: {shown(data)}")
         return self._clock.monotonic()
+
+    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+        """The next line of a device that sends unasked, without `terminator`, and its `time_s`: see `ByteLine`.
+
+        Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
+        """
+        time_s = self._next_line_s
+        if not math.isnan(time_s):
+            self._look(0.0)
+            if self._received.count(terminator) > 1:  # more than one has come since the last: they are old
+                time_s = math.nan
+        if math.isnan(time_s):
+            time_s = self.listen()
+            self._line_until(terminator, limit, timeout_s)  # what is left of the line under way
+        self._next_line_s = math.nan
+        line, ended_s = self._line_until(terminator, limit, timeout_s)
+        looked_s = self._clock.monotonic()
+        self._look(0.0)
+        if not self._received:  # the line after it has not begun by now
+            ended_s = looked_s
+        self._next_line_s = ended_s - (len(line) + len(terminator)) * self._port.character_s
+        return line, time_s
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
@@ -137,6 +162,7 @@ class StreamLine:
         """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
         quiet_s = self._timeout_s if quiet_s is None else quiet_s
         dropped = self._take(len(self._received))
+        self._next_line_s = math.nan
         until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
         while (data := self._port.read(quiet_s)) and self._clock.monotonic() < until_s:
             dropped += data
@@ -169,12 +195,34 @@ class StreamLine:
         """Discard what comes until nothing has come for `gap_s`. Raises LineFault: MISMATCH, LINE_LOST."""
         self.unexpected_bytes += len(self._received)
         self._received.clear()
+        self._next_line_s = math.nan
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(self._last_byte_s + self._gap_s - self._clock.monotonic()):
             self._last_byte_s = self._clock.monotonic()
             self.unexpected_bytes += len(data)
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"the line is never quiet: {shown(data)}")
+
+    def _look(self, wait_s: float) -> bool:
+        """Receive what has come, or comes within `wait_s` (s); whether that was anything."""
+        self._looks_s = (self._looks_s[1], self._clock.monotonic())
+        data = self._port.read(wait_s)
+        if data:
+            self._store(data)
+        return bool(data)
+
+    def _line_until(self, terminator: bytes, limit: int, timeout_s: float | None) -> tuple[bytes, float]:
+        """A line without `terminator`, and a time (s) before which its last byte had not come. Raises LineFault."""
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        while (end := self._received.find(terminator)) < 0:
+            if len(self._received) >= limit:
+                raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._received))}")
+            if not self._look(self._timeout_s if self._received else wait_s):
+                if not self._received:
+                    raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
+                raise LineFault(Quality.INCOMPLETE, f"only {shown(bytes(self._received))}")
+        # the look before the last one has taken all that had come by then
+        return self._take(end + len(terminator))[:end], self._looks_s[0]
 
     def _wait_for_first_byte(self, timeout_s: float | None) -> float:
         """Wait for a reply's first byte; the time (s) by which the rest must be here, without its time on the wire."""

@@ -36,8 +36,10 @@ class SimulatedAscii(SimulatedByteDevice):
         end = plain(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
         self._replies = {(plain(exchange.out) + end).encode("latin-1"): exchange.in_ for exchange in exchanges}
-        if options.out:
-            self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
+        self._forms = [options.in_, *(request.in_ for request in options.requests)]  # of replies with values
+        for out, form in [(options.out, options.in_), *((request.out, request.in_) for request in options.requests)]:
+            if out:
+                self._replies[(plain(out) + end).encode("latin-1")] = form
         self._heard = b""
 
     @property
@@ -70,7 +72,9 @@ class SimulatedAscii(SimulatedByteDevice):
     def _answer(self, form: str) -> str:
         end = plain(self.options.in_terminator)
         words = {}
-        for channel in self.options.channels if form == self.options.in_ else ():
+        for channel in self.options.channels if form in self._forms else ():
+            if f"({channel.name})" not in form and self.options.requests:
+                continue
             value = self.sense(channel.name)
             if not math.isfinite(value):
                 word = next((word for word, meant in channel.instead.items() if meant == "sensor_fault"), None)
@@ -129,7 +133,7 @@ class SimulatedAscii(SimulatedByteDevice):
 
     def _number(self, name: str, form: str) -> str:
         value = self._scaled(name)
-        for token in TOKEN.finditer(plain(self.options.in_)):
+        for token in TOKEN.finditer(plain("".join(self._forms))):
             if token[11] is not None and (token[8] or name) == name:
                 value /= self._factor(name, token[11])[1]
         width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)

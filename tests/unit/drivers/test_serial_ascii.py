@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
+from compd.commissioning.conformance.report import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality, Reading
 from compd.lines.stream import StreamLine
 from compd_drivers.checksums import CHECKSUMS
@@ -405,6 +407,147 @@ def test_the_age_of_what_comes_unasked_is_never_understated() -> None:
     device = gauge(**{"out": "", "out_terminator": "", "in": "%f", "channels": [{"name": "t", "unit": "degC"}]})
     assert device.read(line)[0].time_s == began_s
     assert port.written == []
+
+
+# --- several requests in one gauge ---------------------------------------------------------------------------
+
+PROBES: dict[str, Any] = {
+    "out": "",
+    "requests": [{"out": f"M{k}", "in": f"%(p{k})+08.4f"} for k in (1, 2, 3)],
+    "channels": [{"name": f"p{k}", "unit": "mm"} for k in (3, 1, 2)],
+    "errors": [{"in": "ERR%*1d", "quality": "sensor_fault"}],
+}
+
+
+def test_each_value_has_its_own_request_and_time() -> None:
+    device = gauge(**PROBES)
+    values = {"p1": 1.0, "p2": -2.0, "p3": 3.5}
+    far_end = SimulatedAscii(device.options, values.__getitem__)
+    line, port = line_with(device=far_end.hear)
+    readings = device.read(line)
+    assert [reading.value for reading in readings] == [3.5, 1.0, -2.0], "in the order of the channels"
+    assert port.written == [b"M1\r", b"M2\r", b"M3\r"]
+    p3, p1, p2 = (reading.time_s for reading in readings)
+    assert p1 < p2 < p3
+    assert device.traffic() == [(3, 10)] * 3
+
+
+def test_an_error_to_one_request_leaves_the_others_their_values() -> None:
+    answers = {b"M1\r": b"+01.0000\r\n", b"M2\r": b"ERR0\r\n", b"M3\r": b"+03.0000\r\n"}
+    line, _ = line_with(device=answers.__getitem__)
+    readings = gauge(**PROBES).read(line)
+    assert [reading.quality for reading in readings] == [Quality.OK, Quality.OK, Quality.SENSOR_FAULT]
+
+
+def test_a_reply_to_another_request_is_no_value_where_replies_say_whose_they_are() -> None:
+    named = [{"out": f"M{k}", "in": f"{k}:%(p{k})+08.4f"} for k in (1, 2, 3)]
+    device = gauge(**{**PROBES, "requests": named})
+    line, _ = line_with(device=lambda request: b"1:+01.0000\r\n")
+    with pytest.raises(LineFault) as caught:
+        device.read(line)
+    assert caught.value.quality is Quality.MISMATCH
+
+
+def test_what_all_replies_begin_with_is_whose_they_are() -> None:
+    unit_2 = [{"out": f"2M{k}", "in": f"2,{k}:%(p{k})+08.4f"} for k in (1, 2, 3)]
+    assert gauge(**{**PROBES, "requests": unit_2}).reply_identity == "2,"
+    assert gauge(**PROBES).reply_identity is None
+
+
+@pytest.mark.parametrize(
+    ("keys", "problem"),
+    [
+        ({"out": "?"}, "there is no `out`"),
+        ({"in": "%(p1)f"}, "either `in` or `requests`"),
+        ({"requests": []}, "either `in` or `requests`"),
+        ({"requests": PROBES["requests"][:2]}, r"no %\(p3\)f"),
+        ({"requests": [*PROBES["requests"], {"out": "M4", "in": "%(p1)f"}]}, "p1 stands in several replies"),
+        ({"requests": [{"out": "M1", "in": "%f"}]}, "without name|has no"),
+    ],
+)
+def test_requests_that_cannot_be_are_refused(keys: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        gauge(**{**PROBES, **keys})
+
+
+def test_several_requests_on_wires_that_go_wrong() -> None:
+    options = {**PROBES, "out_terminator": r"\r", "in_terminator": r"\r\n"}
+    results = list(run_conformance(driver_under_test("serial_ascii", options), on_real_wires=False))
+    assert [result for _, result in results if result.verdict == "FAIL"] == []
+
+
+class TalkingPort(ScriptedPort):
+    """A device that sends a number every `period_s`, byte by byte; its sensor is read when a line begins."""
+
+    character_s = 1e-3
+
+    def __init__(self, clock: InstantClock, period_s: float) -> None:
+        super().__init__(clock)
+        self._talk_clock = clock
+        self._period_s = period_s
+        self._read_s = clock.now_s
+
+    def line(self, number: int) -> bytes:
+        return f"{number:+08.1f}\r\n".encode()
+
+    def begins_s(self, number: int) -> float:
+        return 100.0 + number * self._period_s
+
+    def read(self, timeout_s: float) -> bytes:
+        clock, until_s = self._talk_clock, self._talk_clock.now_s + max(0.0, timeout_s)
+        came, due_s = b"", self._read_s
+        number = max(0, int((self._read_s - 100.0) / self._period_s) - 1)
+        while self.begins_s(number) <= until_s:
+            for place, byte in enumerate(self.line(number), start=1):
+                at_s = self.begins_s(number) + place * self.character_s
+                if self._read_s < at_s <= (clock.now_s if came else until_s):
+                    came, due_s = came + bytes([byte]), at_s
+                    clock.now_s = max(clock.now_s, at_s)
+            number += 1
+        if came:
+            self._read_s = due_s
+        else:
+            clock.now_s = until_s
+        return came
+
+
+UNASKED = {"out": "", "out_terminator": "", "in": "%+08.1f", "channels": [{"name": "t", "unit": "degC"}]}
+
+
+@pytest.mark.parametrize("period_s", [0.011, 0.02, 0.1])
+def test_a_talker_is_read_at_its_full_rate(period_s: float) -> None:
+    clock = InstantClock()
+    port = TalkingPort(clock, period_s)
+    line = StreamLine(port, 0.3, 0.002, clock)
+    device = gauge(**UNASKED)
+    values = []
+    for _ in range(20):
+        (reading,) = device.read(line)
+        values.append(int(reading.value))
+        assert reading.time_s <= port.begins_s(int(reading.value)), "its age is never understated"
+        assert clock.now_s - reading.time_s < 2.5 * period_s + 0.02
+    assert values == list(range(values[0], values[0] + 20)), "not one line is left out"
+
+
+def test_of_a_talker_that_is_seldom_asked_the_newest_line_counts() -> None:
+    clock = InstantClock()
+    port = TalkingPort(clock, 0.02)
+    line = StreamLine(port, 0.3, 0.002, clock)
+    device = gauge(**UNASKED)
+    for _ in range(5):
+        (reading,) = device.read(line)
+        assert clock.now_s - reading.time_s < 0.06
+        assert reading.time_s <= port.begins_s(int(reading.value))
+        clock.now_s += 0.5
+
+
+def test_a_talker_that_is_slower_than_the_timeout_is_told_so() -> None:
+    clock = InstantClock()
+    line = StreamLine(TalkingPort(clock, 1.0), 0.3, 0.002, clock)
+    with pytest.raises(LineFault, match="`reply_timeout_s` must be longer than the period"):
+        gauge(**UNASKED).read(line)
+    patient = gauge(**UNASKED, reply_timeout_s=1.5)
+    assert patient.read(line)[0].ok
 
 
 def test_a_device_that_stops_speaking() -> None:
