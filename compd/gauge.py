@@ -161,10 +161,31 @@ class ByteLine(Protocol):
         """
         ...
 
+    def pulse_dtr(self, low_s: float) -> float:
+        """Ask by DTR, which is LOW for at least `low_s` (s), and HIGH again.
+
+        Returns the monotonic time (s) at which it became LOW: the `time_s` of the readings in the reply. LINE_LOST also
+        where the port has no DTR.
+        """
+        ...
+
+    def send_break(self, duration_s: float) -> None:
+        """A break of at least `duration_s` (s) on the line, for devices that want one before a request."""
+        ...
+
     def listen(self) -> float:
         """Discard what has arrived so far, of a device that sends unasked.
 
         Returns the monotonic time (s): the `time_s` of the readings that are received next.
+        """
+        ...
+
+    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+        """The next whole line of a device that sends unasked, at its full rate, without `terminator`.
+
+        Also returns its `time_s`: when the line before it began, which is read too where nothing is known of it. More
+        than `limit` bytes raise MISMATCH. `timeout_s` is for the first byte, and must be longer than the device's
+        period. Where lines come faster than they are asked for, the newest counts.
         """
         ...
 
@@ -189,7 +210,7 @@ class RegisterReply(NamedTuple):
 
     Attributes
     ----------
-    registers : unsigned 16-bit values, in the order of their addresses.
+    registers : unsigned 16-bit values, or bits (0 or 1), in the order of their addresses.
     time_s : monotonic time (s) at which the request had left: the `time_s` of the readings.
     """
 
@@ -204,6 +225,18 @@ class RegisterLine(Protocol):
         """`count` registers from `address` of the slave `unit`, by function code 3 (holding) or 4 (input).
 
         `address` counts from 0, as on the wire; manuals that write 40001 or 30001 mean address 0.
+        """
+        ...
+
+    def read_bits(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
+        """`count` bits from `address` of the slave `unit`, by function code 1 (coils) or 2 (discrete inputs)."""
+        ...
+
+    def write(self, unit: int, function: int, address: int, values: Sequence[int], settle_s: float = 0.0) -> float:
+        """Write to the slave `unit`, by function code 5 (one coil, 0 or 1), 6 (one register) or 16 (registers).
+
+        Unit 0 of a serial line is all slaves at once, of which none answers. The next request follows after `settle_s`
+        at the earliest. Returns the monotonic time (s) at which the request had left.
         """
         ...
 
@@ -309,6 +342,14 @@ class Gauge(ABC, Generic[LineT]):
         request: see `replies_tell_whose`. Register lines tell replies apart themselves.
         """
         return None
+
+    @property
+    def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
+        """State of DTR and RTS (True is HIGH) from which the device or its cable takes its power; {} where it does not.
+
+        Its line is opened so, where the line's own keys `dtr` and `rts` are left out.
+        """
+        return {}
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         """(bytes sent, bytes received) of every exchange that one `read` makes, for planning lines; None = unknown.

@@ -294,10 +294,11 @@ class _RepeatedReply:
         self._waiting = self._reply
         return 0.0
 
-    def listen(self) -> float:
-        """A device that speaks unasked is heard from the middle of a line on."""
-        self._waiting = 2 * self._reply
-        return 0.0
+    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+        """A device that speaks unasked says it again and again."""
+        if not self._waiting:
+            self._waiting = self._reply
+        return self.receive_until(terminator, limit)[: -len(terminator)], 0.0
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         if len(self._waiting) < count:

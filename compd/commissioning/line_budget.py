@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from compd.configuration import Configuration
 from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
@@ -71,8 +71,9 @@ def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = No
 def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
     """A configured line's pace. Behind socket:// the device server's baud rate counts: it is the configured one."""
     if isinstance(line, SerialLine | ModbusRtuLine):
-        return serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
-    return Pace(0.0, 0.0, TCP_EXCHANGE_S if turnaround_s is None else max(turnaround_s, TCP_EXCHANGE_S))
+        serial = serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
+        return replace(serial, quiet_s=max(serial.quiet_s, line.pause_s))
+    return Pace(0.0, line.pause_s, TCP_EXCHANGE_S if turnaround_s is None else max(turnaround_s, TCP_EXCHANGE_S))
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from pydantic import ValidationError
 
 from compd.clock import Clock
 from compd.configuration import load as load_configuration
-from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
+from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine, powered
 from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
 from compd.lines import Line, open_line, open_stream
+from compd.lines.echo import explained
 from compd.lines.port import Port
 from compd.lines.stream import StreamLine
 from compd.plugins import GAUGES, load
@@ -56,7 +57,13 @@ def gauge_of_configuration(path: Path, name: str | None) -> GaugeTarget:
             )
         )
     options = configuration.gauges[name]
-    return GaugeTarget(name, configuration.drivers[name](options), configuration.lines[options.line])
+    on_line = [
+        configuration.drivers[other](other_options)
+        for other, other_options in configuration.gauges.items()
+        if other_options.line == options.line
+    ]
+    line = powered(configuration.lines[options.line], on_line)
+    return GaugeTarget(name, configuration.drivers[name](options), line)
 
 
 def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]) -> GaugeTarget:
@@ -86,7 +93,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    return GaugeTarget(driver, gauge, line_settings(port, kind.line_kind == "registers"))
+    return GaugeTarget(driver, gauge, powered(line_settings(port, kind.line_kind == "registers"), [gauge]))
 
 
 def line_settings(port: PortArguments, registers: bool) -> LineSettings:
@@ -162,6 +169,12 @@ class TappedPort:
         self._listener(">", data)
         self._port.write(data)
 
+    def set_dtr(self, high: bool) -> None:
+        self._port.set_dtr(high)
+
+    def set_break(self, on: bool) -> None:
+        self._port.set_break(on)
+
     def close(self) -> None:
         self._port.close()
 
@@ -183,6 +196,8 @@ def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Seq
     line = open_tapped_line(target.line, clock, listener)
     try:
         return target.gauge.read(line)
+    except LineFault as fault:
+        raise explained(fault, line) from fault
     finally:
         line.close()
 
@@ -202,7 +217,8 @@ def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator
                 if line is None:
                     line = open_line(target.line, clock)
                 yield target.gauge.read(line)
-            except LineFault as fault:
+            except LineFault as raised:
+                fault = raised if line is None else explained(raised, line)
                 yield [bad(clock.monotonic(), fault.quality, fault.detail)] * len(target.gauge.channels)
                 line = _line_after_fault(line, fault)
                 if line is None:

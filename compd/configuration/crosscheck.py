@@ -39,6 +39,7 @@ def problems(sections: Sections) -> list[Problem]:
     return [
         *_port_problems(sections),
         *_line_problems(sections),
+        *_power_problems(sections),
         *_process_problems(sections),
         *_channel_problems(sections),
         *_completeness_problems(sections),
@@ -141,6 +142,30 @@ def _line_problems(sections: Sections) -> Iterator[Problem]:
                 value=f"{line_name} (kind {kind})",
                 allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
+
+
+def _power_problems(sections: Sections) -> Iterator[Problem]:
+    """A line whose DTR or RTS is not as a gauge on it needs it for its power."""
+    needed: dict[tuple[str, str], tuple[str, bool]] = {}
+    for name, options in sections.gauges.items():
+        line = sections.lines.get(options.line)
+        for pin, high in sections.drivers[name](options).line_needs.items():
+            by, wanted = needed.setdefault((options.line, pin), (name, high))
+            set_to = getattr(line, pin, None)
+            against = ""
+            if set_to not in (None, high):
+                against = f"`{pin}: {str(set_to).lower()}` of line `{options.line}`"
+            elif pin == "rts" and getattr(line, "rs485", None) is not None:
+                against = f"`rs485` of line `{options.line}`"
+            elif wanted != high:
+                against = f"gauge `{by}` on line `{options.line}`"
+            if against:
+                yield Problem(
+                    where=sections.document.where(("gauges", name)),
+                    what=f"is powered from {pin.upper()}, which {against} sets otherwise",
+                    allowed=f"{pin}: {str(high).lower()}",
+                    next_step="remove the line's key, or give the gauge a line of its own",
+                )
 
 
 def _process_problems(sections: Sections) -> Iterator[Problem]:

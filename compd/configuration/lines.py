@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from compd.configuration.section import Positive, Section, Text
+from compd.configuration.section import Positive, Section, Text, refusal
+from compd.gauge import Gauge
 
+AnyLine = TypeVar("AnyLine", bound="_LineSettings")
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 
 
@@ -16,9 +20,24 @@ class _LineSettings(Section):
     back_off_s: tuple[Positive, Positive] = Field(
         default=(0.5, 10.0), description="wait after a lost line: first and longest, doubling between"
     )
-    poll_every_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = Field(
+    poll_every_s: NotNegative = Field(
         default=0.0, description="time from one round to the next; 0 = as fast as the line goes"
     )
+    pause_s: NotNegative = Field(
+        default=0.0, description="from a reply to the next request, for devices that are deaf after a reply"
+    )
+
+
+class Rs485(Section):
+    """RTS as the direction of a two-wire RS-485 line, for adapters that do not switch it themselves."""
+
+    rts_when_sending: bool = Field(default=True, description="RTS is HIGH while a request is sent, else LOW; or not")
+    delay_before_s: NotNegative = Field(default=0.0, description="from the switch of RTS to the request")
+    delay_after_s: NotNegative = Field(default=0.0, description="from the request's end to the switch of RTS")
+
+
+_ECHO = "the adapter repeats every request (two-wire RS-485): take that out"
+_URL_HAS_NONE = "a device server has these lines only behind rfc2217://host:port, and switches RS-485 itself"
 
 
 class _SerialSettings(_LineSettings):
@@ -28,6 +47,27 @@ class _SerialSettings(_LineSettings):
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
     low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")
+    echo: bool = Field(default=False, description=_ECHO)
+    dtr: bool | None = Field(
+        default=None, description="DTR while the line is open: true is HIGH; left out: what its gauges need, else HIGH"
+    )
+    rts: bool | None = Field(
+        default=None, description="RTS while the line is open: true is HIGH; left out: what its gauges need, else HIGH"
+    )
+    rs485: Rs485 | None = Field(
+        default=None, description="RTS switches the direction of a two-wire line; left out: the adapter does it itself"
+    )
+
+    @model_validator(mode="after")
+    def _has_these_lines(self) -> Self:
+        if self.rs485 is not None and self.rts is not None:
+            raise refusal("`rts` and `rs485` contradict each other", "one of them", "remove `rts`")
+        url = self.port.partition("://")[0] if "://" in self.port else ""
+        if self.rs485 is not None and url:
+            raise refusal("`rs485` needs a port of this computer", _URL_HAS_NONE, "remove `rs485`, set it there")
+        if (self.dtr is not None or self.rts is not None) and url == "socket":
+            raise refusal("`dtr` and `rts` need a serial port", _URL_HAS_NONE, "remove them, or write rfc2217://")
+        return self
 
 
 _HOST = "name or address of the device or of the serial device server"
@@ -45,12 +85,18 @@ class TcpLine(_LineSettings):
     kind: Literal["tcp"] = Field(description="bytes over TCP")
     host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="TCP port of the device")
+    echo: bool = Field(default=False, description=_ECHO)
 
 
 class ModbusRtuLine(_SerialSettings):
     """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
 
     kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
+    ask_one_more: bool = Field(
+        default=True,
+        description="ask for a register more every second time, so that a late reply has another length; a slave that "
+        "refuses it, or is silent, is not asked again: switch it off for one that does worse",
+    )
 
 
 class ModbusTcpLine(_LineSettings):
@@ -59,6 +105,16 @@ class ModbusTcpLine(_LineSettings):
     kind: Literal["modbus_tcp"] = Field(description="Modbus TCP registers")
     host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(default=502, description="TCP port of the device")
+
+
+def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
+    """The line with DTR and RTS as its gauges need them, where its own keys leave them open."""
+    if not isinstance(line, _SerialSettings) or line.port.startswith("socket://"):
+        return line
+    needs: dict[str, bool] = {
+        name: high for gauge in gauges for name, high in gauge.line_needs.items() if getattr(line, name) is None
+    }
+    return line.model_copy(update=needs)
 
 
 LineSettings = Annotated[SerialLine | TcpLine | ModbusRtuLine | ModbusTcpLine, Field(discriminator="kind")]

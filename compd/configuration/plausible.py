@@ -76,6 +76,7 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "a line that is gone would be opened without a pause",
         "a cable that is plugged in again would be found only after that time",
     ),
+    PlausibleRange("lines.*.pause_s", 0, 1, "s", "", "devices are deaf for milliseconds after a reply"),
     PlausibleRange("lines.*.poll_every_s", 0, 60, "s", "", "readings would be a minute old and more"),
     PlausibleRange(
         "gauges.*.stale_after_s", 0.005, 600, "s",

@@ -10,6 +10,8 @@ from __future__ import annotations
 import logging
 import math
 import struct
+import threading
+from collections.abc import Callable, Mapping, Sequence
 
 from pymodbus.client import ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
@@ -17,7 +19,7 @@ from pymodbus.pdu import ExceptionResponse, ModbusPDU
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
-from compd.lines.modbus_rtu import EXCEPTIONS
+from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, exception_fault
 
 # Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one as well.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
@@ -29,12 +31,19 @@ class ModbusTcp:
 
     last_request_s = -math.inf  # not noted: a reply names its request
     unexpected_bytes = 0  # pymodbus drops them by their transaction number, uncounted
+    request_came_back = False  # TCP has no echo
 
-    def __init__(self, host: str, port: int, timeout_s: float, clock: Clock) -> None:
-        """Connect within `timeout_s`. Raises LineFault (LINE_LOST) when the device cannot be reached."""
+    def __init__(self, host: str, port: int, timeout_s: float, clock: Clock, pause_s: float = 0.0) -> None:
+        """Connect within `timeout_s`. `pause_s`: from a reply to the next request, s.
+
+        Raises LineFault (LINE_LOST) when the device cannot be reached.
+        """
         self._where = f"{host}:{port}"
         self._timeout_s = timeout_s
         self._clock = clock
+        self._pause_s = pause_s
+        self._last_reply_s = -math.inf
+        self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._client = ModbusTcpClient(host, port=port, timeout=timeout_s, retries=0)
         self._connect()
 
@@ -43,21 +52,42 @@ class ModbusTcp:
 
         Raises LineFault: TIMEOUT, MISMATCH, DEVICE_ERROR (with the exception's name), LINE_LOST.
         """
-        if not self._client.connected:
-            self._connect()
         read = self._client.read_holding_registers if function == 3 else self._client.read_input_registers
-        time_s = self._clock.monotonic()
-        try:
-            reply = read(address, count=count, device_id=unit)
-        except ConnectionException as error:
-            raise self._fault(Quality.LINE_LOST, str(error)) from error
-        except ModbusIOException as error:
-            raise self._fault(Quality.TIMEOUT, f"no answer to this request within {self._timeout_s:g} s") from error
-        except (ModbusException, struct.error, IndexError, ValueError) as error:
-            raise self._fault(Quality.MISMATCH, f"not to be decoded: {error}") from error
-        except OSError as error:
-            raise self._fault(Quality.LINE_LOST, str(error)) from error
-        return RegisterReply(self._registers(reply, function, count), time_s)
+        time_s, reply = self._asked(function, lambda: read(address, count=count, device_id=unit))
+        if len(reply.registers) != count:
+            raise self._fault(Quality.MISMATCH, f"asked {count} registers, got {len(reply.registers)}")
+        return RegisterReply(tuple(reply.registers), time_s)
+
+    def read_bits(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
+        """`count` bits from `address` of slave `unit` by function 1 or 2. Raises LineFault as `read_registers` does."""
+        read = self._client.read_coils if function == 1 else self._client.read_discrete_inputs
+        time_s, reply = self._asked(function, lambda: read(address, count=count, device_id=unit))
+        if len(reply.bits) != 8 * -(-count // 8):  # whole bytes
+            raise self._fault(Quality.MISMATCH, f"asked {count} bits, got {len(reply.bits)}")
+        return RegisterReply(tuple(map(int, reply.bits[:count])), time_s)
+
+    def write(self, unit: int, function: int, address: int, values: Sequence[int], settle_s: float = 0.0) -> float:
+        """Write by function 5, 6 or 16; see `RegisterLine`. Over TCP unit 0 is a device like any other.
+
+        Raises LineFault as `read_registers` does.
+        """
+        client = self._client
+        first = values[0]
+        writes: Mapping[int, Callable[[], ModbusPDU]] = {
+            WRITE_COIL: lambda: client.write_coil(address, bool(first), device_id=unit),
+            WRITE_REGISTER: lambda: client.write_register(address, first, device_id=unit),
+            WRITE_REGISTERS: lambda: client.write_registers(address, list(values), device_id=unit),
+        }
+        time_s, reply = self._asked(function, writes[function])
+        confirmed = {
+            WRITE_COIL: list(map(int, reply.bits[:1])) == [int(bool(first))],
+            WRITE_REGISTER: list(reply.registers) == [first],
+            WRITE_REGISTERS: reply.count == len(values),
+        }
+        if reply.address != address or not confirmed[function]:
+            raise self._fault(Quality.MISMATCH, f"wrote {list(values)} to {address}, something else was confirmed")
+        self._wait_until(time_s + settle_s)
+        return time_s
 
     def drain(self, quiet_s: float | None = None) -> bytes:
         """Nothing: after a fault the connection is a new one."""
@@ -67,20 +97,37 @@ class ModbusTcp:
         """Close the connection."""
         self._client.close()  # type: ignore[no-untyped-call]
 
+    def _wait_until(self, time_s: float) -> None:
+        rest_s = time_s - self._clock.monotonic()
+        if rest_s > 0:
+            self._clock.wait(self._no_event, rest_s)
+
     def _connect(self) -> None:
         if not self._client.connect():  # type: ignore[no-untyped-call]
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}")
 
-    def _registers(self, reply: ModbusPDU, function: int, count: int) -> tuple[int, ...]:
-        """The registers of a reply that fits its request. Raises LineFault for any other."""
+    def _asked(self, function: int, ask: Callable[[], ModbusPDU]) -> tuple[float, ModbusPDU]:
+        """One exchange: its time, s, and a reply of the same function. Raises LineFault for any other."""
+        if not self._client.connected:
+            self._connect()
+        self._wait_until(self._last_reply_s + self._pause_s)
+        time_s = self._clock.monotonic()
+        try:
+            reply = ask()
+        except ConnectionException as error:
+            raise self._fault(Quality.LINE_LOST, str(error)) from error
+        except ModbusIOException as error:
+            raise self._fault(Quality.TIMEOUT, f"no answer to this request within {self._timeout_s:g} s") from error
+        except (ModbusException, struct.error, IndexError, ValueError) as error:
+            raise self._fault(Quality.MISMATCH, f"not to be decoded: {error}") from error
+        except OSError as error:
+            raise self._fault(Quality.LINE_LOST, str(error)) from error
+        self._last_reply_s = self._clock.monotonic()
         if isinstance(reply, ExceptionResponse):
-            code = reply.exception_code
-            raise LineFault(Quality.DEVICE_ERROR, f"exception {code}, {EXCEPTIONS.get(code, 'unknown')}")
+            raise exception_fault(reply.exception_code)
         if reply.function_code != function:
             raise self._fault(Quality.MISMATCH, f"asked function {function}, got {reply.function_code}")
-        if len(reply.registers) != count:
-            raise self._fault(Quality.MISMATCH, f"asked {count} registers, got {len(reply.registers)}")
-        return tuple(reply.registers)
+        return time_s, reply
 
     def _fault(self, quality: Quality, detail: str) -> LineFault:
         """Close the connection, and make the fault to raise."""

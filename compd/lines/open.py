@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Literal, Protocol
 
 from compd.clock import Clock
+from compd.lines.control_lines import ControlLines, Rs485Settings
 from compd.lines.modbus_rtu import RtuMaster, gap_s
 from compd.lines.modbus_tcp import ModbusTcp
 from compd.lines.port import Port, SerialPort, TcpPort
@@ -27,11 +28,14 @@ def _unchanged(port: Port) -> Port:
     return port
 
 
-class SerialSettings(Protocol):
-    """The keys of a serial line in the configuration that are needed to open it."""
-
+class _Pause(Protocol):
     @property
-    def kind(self) -> Literal["serial", "modbus_rtu"]: ...
+    def timeout_s(self) -> float: ...
+    @property
+    def pause_s(self) -> float: ...
+
+
+class _Serial(_Pause, Protocol):
     @property
     def port(self) -> str: ...
     @property
@@ -41,16 +45,36 @@ class SerialSettings(Protocol):
     @property
     def low_latency(self) -> bool: ...
     @property
-    def timeout_s(self) -> float: ...
+    def echo(self) -> bool: ...
+    @property
+    def dtr(self) -> bool | None: ...
+    @property
+    def rts(self) -> bool | None: ...
+    @property
+    def rs485(self) -> Rs485Settings | None: ...
 
 
-class _Address(Protocol):
+class SerialSettings(_Serial, Protocol):
+    """The keys of a serial line in the configuration that are needed to open it."""
+
+    @property
+    def kind(self) -> Literal["serial"]: ...
+
+
+class ModbusSerialSettings(_Serial, Protocol):
+    """The keys of a Modbus line on a serial port in the configuration that are needed to open it."""
+
+    @property
+    def kind(self) -> Literal["modbus_rtu"]: ...
+    @property
+    def ask_one_more(self) -> bool: ...
+
+
+class _Address(_Pause, Protocol):
     @property
     def host(self) -> str: ...
     @property
     def port(self) -> int: ...
-    @property
-    def timeout_s(self) -> float: ...
 
 
 class TcpSettings(_Address, Protocol):
@@ -58,6 +82,8 @@ class TcpSettings(_Address, Protocol):
 
     @property
     def kind(self) -> Literal["tcp"]: ...
+    @property
+    def echo(self) -> bool: ...
 
 
 class ModbusTcpSettings(_Address, Protocol):
@@ -67,31 +93,36 @@ class ModbusTcpSettings(_Address, Protocol):
     def kind(self) -> Literal["modbus_tcp"]: ...
 
 
-def open_line(
-    settings: SerialSettings | TcpSettings | ModbusTcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged
-) -> Line:
+StreamSettings = SerialSettings | ModbusSerialSettings | TcpSettings
+
+
+def open_line(settings: StreamSettings | ModbusTcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> Line:
     """Open a line of the settings' kind. After a LineFault with LINE_LOST, `close()` it and open a new one.
 
     wrap_port : as in `open_stream`; the port of Modbus TCP is within pymodbus and stays as it is.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
     if settings.kind == "modbus_tcp":
-        return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock)
+        return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock, settings.pause_s)
     stream = open_stream(settings, clock, wrap_port)
-    return RtuMaster(stream) if settings.kind == "modbus_rtu" else stream
+    return RtuMaster(stream, settings.ask_one_more) if settings.kind == "modbus_rtu" else stream
 
 
-def open_stream(settings: SerialSettings | TcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> StreamLine:
+def open_stream(settings: StreamSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> StreamLine:
     """Open the stream of bytes of a line, whatever protocol is spoken over it.
 
     wrap_port : puts another port around the line's own, for instance one that shows every byte.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
     if settings.kind == "tcp":
-        connection = TcpPort(settings.host, settings.port, settings.timeout_s)
-        return StreamLine(wrap_port(connection), settings.timeout_s, TCP_GAP_S, clock)
-    port = SerialPort(settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s)
-    quiet_s = max(QUIET_CHARACTERS * port.character_s, SERIAL_GAP_S)
+        port: Port = TcpPort(settings.host, settings.port, settings.timeout_s)
+        quiet_s = TCP_GAP_S
+    else:
+        control = ControlLines(settings.dtr, settings.rts, settings.rs485)
+        port = SerialPort(
+            settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s, control
+        )
+        quiet_s = max(QUIET_CHARACTERS * port.character_s, SERIAL_GAP_S)
     if settings.kind == "modbus_rtu":
         quiet_s = max(quiet_s, gap_s(settings.baud))
-    return StreamLine(wrap_port(port), settings.timeout_s, quiet_s, clock)
+    return StreamLine(wrap_port(port), settings.timeout_s, max(quiet_s, settings.pause_s), clock, settings.echo)

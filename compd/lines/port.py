@@ -16,6 +16,7 @@ import serial
 import structlog
 
 from compd.gauge import LineFault, Quality
+from compd.lines.control_lines import ControlLines
 
 log = structlog.get_logger()
 
@@ -39,18 +40,35 @@ class Port(Protocol):
         """Write all of `data`."""
         ...
 
+    def set_dtr(self, high: bool) -> None:
+        """Set DTR. Raises LineFault (LINE_LOST) where the port has none."""
+        ...
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break. Raises LineFault (LINE_LOST) where the port has none."""
+        ...
+
     def close(self) -> None:
         """Close the port, which is of no further use."""
         ...
 
 
 class SerialPort:
-    """A serial port. All its parameters are set when it is opened, and never changed."""
+    """A serial port. All its parameters are set when it is opened; only DTR and break change while it is open."""
 
-    def __init__(self, port: str, baud: int, form: str, low_latency: bool, write_timeout_s: float) -> None:
+    def __init__(
+        self,
+        port: str,
+        baud: int,
+        form: str,
+        low_latency: bool,
+        write_timeout_s: float,
+        control: ControlLines = ControlLines(),  # noqa: B008  a NamedTuple of None
+    ) -> None:
         """`port`: device path or pyserial URL; `form`: data bits, parity and stop bits, as "8N1" or "7E2".
 
-        `write_timeout_s`: how long the port may take no byte, s; not watched over rfc2217://.
+        `write_timeout_s`: how long the port may take no byte, s; not watched over rfc2217://. `control`: DTR, RTS and
+        the direction of RS-485; a device without them is opened all the same, and the log says so.
 
         Raises LineFault (LINE_LOST) when it cannot be opened.
         """
@@ -65,7 +83,10 @@ class SerialPort:
                 stopbits=stop_bits,
                 timeout=SLICE_S,
                 exclusive=True if is_device else None,
+                do_not_open=True,
             )
+            control.prepare(self._port)
+            self._port.open()
         except Exception as error:  # of a URL, it is anything that its handler or the network raises
             raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error or type(error).__name__}") from error
         # Behind a URL the device server sets the baud rate, and the time of a character is unknown here.
@@ -79,6 +100,8 @@ class SerialPort:
                     self._check_parity()
                 if low_latency:
                     self._ask_low_latency(port)
+                if refused := control.check(self._port):
+                    log.warning("DTR, RTS or RS-485 not granted", port=port, reason=refused)
             except PORT_FAULTS as error:
                 self._port.close()
                 raise LineFault(Quality.LINE_LOST, f"cannot set up {port}: {error}") from error
@@ -142,6 +165,18 @@ class SerialPort:
                 continue
         return data
 
+    def set_dtr(self, high: bool) -> None:
+        try:
+            self._port.dtr = high
+        except PORT_FAULTS as error:
+            raise LineFault(Quality.LINE_LOST, f"no DTR on this port: {error}") from error
+
+    def set_break(self, on: bool) -> None:
+        try:
+            self._port.break_condition = on
+        except PORT_FAULTS as error:
+            raise LineFault(Quality.LINE_LOST, f"no break on this port: {error}") from error
+
     def close(self) -> None:
         try:
             self._port.close()
@@ -180,6 +215,12 @@ class TcpPort:
             self._socket.sendall(data)
         except OSError as error:
             raise LineFault(Quality.LINE_LOST, f"write: {error}") from error
+
+    def set_dtr(self, high: bool) -> None:
+        raise LineFault(Quality.LINE_LOST, "a TCP connection has no DTR: use a serial port, or rfc2217://")
+
+    def set_break(self, on: bool) -> None:
+        raise LineFault(Quality.LINE_LOST, "a TCP connection has no break: use a serial port, or rfc2217://")
 
     def close(self) -> None:
         self._socket.close()

@@ -7,6 +7,7 @@ import threading
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
+from compd.lines.echo import is_echo
 from compd.lines.port import Port
 
 SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
@@ -29,10 +30,10 @@ class StreamLine:
     last request, s; -inf before the first.
     """
 
-    def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock) -> None:
+    def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock, echo: bool = False) -> None:
         """`timeout_s`: for the first byte of a reply, and again for the rest beyond its time on the wire.
 
-        `gap_s`: silence before a request, s.
+        `gap_s`: silence before a request, s. `echo`: the adapter repeats every request, which is taken out.
         """
         self.unexpected_bytes = 0
         self.last_request_s = -math.inf
@@ -40,6 +41,12 @@ class StreamLine:
         self._timeout_s = timeout_s
         self._gap_s = gap_s
         self._clock = clock
+        self._echo = echo
+        self._next_line_s = math.nan  # before it the next line of a device that sends unasked is not sampled, s
+        self._looks_s = (-math.inf, -math.inf)  # when the last two looks for bytes began
+        self._left_s = -math.inf  # when the last bit of the last request will have left
+        self._request = b""
+        self._came = b""  # since the request, as many bytes as it has
         self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
@@ -47,12 +54,50 @@ class StreamLine:
     def send(self, request: bytes) -> float:
         """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
 
-        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST.
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST; where an echo is expected, TIMEOUT,
+        INCOMPLETE or MISMATCH for any other.
         """
         self._wait_for_silence()
+        self._request, self._came = request, b""
         self.last_request_s = self._clock.monotonic()
+        self._left_s = self.last_request_s + len(request) * self._port.character_s
         self._port.write(request)
-        return self.last_request_s + len(request) * self._port.character_s
+        if self._echo:
+            self._take_echo(request)
+        return self._left_s
+
+    def pulse_dtr(self, low_s: float) -> float:
+        """Ask by DTR, which is LOW for at least `low_s` (s) and HIGH again; the monotonic time (s) of its beginning.
+
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST also where the port has no DTR.
+        """
+        self._wait_for_silence()
+        self._request = b""
+        self.last_request_s = self._clock.monotonic()
+        self._port.set_dtr(False)
+        try:
+            self._clock.wait(self._no_event, low_s)
+        finally:
+            self._port.set_dtr(True)
+        return self.last_request_s
+
+    def send_break(self, duration_s: float) -> None:
+        """A break of at least `duration_s` (s), once the line is quiet.
+
+        Raises LineFault: MISMATCH when the line is never quiet, LINE_LOST also where the port has no break.
+        """
+        self._wait_for_silence()
+        self._port.set_break(True)
+        try:
+            self._clock.wait(self._no_event, duration_s)
+        finally:
+            self._port.set_break(False)
+
+    def rest_until(self, time_s: float) -> None:
+        """Wait until the monotonic time `time_s` (s), for a device that is busy so long."""
+        rest_s = time_s - self._clock.monotonic()
+        if rest_s > 0:
+            self._clock.wait(self._no_event, rest_s)
 
     def listen(self) -> float:
         """Discard what has come so far, without waiting for silence; the monotonic time (s) now.
@@ -60,12 +105,35 @@ class StreamLine:
         Raises LineFault: MISMATCH when bytes come faster than they are read, LINE_LOST.
         """
         self._received.clear()
+        self._next_line_s = math.nan
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(0.0):
             self._last_byte_s = self._clock.monotonic()
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"more comes than can be read: {shown(data)}")
         return self._clock.monotonic()
+
+    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+        """The next line of a device that sends unasked, without `terminator`, and its `time_s`: see `ByteLine`.
+
+        Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
+        """
+        time_s = self._next_line_s
+        if not math.isnan(time_s):
+            self._look(0.0)
+            if self._received.count(terminator) > 1:  # more than one has come since the last: they are old
+                time_s = math.nan
+        if math.isnan(time_s):
+            time_s = self.listen()
+            self._line_until(terminator, limit, timeout_s)  # what is left of the line under way
+        self._next_line_s = math.nan
+        line, ended_s = self._line_until(terminator, limit, timeout_s)
+        looked_s = self._clock.monotonic()
+        self._look(0.0)
+        if not self._received:  # the line after it has not begun by now
+            ended_s = looked_s
+        self._next_line_s = ended_s - (len(line) + len(terminator)) * self._port.character_s
+        return line, time_s
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
@@ -94,6 +162,7 @@ class StreamLine:
         """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
         quiet_s = self._timeout_s if quiet_s is None else quiet_s
         dropped = self._take(len(self._received))
+        self._next_line_s = math.nan
         until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
         while (data := self._port.read(quiet_s)) and self._clock.monotonic() < until_s:
             dropped += data
@@ -104,10 +173,29 @@ class StreamLine:
         """Close the port."""
         self._port.close()
 
+    @property
+    def request_came_back(self) -> bool:
+        """Whether the first bytes that came after the last request are that request: see `compd.lines.echo`."""
+        return not self._echo and is_echo(self._request, self._came)
+
+    def _take_echo(self, request: bytes) -> None:
+        """Receive the request as the adapter repeats it. Raises LineFault."""
+        try:
+            came = self.receive(len(request))
+        except LineFault as fault:
+            if fault.quality is Quality.LINE_LOST:
+                raise
+            text = f"{fault.detail}: the adapter has not repeated the request, as `echo: true` of the line says"
+            raise LineFault(fault.quality, text) from fault
+        if came != request:
+            text = f"{shown(came)} came in place of the echo of {shown(request)}: see `echo` of the line"
+            raise LineFault(Quality.MISMATCH, text)
+
     def _wait_for_silence(self) -> None:
         """Discard what comes until nothing has come for `gap_s`. Raises LineFault: MISMATCH, LINE_LOST."""
         self.unexpected_bytes += len(self._received)
         self._received.clear()
+        self._next_line_s = math.nan
         give_up_s = self._clock.monotonic() + self._timeout_s
         while data := self._port.read(self._last_byte_s + self._gap_s - self._clock.monotonic()):
             self._last_byte_s = self._clock.monotonic()
@@ -115,11 +203,33 @@ class StreamLine:
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"the line is never quiet: {shown(data)}")
 
+    def _look(self, wait_s: float) -> bool:
+        """Receive what has come, or comes within `wait_s` (s); whether that was anything."""
+        self._looks_s = (self._looks_s[1], self._clock.monotonic())
+        data = self._port.read(wait_s)
+        if data:
+            self._store(data)
+        return bool(data)
+
+    def _line_until(self, terminator: bytes, limit: int, timeout_s: float | None) -> tuple[bytes, float]:
+        """A line without `terminator`, and a time (s) before which its last byte had not come. Raises LineFault."""
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        while (end := self._received.find(terminator)) < 0:
+            if len(self._received) >= limit:
+                raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._received))}")
+            if not self._look(self._timeout_s if self._received else wait_s):
+                if not self._received:
+                    raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
+                raise LineFault(Quality.INCOMPLETE, f"only {shown(bytes(self._received))}")
+        # the look before the last one has taken all that had come by then
+        return self._take(end + len(terminator))[:end], self._looks_s[0]
+
     def _wait_for_first_byte(self, timeout_s: float | None) -> float:
         """Wait for a reply's first byte; the time (s) by which the rest must be here, without its time on the wire."""
         if not self._received:
             wait_s = self._timeout_s if timeout_s is None else timeout_s
-            data = self._port.read(wait_s)
+            leaving_s = max(0.0, self._left_s - self._clock.monotonic())  # of a long request, at a low baud rate
+            data = self._port.read(wait_s + leaving_s if wait_s > 0 else 0.0)
             if not data:
                 raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
             self._store(data)
@@ -138,6 +248,8 @@ class StreamLine:
     def _store(self, data: bytes) -> None:
         """Keep bytes that have come, and the time."""
         self._received += data
+        if len(self._came) < len(self._request):
+            self._came += data[: len(self._request) - len(self._came)]
         self._last_byte_s = self._clock.monotonic()
 
     def _take(self, count: int) -> bytes:

@@ -20,6 +20,7 @@ import structlog
 
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
+from compd.configuration.lines import powered
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.votes.votes import Votes
@@ -218,9 +219,13 @@ class Daemon:
         configuration = self.configuration
         trust = length_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
+        on_line = {
+            line: [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line]
+            for line in configuration.lines
+        }
         lines = {
-            line: (settings, [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line])
-            for line, settings in configuration.lines.items()
+            line: (powered(configuration.lines[line], [gauge for _, gauge in named]), named)
+            for line, named in on_line.items()
         }
         stale_after_s = {
             name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s

@@ -14,7 +14,8 @@ from pydantic.fields import FieldInfo
 from compd.gauge import Unit
 from compd_drivers.linearisation import Linearisation
 from compd_drivers.measured import DescriptionSection
-from compd_drivers.modbus import Address, Function, RegisterType, Status
+from compd_drivers.modbus_description import Address, Status
+from compd_drivers.modbus_number import NumberType
 
 INPUTS = 8  # of every module that is described here
 
@@ -57,7 +58,7 @@ class AnalogueInput(DescriptionSection):
 class AnalogueData(DescriptionSection):
     """How the module gives an input's signal."""
 
-    type: RegisterType = Field(description="how the number is stored")
+    type: NumberType = Field(description="how the number is stored")
     counts: tuple[int, int] | None = Field(
         default=None, description="raw numbers at the lower and the upper end of the range; left out: V or mA itself"
     )
@@ -92,7 +93,7 @@ class AnalogueData(DescriptionSection):
 class AnalogueModule(DescriptionSection):
     """The registers of a module of eight inputs."""
 
-    function: Function = Field(description="3: holding registers, 4: input registers")
+    function: Literal[3, 4] = Field(description="3: holding registers, 4: input registers")
     address: Address = Field(description="register of input 0, from 0")
     step: int = Field(default=1, ge=1, description="registers from one input to the next")
     status: Status | None = Field(default=None, description="status register of input 0; the others follow one by one")

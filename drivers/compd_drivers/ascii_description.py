@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from compd_drivers.exchange import ExchangeOptions
+from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
+from compd_drivers.number_form import DecimalMark
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 # An error form that fits more than this share of so many values of all kinds leaves no value.
@@ -40,6 +41,13 @@ class Exchange(DescriptionSection):
     in_: str = Field(alias="in", description="what the reply looks like, without its terminator")
 
 
+class ValueRequest(DescriptionSection):
+    """One of several requests, and its reply with values in it."""
+
+    out: str = Field(min_length=1, description="the request, without its terminator")
+    in_: str = Field(alias="in", min_length=1, description="what the reply looks like, without its terminator")
+
+
 class Echo(Exchange):
     """A request whose reply cannot be mistaken for a measurement."""
 
@@ -50,9 +58,16 @@ class SerialAsciiOptions(ExchangeOptions):
     """Options of a described ASCII gauge."""
 
     out: str = Field(default="", description="the request; left out: the device speaks unasked")
+    dtr_pulse_s: Seconds | None = Field(
+        default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
+    )
     out_terminator: str = Field(default="", description="what ends every request")
-    in_: str = Field(alias="in", min_length=1, description="what the reply looks like")
+    in_: str = Field(alias="in", default="", description="what the reply looks like")
+    requests: tuple[ValueRequest, ...] = Field(
+        default=(), description="in place of `out` and `in`: requests that are made one after the other in every poll"
+    )
     in_terminator: str = Field(description='what ends every reply; "": the reply has a fixed length')
+    decimal_mark: DecimalMark = Field(default=".", description="of every number in the replies")
     channels: tuple[AsciiChannel, ...] = Field(min_length=1, description="the numbers in the reply, in their order")
     errors: tuple[ErrorReply, ...] = Field(
         default=(), description="looked at before the value; the first that fits counts"
@@ -63,35 +78,71 @@ class SerialAsciiOptions(ExchangeOptions):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
+        problems = [*self._request_problems()]
+        if not problems:
+            description = Description.of(self)
+            problems += [*self._number_problems(description), *self._length_problems(description)]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    def _request_problems(self) -> Iterator[str]:
+        if bool(self.in_) == bool(self.requests):
+            yield "needs either `in` or `requests`"
+        if self.requests and self.out:
+            yield "with `requests` there is no `out`"
+        if self.asked and self.dtr_pulse_s is not None:
+            yield "the request is `out` or `dtr_pulse_s`, not both"
+        if not self.asked and (self.init or self.echo or self.silent_in_menu):
+            yield "a device that speaks unasked, or by DTR, has no init, echo or silent_in_menu"
+        if not self.asked and self.dtr_pulse_s is None and not self.in_terminator:
+            yield "a device that speaks unasked needs an `in_terminator`"
+
+    def _number_problems(self, description: Description) -> Iterator[str]:
         names = [channel.name for channel in self.channels]
         if doubled := repeated(names):
-            raise ValueError(f"channel named twice: {doubled}")
-        description = Description.of(self)
-        numbers = description.reply.channels
-        if numbers != ("",) or len(names) > 1:
+            yield f"channel named twice: {doubled}"
+        numbers = [number for poll in description.polls for number in poll.reply.channels]
+        if numbers != [""] or len(names) > 1:
             if missing := [name for name in names if name not in numbers]:
-                raise ValueError(f"`in` has no %({missing[0]})f")
+                yield f"`in` has no %({missing[0]})f"
             if unknown := [number for number in numbers if number not in names]:
-                raise ValueError(f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}")
+                yield f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}"
+            if doubled := repeated(numbers):
+                yield f"channel {doubled or 'without name'} stands in several replies"
         if shadowed := description.error_like_a_value():
-            raise ValueError(f"error {shadowed!r} fits nearly every value of the form {self.in_!r}")
+            yield "error {!r} fits nearly every value of the form {!r}".format(*shadowed)
+
+    def _length_problems(self, description: Description) -> Iterator[str]:
         if not self.in_terminator and None in description.lengths:
-            raise ValueError("without `in_terminator` every reply must have a fixed length: give every width")
-        if not self.in_terminator and len(set(description.lengths)) > 1:
-            raise ValueError("without `in_terminator` all replies, errors too, must have the same length")
-        if not self.out and (self.init or self.echo or self.silent_in_menu):
-            raise ValueError("a device that speaks unasked has no init, echo or silent_in_menu")
-        if not self.out and not self.in_terminator:
-            raise ValueError("a device that speaks unasked needs an `in_terminator`")
-        return self
+            yield "without `in_terminator` every reply must have a fixed length: give every width"
+        elif not self.in_terminator and len(set(description.lengths)) > 1:
+            yield "without `in_terminator` all replies, errors too, must have the same length"
+
+    @property
+    def asked(self) -> bool:
+        """Whether the device is asked by bytes."""
+        return bool(self.out or self.requests)
+
+    @property
+    def values(self) -> tuple[tuple[str, str], ...]:
+        """Each request with values in its reply, without terminator, and what the reply looks like."""
+        return tuple((request.out, request.in_) for request in self.requests) or ((self.out, self.in_),)
+
+
+class PollForm(NamedTuple):
+    """One request as bytes, b"" where the device is not asked by any, and its reply."""
+
+    request: bytes
+    reply: ReplyFormat
+    text: str
 
 
 class Description(NamedTuple):
     """The options' texts, ready for use."""
 
-    reply: ReplyFormat
+    polls: tuple[PollForm, ...]
     errors: tuple[tuple[ReplyFormat, ErrorReply], ...]
-    request: bytes
     terminator: bytes
 
     @classmethod
@@ -101,32 +152,36 @@ class Description(NamedTuple):
         instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
         if single:
             instead[""] = instead[options.channels[0].name]
+        mark = options.decimal_mark
         for exchange in (*options.init, *([options.echo] if options.echo else [])):
-            _format(exchange.in_)
+            _format(exchange.in_, mark)
         return cls(
-            _format(options.in_, instead),
-            tuple((_format(error.in_), error) for error in options.errors),
-            unescape(options.out) + unescape(options.out_terminator),
+            tuple(
+                PollForm(unescape(out) + unescape(options.out_terminator), _format(form, mark, instead), form)
+                for out, form in options.values
+            ),
+            tuple((_format(error.in_, mark), error) for error in options.errors),
             unescape(options.in_terminator),
         )
 
-    def error_like_a_value(self) -> str:
-        """The first error form that fits nearly every value; "" if there is none."""
-        values = list(self.reply.samples(SAMPLED_VALUES)) if self.errors else []
-        for form, error in self.errors:
-            if sum(form.match(value) is not None for value in values) > NEARLY_EVERY * len(values):
-                return error.in_
-        return ""
+    def error_like_a_value(self) -> tuple[str, str] | None:
+        """The first error form that fits nearly every value of a reply, and that reply's form."""
+        for poll in self.polls if self.errors else ():
+            values = list(poll.reply.samples(SAMPLED_VALUES))
+            for form, error in self.errors:
+                if sum(form.match(value) is not None for value in values) > NEARLY_EVERY * len(values):
+                    return error.in_, poll.text
+        return None
 
     @property
     def lengths(self) -> tuple[int | None, ...]:
         """Of every reply the device may give."""
-        return (self.reply.length, *(form.length for form, _ in self.errors))
+        return tuple(form.length for form in (*(poll.reply for poll in self.polls), *(form for form, _ in self.errors)))
 
 
-def _format(text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:
+def _format(text: str, mark: DecimalMark, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:
     """ValueError names the text that cannot be read."""
     try:
-        return ReplyFormat(text, instead)
+        return ReplyFormat(text, instead, mark)
     except ValueError as error:
         raise ValueError(f"in {text!r}: {error}") from error

@@ -22,6 +22,17 @@ class ExchangeOptions(GaugeOptions):
         default="error",
         description="bytes behind a reply: a fault, or nothing to do with it (a gauge alone on its line)",
     )
+    break_s: Seconds | None = Field(default=None, description="length of the break before every request, if it has one")
+    line_needs: dict[Literal["dtr", "rts"], bool] = Field(
+        default={}, description="DTR and RTS that power its cable: {dtr: true, rts: false} is HIGH and LOW"
+    )
+
+
+def ask(line: ByteLine, options: ExchangeOptions, request: bytes) -> float:
+    """Send a request, behind a break where there is one; its time, s. Raises LineFault as the line does."""
+    if options.break_s is not None:
+        line.send_break(options.break_s)
+    return line.send(request)
 
 
 def receive(line: ByteLine, options: ExchangeOptions, count: int) -> bytes:

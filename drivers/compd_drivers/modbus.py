@@ -1,6 +1,6 @@
 """Generic Modbus gauge: a register map in the configuration; Modbus RTU, TCP and RTU over TCP.
 
-Source of the protocol: Modbus Application Protocol V1.1b3, functions 3 and 4 (M). No comparator with a complete
+Source of the protocol: Modbus Application Protocol V1.1b3, functions 1 to 6 and 16 (M). No comparator with a complete
 public register map was found, so the map is yours, out of your module's manual; for example (M: manual, C: code)
 
     ICP DAS M-7017C (M)       function 4, address 0-7, int16
@@ -9,86 +9,40 @@ public register map was found, so the map is yours, out of your module's manual;
                               2 over, 3 under
     R4DCB08 (C)               function 3, address 0-7, int16, scale 0.1, unit degC, invalid [-32768]
 
-These four are presets too (icpdas_m7017c, adam_4017p, moxa_e1240, r4dcb08). A module that sends V or mA gets a
+A number may be part of its registers: a Beckhoff IP5209 (M) has its status in the low byte of the first register, and
+the 24 bits of its counter in the other three bytes
+    {name: position, function: 3, address: 0, type: uint24, word_order: low_first, unit: mm, scale: 0.001,
+     status: {address: 0, mask: 0x0C}}
+`write_first` switches the unit or starts the device, `write_before_poll` latches; `identity` makes sure that it is this
+device. What is written is confirmed by the device, or the poll has failed.
+
+The four modules are presets too (icpdas_m7017c, adam_4017p, moxa_e1240, r4dcb08). A module that sends V or mA gets a
 `linearisation` per channel: `scale` and `offset` lead to V or mA, the linearisation from there to `unit`.
 """
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
-from pydantic import Field, model_validator
+from compd.gauge import (
+    Channel,
+    Gauge,
+    GaugeOptions,
+    LineFault,
+    Quality,
+    Reading,
+    RegisterLine,
+    RegisterReply,
+    bad,
+    good,
+)
+from compd_drivers.measured import not_measured
+from compd_drivers.modbus_description import ModbusChannel, ModbusOptions, ModbusWrite, Status
+from compd_drivers.modbus_number import FLOATS, READ_BITS, decode
 
-from compd.gauge import Channel, Gauge, GaugeOptions, Quality, Reading, RegisterLine, Unit, bad, good
-from compd_drivers.linearisation import Linearisation
-from compd_drivers.measured import DescriptionSection, not_measured, repeated
-
-Address = Annotated[int, Field(ge=0, le=0xFFFF)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Function = Literal[3, 4]
-RegisterType = Literal["int16", "uint16", "int32", "uint32", "float32"]
-# One less than Modbus allows: the RTU master wants to ask for one more.
-MOST_REGISTERS = 124
-
-_FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
-
-
-class Status(DescriptionSection):
-    """A register that says whether a channel's value counts."""
-
-    address: Address = Field(description="of the status register; read by the channel's own function")
-    ok: tuple[int, ...] = Field(default=(0,), description="values that mean: good")
-    over_range: tuple[int, ...] = Field(default=(), description="values that mean: over range")
-    under_range: tuple[int, ...] = Field(default=(), description="values that mean: under range")
-
-
-class ModbusChannel(DescriptionSection):
-    """One value in the register map: value = raw x scale + offset."""
-
-    name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
-    function: Function = Field(description="3: holding registers, 4: input registers")
-    address: Address = Field(description="first register as on the wire, from 0")
-    type: RegisterType = Field(description="how the number is stored")
-    word_order: Literal["high_first", "low_first"] = Field(
-        default="high_first", description="of a number in two registers"
-    )
-    byte_order: Literal["big", "little"] = Field(default="big", description="inside a register; big is Modbus's own")
-    scale: Number = Field(default=1.0, description="unit (or V, mA) per count; negative turns the sign")
-    offset: Number = Field(default=0.0, description="in the channel's unit")
-    unit: Unit = Field(description="of the value after scale, offset and linearisation")
-    invalid: tuple[Number, ...] = Field(default=(), description="raw values that mean: no sensor, broken wire")
-    over_range: tuple[Number, ...] = Field(default=(), description="raw values that mean: at or above full scale")
-    under_range: tuple[Number, ...] = Field(default=(), description="raw values that mean: at or below zero scale")
-    linearisation: Linearisation | None = Field(default=None, description="from V or mA, after scale, to `unit`")
-    lowest: Number | None = Field(default=None, description="smallest value that the sensor can deliver, in its unit")
-    highest: Number | None = Field(default=None, description="greatest value that the sensor can deliver, in its unit")
-    status: Status | None = Field(default=None, description="register that says whether the value counts")
-
-    @property
-    def length(self) -> int:
-        """Registers that the number takes."""
-        return 1 if self.type in {"int16", "uint16"} else 2
-
-    @model_validator(mode="after")
-    def _ends_inside(self) -> Self:
-        if self.address + self.length > 0x10000:
-            raise ValueError("ends beyond register 65535")
-        return self
-
-
-class ModbusOptions(GaugeOptions):
-    """Options of a Modbus gauge."""
-
-    unit: int = Field(ge=0, le=247, description="slave address (0 only behind some TCP devices)")
-    channels: tuple[ModbusChannel, ...] = Field(min_length=1, description="the register map")
-
-    @model_validator(mode="after")
-    def _names_differ(self) -> Self:
-        if doubled := repeated([channel.name for channel in self.channels]):
-            raise ValueError(f"channel named twice: {doubled}")
-        return self
+# Less than Modbus allows: a serial master wants to ask for more.
+MOST_REGISTERS, MOST_BITS = 124, 1992
 
 
 class RegisterBlock(NamedTuple):
@@ -140,33 +94,69 @@ class Modbus(Gauge[RegisterLine]):
 
     def __init__(self, options: ModbusOptions) -> None:
         super().__init__(options)
+        self._description = options
         self._unit = options.unit
         self._map = options.channels
         self._channels = tuple(Channel(channel.name, channel.unit) for channel in options.channels)
-        spans = [(c.function, c.address, c.length) for c in self._map]
-        spans += [(c.function, c.status.address, 1) for c in self._map if c.status]
+        spans: list[tuple[int, int, int]] = [(c.function, c.address, c.length) for c in self._map]
+        spans += [(c.status_function, c.status.address, 1) for c in self._map if c.status]
         self.blocks = blocks(spans)
         self._values = [self._place(c.function, c.address, c.length) for c in self._map]
-        self._statuses = [self._place(c.function, c.status.address, 1) if c.status else None for c in self._map]
+        self._statuses = [self._place(c.status_function, c.status.address, 1) if c.status else None for c in self._map]
+        self._ready_on: RegisterLine | None = None  # the connection on which it is known and started
 
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
 
     def traffic(self) -> Sequence[tuple[int, int]]:
-        return [(8, 5 + 2 * block.length) for block in self.blocks]
+        writes = [
+            (8 if len(write.values) == 1 else 9 + 2 * len(write.values), 0 if self._unit_of(write) == 0 else 8)
+            for write in self._description.write_before_poll
+        ]
+        return writes + [(8, 5 + _data_bytes(block)) for block in self.blocks]
 
     def read(self, line: RegisterLine) -> Sequence[Reading]:
-        """Raises LineFault as the line does: a block that cannot be read leaves the whole gauge without values."""
-        replies = [line.read_registers(self._unit, *block) for block in self.blocks]
+        """Raises LineFault as the line does: a block that cannot be read leaves the whole gauge without values.
+
+        MISMATCH for another device than the one that the description names.
+        """
+        if self._ready_on is not line:
+            self._begin(line)
+        self._ready_on = None  # until all has gone well
+        latched_s = [self._write(line, write) for write in self._description.write_before_poll]
+        replies = [self._read_block(line, block) for block in self.blocks]
+        self._ready_on = line
         readings = []
         for channel, value, status in zip(self._map, self._values, self._statuses, strict=True):
-            registers, time_s = replies[value.block]
+            registers, read_s = replies[value.block]
             status_value = replies[status.block].registers[status.first] if status else None
+            time_s = latched_s[-1] if latched_s else read_s
             readings.append(
                 _reading(channel, registers[value.first : value.first + channel.length], status_value, time_s)
             )
         return readings
+
+    def _begin(self, line: RegisterLine) -> None:
+        """Make sure that it is this device, then write what it needs. Raises LineFault."""
+        if identity := self._description.identity:
+            place = (self._unit, identity.function, identity.address)
+            registers, _ = line.read_registers(*place, len(identity.equals))
+            if registers != identity.equals:
+                text = f"registers from {identity.address} are {list(registers)}, not {list(identity.equals)}"
+                raise LineFault(Quality.MISMATCH, f"another device than `identity` says: {text}")
+        for write in self._description.write_first:
+            self._write(line, write)
+
+    def _unit_of(self, write: ModbusWrite) -> int:
+        return self._unit if write.unit is None else write.unit
+
+    def _write(self, line: RegisterLine, write: ModbusWrite) -> float:
+        return line.write(self._unit_of(write), write.function, write.address, write.values, write.settle_s)
+
+    def _read_block(self, line: RegisterLine, block: RegisterBlock) -> RegisterReply:
+        read = line.read_bits if block.function in READ_BITS else line.read_registers
+        return read(self._unit, *block)
 
     def _place(self, function: int, address: int, length: int) -> _RegisterPlace:
         return next(
@@ -184,24 +174,35 @@ def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[RegisterBlock, ...]:
         if reads and reads[-1].function == function and address <= reads[-1].address + reads[-1].length:
             last = reads[-1]
             covered = max(end - last.address, last.length)
-            if covered <= MOST_REGISTERS:
+            if covered <= (MOST_BITS if function in READ_BITS else MOST_REGISTERS):
                 reads[-1] = RegisterBlock(function, last.address, covered)
                 continue
         reads.append(RegisterBlock(function, address, length))
     return tuple(reads)
 
 
+def _data_bytes(block: RegisterBlock) -> int:
+    """Bytes of data in the reply."""
+    return -(-block.length // 8) if block.function in READ_BITS else 2 * block.length
+
+
 def _reading(channel: ModbusChannel, registers: tuple[int, ...], status_value: int | None, time_s: float) -> Reading:
-    if channel.status is not None and status_value is not None and status_value not in channel.status.ok:
-        return bad(time_s, _status_quality(channel.status, status_value), f"status {status_value}")
+    if channel.status is not None and status_value is not None:
+        if channel.status.mask is not None:
+            status_value &= channel.status.mask
+        if status_value not in channel.status.ok:
+            return bad(time_s, _status_quality(channel.status, status_value), f"status {status_value}")
     raw = decode(channel, registers)
+    if raw is None:
+        digits = " ".join(f"{register:04X}" for register in registers)
+        return bad(time_s, Quality.MISMATCH, f"{digits} are no decimal digits, see `type` and `mask`")
     if raw in channel.invalid:
         return bad(time_s, Quality.SENSOR_FAULT, f"raw value {raw:g}")
     if raw in channel.over_range:
         return bad(time_s, Quality.OVER_RANGE, f"raw value {raw:g}")
     if raw in channel.under_range:
         return bad(time_s, Quality.UNDER_RANGE, f"raw value {raw:g}")
-    if channel.type == "float32" and not_measured(raw):
+    if channel.type in FLOATS and not_measured(raw):
         return bad(time_s, Quality.MISMATCH, _other_orders(channel, registers, raw))
     value = raw * channel.scale + channel.offset
     reading = channel.linearisation.reading(value, time_s) if channel.linearisation else good(value, time_s)
@@ -226,16 +227,8 @@ def _other_orders(channel: ModbusChannel, registers: Sequence[int], raw: float) 
         for inside in ("big", "little")
     ]
     others = ", ".join(
-        f"{decode(other, registers):.7g} ({other.word_order}, {other.byte_order})"
+        f"{decode(other, registers) or 0.0:.7g} ({other.word_order}, {other.byte_order})"
         for other in orders
         if other != channel
     )
     return f"byte order? {raw:.4g} ({channel.word_order}, {channel.byte_order}) is no measurement; others: {others}"
-
-
-def decode(channel: ModbusChannel, registers: Sequence[int]) -> float:
-    """The raw number in a channel's registers (unsigned, as on the wire)."""
-    words = registers if channel.word_order == "high_first" else registers[::-1]
-    data = b"".join(word.to_bytes(2, channel.byte_order) for word in words)
-    (raw,) = struct.unpack(_FORMATS[channel.type], data)
-    return float(raw)

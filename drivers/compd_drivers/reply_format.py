@@ -7,21 +7,25 @@ Everything is literal but a backslash and a percent sign:
     %f                    number with a decimal point:   +12.345   -.5   "   1.0"
     %+09.4f               exactly as printf prints it: 9 characters, 4 of them decimals, sign always
     %d   %+06d            whole number, without or with its exact width
-    %e                    number with an exponent:  +1.2345E-03
+    %e   %.0e             number with an exponent:  +1.2345E-03  1E-3;  with no decimals: only the latter
     %x   %4x              hexadecimal number, without sign
     %+4x                  hexadecimal number in two's complement of its width: FFFF is -1
     %(name)f              the number of channel `name`; the name may be left out where there is one channel
+    %(name){mm=1|um=0.001}  one of these words, before or behind the number, which it multiplies: its unit
+    %(name){+=1|-=-1}     its sign, which then does not stand in the number
     %*5c   %*s            skip five characters; skip what is not blank
     %*[<>=]   %*2[0-9]    skip one or more (or exactly two) characters out of a set
     %*?[<>= ]             skip any number of them, also none
     %<sum8>   %0<xor8>    checksum of all before it, as bytes, or as hexadecimal digits;
-    %1<sum8>   %01<xor8>  leaving out the first byte
+    %#<sum100>            as decimal digits;
+    %1<sum8>   %01<xor8>  leaving out the first byte; %01.1<xor8>: the first and the last one (NMEA's $ and *)
 
 Give width and decimals wherever the manual shows them: a digit lost on the wire is then found.
 A width counts characters, blanks and sign included; leading zeros may come as blanks. Flag + : the sign is always
 there; flag blank: a sign or a blank is always there. What is skipped never takes the sign or a digit of a
-number beside it; where both have a width, skipped digits may follow a number: `%+08.3f%*2c`.
-Sources: StreamDevice (format converters, checksums), C printf.
+number beside it; where both have a width, skipped digits may follow a number: `%+08.3f%*2c`. A decimal comma is the
+option `decimal_mark: ","`.
+Sources: StreamDevice (format converters, enumerations, checksums), C printf.
 """
 
 from __future__ import annotations
@@ -29,24 +33,23 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from random import Random
 from typing import Literal, cast
 
-from compd_drivers.checksums import CHECKSUMS, ChecksumKind
+from compd_drivers.checksums import CHECKSUMS, ChecksumField, ChecksumKind
+from compd_drivers.number_form import DecimalMark, FactorWords, NumberForm, characters
 
-OPEN_LENGTH = 32  # bytes of a number or a skipped part without width: more than any instrument sends
+OPEN_LENGTH = 32  # bytes of a number without width: more than any instrument sends
+OPEN_SKIPPED = 256  # bytes of a skipped part without width, such as the rest of a protocol's line
 _ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|(.))", re.DOTALL)
 _ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
 _CONVERTER = re.compile(
     r"%(?:(?P<percent>%)"
-    r"|(?P<hex>0?)(?P<skip>\d*)<(?P<checksum>\w+)>"
+    r"|(?P<digits>[0#]?)(?P<skip>\d*)(?:\.(?P<behind>\d+))?<(?P<checksum>\w+)>"
     r"|(?P<star>\*)?(?P<optional>\?)?(?:\((?P<name>\w+)\))?(?P<flags>[+ 0]*)(?P<width>\d+)?(?:\.(?P<decimals>\d+))?"
-    r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]))",
+    r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]|\{(?P<words>[^}]*)\}))",
 )
 _BYTE = struct.Struct("B").pack
-_SIGNS = {"+": r" *[+-] *", " ": r"(?: *[+-]| ) *", "": r" *[+-]? *"}
-_CHARACTERS = {"f": r"[+\- 0-9.]", "d": r"[+\- 0-9]", "e": r"[+\- 0-9.Ee]", "x": r"[0-9A-Fa-f]"}
 
 
 def unescape(text: str) -> bytes:
@@ -67,31 +70,6 @@ def unescape(text: str) -> bytes:
         raise ValueError(f"{text[error.start]!r} is not a single byte; write its code as \\xHH") from error
 
 
-@dataclass(frozen=True)
-class _Number:
-    """A number in the reply: its channel ("" if not named), and how its text must read."""
-
-    channel: str
-    kind: str
-    text: re.Pattern[bytes]
-    signed_bits: int  # of a hexadecimal number in two's complement; 0 for every other
-
-
-@dataclass(frozen=True)
-class _ChecksumField:
-    """A checksum in the reply: of the bytes from `start` up to its group `group`."""
-
-    group: str
-    kind: ChecksumKind
-    start: int
-    hexadecimal: bool
-
-    def of(self, data: bytes) -> bytes:
-        """The checksum of `data` as it stands in the reply."""
-        checksum = CHECKSUMS[self.kind].of(data)
-        return checksum[::-1].hex().upper().encode() if self.hexadecimal else checksum
-
-
 class ReplyFormat:
     """A format, ready to match replies.
 
@@ -101,11 +79,15 @@ class ReplyFormat:
     beginning : the literal bytes before all else.
     """
 
-    def __init__(self, text: str, instead: Mapping[str, Collection[bytes]] | None = None) -> None:
+    def __init__(
+        self, text: str, instead: Mapping[str, Collection[bytes]] | None = None, mark: DecimalMark = "."
+    ) -> None:
         """`instead`: by channel, what may stand in place of its number. ValueError says what is wrong."""
         self._instead = instead or {}
-        self._numbers: list[_Number] = []
-        self._checks: list[_ChecksumField] = []
+        self._mark = mark
+        self._numbers: list[NumberForm] = []
+        self._words: list[FactorWords] = []
+        self._checks: list[ChecksumField] = []
         self._before: Literal["fixed", "number", "number of open width", "skipped"] = "fixed"  # what stands before
         self._samples: list[Callable[[Random, bytes], bytes]] = []  # each part, behind what stands before it
         self.length: int | None = 0
@@ -121,10 +103,16 @@ class ReplyFormat:
                 pattern += self._fixed("%")
             else:
                 beginning = self.literal if beginning is None else beginning
-                pattern += self._converter(match)
+                try:
+                    pattern += self._converter(match)
+                except ValueError as error:
+                    raise ValueError(f"{match[0]}: {error}") from error
             at = match.end()
         self._pattern = re.compile((pattern + self._literally(source[at:])).encode("latin-1"), re.DOTALL)
         self.beginning = self.literal if beginning is None else beginning
+        for words in self._words:
+            if words.channel not in self.channels:
+                raise ValueError(f"words for {words.channel or 'a number'}, which is not in the reply")
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -148,10 +136,14 @@ class ReplyFormat:
             text = match[f"n{k}"]
             if text in self._instead.get(number.channel, ()):
                 values.append(text)
-            elif number.text.fullmatch(text):
-                values.append(_value(number, text))
-            else:
+                continue
+            value = number.value(text, self._sign_is_elsewhere(number.channel))
+            if value is None:
                 return None
+            for place, words in enumerate(self._words):
+                if words.channel == number.channel:
+                    value *= words.factors[match[f"w{place}"].decode("latin-1")]
+            values.append(value)
         return tuple(values)
 
     def samples(self, count: int) -> Iterator[bytes]:
@@ -159,8 +151,11 @@ class ReplyFormat:
         random = Random(0)
         for _ in range(count):
             reply = b""
-            for part in self._samples:
-                reply += part(random, reply)
+            try:
+                for part in self._samples:
+                    reply += part(random, reply)
+            except ValueError:  # no checksum can be made of what is skipped
+                continue
             if self.match(reply) is not None:
                 yield reply
 
@@ -171,11 +166,18 @@ class ReplyFormat:
 
     def _fits(self, match: re.Match[bytes], reply: bytes) -> bool:
         for check in self._checks:
-            expected = check.of(reply[check.start : match.start(check.group)])
+            try:
+                expected = check.of(reply[: match.start(check.group)])
+            except ValueError:
+                return False
             received = match[check.group]
-            if (received.upper() if check.hexadecimal else received) != expected:
+            if (received.upper() if check.digits else received) != expected:
                 return False
         return True
+
+    def _sign_is_elsewhere(self, channel: str) -> bool:
+        """Whether a word beside the channel's number says its sign."""
+        return any(words.turns_sign for words in self._words if words.channel == channel)
 
     def _literally(self, text: str) -> str:
         if "%" in text:
@@ -191,90 +193,94 @@ class ReplyFormat:
         self._samples.append(lambda random, before: data)
         return re.escape(text)
 
-    def _longer(self, by: int | None) -> None:
-        self.longest += OPEN_LENGTH if by is None else by
+    def _longer(self, by: int | None, at_most: int = OPEN_LENGTH) -> None:
+        self.longest += at_most if by is None else by
         self.length = None if self.length is None or by is None else self.length + by
 
     def _converter(self, match: re.Match[str]) -> str:
         if match["checksum"]:
             return self._checksum(match)
+        if match["words"] is not None:
+            return self._factor_words(match)
         if match["kind"] in tuple("fdex") and not match["star"]:
             return self._number(match)
         if not match["star"]:
-            raise ValueError(f"{match[0]}: only numbers are read; write %*... to skip this")
+            raise ValueError("only numbers are read; write %*... to skip this")
         if match["flags"] or match["decimals"] or match["name"]:
-            raise ValueError(f"{match[0]}: only a width belongs to what is skipped")
+            raise ValueError("only a width belongs to what is skipped")
         return self._skipped(match)
+
+    def _factor_words(self, match: re.Match[str]) -> str:
+        if match["star"] or match["optional"] or match["flags"] or match["width"] or match["decimals"]:
+            raise ValueError("only a name belongs to words")
+        words = FactorWords.of(match["name"] or "", match["words"])
+        group = f"w{len(self._words)}"
+        self._words.append(words)
+        lengths = {len(word) for word in words.factors}
+        self._longer(lengths.pop() if len(lengths) == 1 else None)
+        self._samples.append(lambda random, before: random.choice(list(words.factors)).encode("latin-1"))
+        self._before = "fixed"
+        return f"(?P<{group}>{words.pattern})"
 
     def _skipped(self, match: re.Match[str]) -> str:
         width = int(match["width"]) if match["width"] else None
         kind = match["kind"]
         if kind == "c":
             width = width or 1
-        characters = "." if kind == "c" else _CHARACTERS.get(kind, r"[^ \t\r\n]") if kind else _set(match["set"])
+        of_kind = "." if kind == "c" else r"[^ \t\r\n]" if kind == "s" else characters(kind, self._mark) if kind else ""
+        skipped = of_kind or _set(match["set"])
         # what is skipped must not take digits of the number before it, which it cannot where both have a width
         both_fixed = self._before == "number" and width is not None and not match["optional"]
-        whole = r"(?![0-9.])" if self._before.startswith("number") and not both_fixed else ""
-        of_the_set = re.compile(characters.encode("latin-1"), re.DOTALL)
+        whole = self._digits_end if self._before.startswith("number") and not both_fixed else ""
+        of_the_set = re.compile(skipped.encode("latin-1"), re.DOTALL)
         allowed = [byte for byte in map(_BYTE, range(256)) if of_the_set.fullmatch(byte)]
         length = 0 if match["optional"] else width or 1
         self._samples.append(lambda random, before: b"".join(random.choices(allowed, k=length)))
-        if match["optional"]:
-            self._longer(None)
-            self._before = "skipped"
-            return f"{whole}{characters}*" if width is None else f"{whole}{characters}{{0,{width}}}"
-        self._longer(width)
+        self._longer(None if match["optional"] else width, width or OPEN_SKIPPED)
         self._before = "skipped"
-        return f"{whole}{characters}+" if width is None else f"{whole}{characters}{{{width}}}"
+        if match["optional"]:
+            return f"{whole}{skipped}*" if width is None else f"{whole}{skipped}{{0,{width}}}"
+        return f"{whole}{skipped}+" if width is None else f"{whole}{skipped}{{{width}}}"
+
+    @property
+    def _digits_end(self) -> str:
+        """What must not follow a number of open width."""
+        return rf"(?![0-9{self._mark}])"
 
     def _number(self, match: re.Match[str]) -> str:
-        kind, flags = match["kind"], match["flags"] or ""
         width = int(match["width"]) if match["width"] else None
         decimals = int(match["decimals"]) if match["decimals"] else None
         if match["optional"]:
-            raise ValueError(f"{match[0]}: a number cannot be optional")
-        if decimals is not None and (kind in "dx" or decimals == 0):
-            raise ValueError(f"{match[0]}: decimals belong to %f and %e, and there is at least one")
-        sign = _SIGNS["+" if "+" in flags else " " if " " in flags else ""]
-        places = "+" if decimals is None else f"{{{decimals}}}"
-        body = {
-            "f": rf"{sign}[0-9]*\.[0-9]{places}",
-            "e": rf"{sign}[0-9]+\.[0-9]{places}[Ee][+-]?[0-9]+",
-            "d": rf"{sign}[0-9]+",
-            "x": "[0-9A-Fa-f]+",
-        }[kind]
+            raise ValueError("a number cannot be optional")
         name = match["name"] or ""
         if name in self.channels:
-            raise ValueError(f"{match[0]}: channel {name!r} stands twice in the reply")
-        signed = kind == "x" and "+" in flags
-        if signed and width is None:
-            raise ValueError(f"{match[0]}: two's complement needs the number's width: %+4x")
+            raise ValueError(f"channel {name!r} stands twice in the reply")
+        number = NumberForm(name, match["kind"], match["flags"] or "", width, decimals, self._mark)
         group = f"n{len(self._numbers)}"
-        self._numbers.append(_Number(name, kind, re.compile(body.encode()), 4 * width if signed and width else 0))
-        self._samples.append(lambda random, before: _sample(random, kind, flags, width, decimals))
+        self._numbers.append(number)
+        self._samples.append(lambda random, before: number.sample(random, self._sign_is_elsewhere(name)))
         words = [re.escape(word.decode("latin-1")) for word in sorted(self._instead.get(name, ()), key=len)]
         lengths = {len(word) for word in self._instead.get(name, ())} | {width}
         self._longer(width if len(lengths) == 1 else None)
-        exact = body if width is None else f"{_CHARACTERS[kind]}{{{width}}}"
         # nor may it take the sign or a digit of this one; and a number of open width ends with its last digit
-        begins = r"(?:(?<![0-9.+\-])|(?<![.+\-])(?=[+\- ]))" if self._before == "skipped" else ""
-        ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if kind == "x" else r"(?![0-9.])"
+        mark = re.escape(self._mark)
+        begins = rf"(?:(?<![0-9{mark}+\-])|(?<![{mark}+\-])(?=[+\- ]))" if self._before == "skipped" else ""
+        ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if number.kind == "x" else self._digits_end
         self._before = "number" if len(lengths) == 1 and width else "number of open width"
-        return f"{begins}(?P<{group}>{'|'.join([*words, exact])}){ends}"
+        return f"{begins}(?P<{group}>{'|'.join([*words, number.place])}){ends}"
 
     def _checksum(self, match: re.Match[str]) -> str:
         if match["checksum"] not in CHECKSUMS:
-            raise ValueError(f"{match[0]}: no such checksum; there are {', '.join(CHECKSUMS)}")
-        length = CHECKSUMS[cast(ChecksumKind, match["checksum"])].length
-        self._before = "fixed"
+            raise ValueError(f"no such checksum; there are {', '.join(CHECKSUMS)}")
+        kind, digits = cast(ChecksumKind, match["checksum"]), cast(Literal["", "0", "#"], match["digits"])
         group = f"c{len(self._checks)}"
-        self._checks.append(
-            _ChecksumField(group, cast(ChecksumKind, match["checksum"]), int(match["skip"] or 0), bool(match["hex"]))
-        )
-        self._longer(2 * length if match["hex"] else length)
-        check = self._checks[-1]
-        self._samples.append(lambda random, before: check.of(before[check.start :]))
-        return f"(?P<{group}>[0-9A-Fa-f]{{{2 * length}}})" if match["hex"] else f"(?P<{group}>.{{{length}}})"
+        check = ChecksumField(group, kind, int(match["skip"] or 0), int(match["behind"] or 0), digits)
+        self._checks.append(check)
+        self._before = "fixed"
+        self._longer(check.length)
+        self._samples.append(lambda random, before: check.of(before))
+        characters_of_it = {"": ".", "0": "[0-9A-Fa-f]", "#": "[0-9]"}[digits]
+        return f"(?P<{group}>{characters_of_it}{{{check.length}}})"
 
 
 def _set(text: str) -> str:
@@ -284,23 +290,3 @@ def _set(text: str) -> str:
         raise ValueError("%*[]: a set without members")
     members = re.sub(r"([\[\]\\^&~|])", r"\\\1", members)
     return f"[{turned}{members}]"
-
-
-def _value(number: _Number, text: bytes) -> float:
-    digits = text.replace(b" ", b"")
-    if number.kind != "x":
-        return float(digits)
-    value = int(digits, 16)
-    return float(value - (1 << number.signed_bits) if number.signed_bits and value >> number.signed_bits - 1 else value)
-
-
-def _sample(random: Random, kind: str, flags: str, width: int | None, decimals: int | None) -> bytes:
-    """A number as printf prints it."""
-    if kind == "x":
-        length = width or 4
-        return f"{random.getrandbits(4 * length):0{length}X}".encode()
-    places = 3 if decimals is None and kind in "fe" else decimals or 0
-    whole = 2 if width is None else max(0, width - 1 - (places + 1 if kind == "f" else 0))
-    value = random.uniform(-1, 1) * 10.0**whole
-    text = f"%{flags}{width or ''}" + (f".{places}{kind}" if kind in "fe" else kind)
-    return (text % (int(value) if kind == "d" else value)).encode()

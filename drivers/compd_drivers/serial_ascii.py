@@ -38,9 +38,13 @@ Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak
       channels: [{name: force, unit: N, scale: 4.4482216152605}]
       errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
-A device that speaks unasked, as the last, has no `out`: its newest whole line counts, never a half one, and its time is
-that at which waiting for it began. `echo` is a second request whose reply looks different: asked before every
-`every`-th poll, it finds a device whose replies are one behind.
+A device that is asked by a pulse of DTR has `dtr_pulse_s` in place of `out`; `line_needs` powers its cable.
+A device that speaks unasked, as the last, has no `out`: each of its lines counts, never a half one, and its time is
+that at which the line before it began; `reply_timeout_s` must be longer than its period.
+A device with a request for each of its values (M1, M2 ...) has `requests: [{out: M1, in: ...}, ...]` in place of `out`
+and `in`; each channel has the time of its own request.
+`echo` is a second request whose reply looks different: asked before every `every`-th poll, it finds a device whose
+replies are one behind.
 Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a whole reply on a connection,
 the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
 and the detail says so; both are without a value.
@@ -51,12 +55,13 @@ a second time, as those of all gauges are. Other quantities are not: set a parit
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
-from compd_drivers.ascii_description import Description, ErrorReply, SerialAsciiOptions
-from compd_drivers.exchange import MenuSilence, nothing_behind, receive, receive_line
+from compd_drivers.ascii_description import Description, ErrorReply, PollForm, SerialAsciiOptions
+from compd_drivers.exchange import MenuSilence, ask, nothing_behind, receive, receive_line
 from compd_drivers.reply_format import ReplyFormat, unescape
 
 
@@ -83,13 +88,15 @@ class SerialAscii(Gauge[ByteLine]):
         self._measured = options.channels
         self._protocol = options
         self._channels = tuple(channel.channel for channel in options.channels)
-        order = self._description.reply.channels
-        self._order = [order.index(c.name) if c.name in order else 0 for c in options.channels]
+        self._places = [self._place(channel.name) for channel in options.channels]
         self._instead = [{unescape(word): quality for word, quality in c.instead.items()} for c in options.channels]
         terminator = unescape(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
-        self._exchanges = [(unescape(exchange.out) + terminator, ReplyFormat(exchange.in_)) for exchange in exchanges]
-        forms = [self._description.reply, *(form for _, form in self._exchanges)]
+        self._exchanges = [
+            (unescape(exchange.out) + terminator, ReplyFormat(exchange.in_, mark=options.decimal_mark))
+            for exchange in exchanges
+        ]
+        forms = [*(poll.reply for poll in self._description.polls), *(form for _, form in self._exchanges)]
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]
         self._limit = max(form.longest for form in forms) + len(self._description.terminator)
@@ -103,13 +110,21 @@ class SerialAscii(Gauge[ByteLine]):
 
     @property
     def reply_identity(self) -> str | None:
-        return self._description.reply.beginning.decode("latin-1") or None
+        beginnings = [poll.reply.beginning for poll in self._description.polls]
+        common = itertools.takewhile(lambda bytes_there: len(set(bytes_there)) == 1, zip(*beginnings, strict=False))
+        return bytes(first for first, *_ in common).decode("latin-1") or None
+
+    @property
+    def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
+        return self._protocol.line_needs
 
     def traffic(self) -> Sequence[tuple[int, int]] | None:
-        length = self._description.reply.length
-        if length is None or not self._protocol.out:
-            return None
-        return [(len(self._description.request), length + len(self._description.terminator))]
+        exchanges = []
+        for poll in self._description.polls:
+            if poll.reply.length is None or not self._protocol.asked:
+                return None
+            exchanges.append((len(poll.request), poll.reply.length + len(self._description.terminator)))
+        return exchanges
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, MISMATCH for a reply of another form, CRC for a wrong checksum,
@@ -128,31 +143,65 @@ class SerialAscii(Gauge[ByteLine]):
                 self._exchange(line, request, form)
             self._until_echo = 0
         self._check_echo(line)
-        reply, time_s = self._poll(line)
-        self._ready_on = line
-        error = self._error(reply)  # before the value: an error may look like one
-        if error is None:
-            values = self._description.reply.match(reply)
-            if values is None:
-                raise self._misfit(reply, self._description.reply)
-            return [self._reading(k, values[place], time_s) for k, place in enumerate(self._order)]
-        if error.quality == "device_error":
-            self._ready_on = None
-        return [bad(time_s, Quality(error.quality), _shown(reply, error))] * len(self._channels)
+        replies = [self._values(line, poll) for poll in self._description.polls]
+        # one that says it is in trouble is spoken to from the beginning
+        in_trouble = any(
+            isinstance(answer, Reading) and answer.quality is Quality.DEVICE_ERROR for answer, _ in replies
+        )
+        self._ready_on = None if in_trouble else line
+        readings = []
+        for k, (poll, number) in enumerate(self._places):
+            answer, time_s = replies[poll]
+            readings.append(answer if isinstance(answer, Reading) else self._reading(k, answer[number], time_s))
+        return readings
 
-    def _poll(self, line: ByteLine) -> tuple[bytes, float]:
+    def _place(self, channel: str) -> tuple[int, int]:
+        """Which request's reply has the channel's number, and which number of it; the only one where it has no name."""
+        for k, poll in enumerate(self._description.polls):
+            if channel in poll.reply.channels:
+                return k, poll.reply.channels.index(channel)
+        return 0, 0
+
+    def _values(self, line: ByteLine, poll: PollForm) -> tuple[tuple[float | bytes, ...] | Reading, float]:
+        """The numbers in a request's reply, or the error that it is, and the time of asking (s)."""
+        reply, time_s = self._poll(line, poll)
+        error = self._error(reply)  # before the value: an error may look like one
+        if error is not None:
+            return bad(time_s, Quality(error.quality), _shown(reply, error)), time_s
+        values = poll.reply.match(reply)
+        if values is None:
+            raise self._misfit(reply, poll.reply)
+        return values, time_s
+
+    def _poll(self, line: ByteLine, poll: PollForm) -> tuple[bytes, float]:
         """The reply without its terminator, and the time of asking (s)."""
-        form = self._description.reply
-        if not self._protocol.out:
-            time_s = line.listen()
-            self._line(line)  # what is left of the line that was under way
-            return self._receive(line, form), time_s
-        time_s = line.send(self._description.request)
-        return self._whole(line, form), time_s
+        if self._protocol.dtr_pulse_s is not None:
+            time_s = line.pulse_dtr(self._protocol.dtr_pulse_s)
+        elif not self._protocol.asked:
+            return self._unasked(line, poll.reply)
+        else:
+            time_s = ask(line, self._protocol, poll.request)
+        return self._whole(line, poll.reply), time_s
+
+    def _unasked(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
+        """The next reply of a device that speaks unasked, and its time (s)."""
+        terminator, wait_s = self._description.terminator, self._protocol.reply_timeout_s
+        try:
+            reply, time_s = line.next_line(terminator, self._limit, wait_s)
+            for _ in range(form.literal.count(terminator)):
+                if self._error(reply) is not None:
+                    break
+                reply += terminator + line.next_line(terminator, self._limit, wait_s)[0]
+        except LineFault as fault:
+            if fault.quality is not Quality.TIMEOUT:
+                raise
+            text = f"{fault.detail}; `reply_timeout_s` must be longer than the period of a device that speaks unasked"
+            raise LineFault(fault.quality, text) from fault
+        return reply, time_s
 
     def _exchange(self, line: ByteLine, request: bytes, form: ReplyFormat) -> None:
         """One exchange without a value; an error reply to it is a fault of the whole poll."""
-        line.send(request)
+        ask(line, self._protocol, request)
         reply = self._whole(line, form)
         if error := self._error(reply):
             raise LineFault(Quality(error.quality), _shown(reply, error))

@@ -29,7 +29,7 @@ from pydantic import Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
 from compd_drivers.checksums import CHECKSUMS, ChecksumKind
-from compd_drivers.exchange import ExchangeOptions, following, nothing_behind, receive
+from compd_drivers.exchange import ExchangeOptions, ask, following, nothing_behind, receive
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, not_measured, repeated
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
@@ -85,6 +85,10 @@ class FrameChecksum(DescriptionSection):
 
     def check(self, frame: FrameLayout, key: str) -> None:
         """ValueError where `frame`, the option `key`, has no place for this checksum."""
+        if self.kind == "modbus_lrc":
+            raise ValueError(
+                f"`{key}` has no digits: modbus_lrc is of hexadecimal digits, in bytes it is negative_sum8"
+            )
         length = frame.checksum.stop - frame.checksum.start
         if length != CHECKSUMS[self.kind].length:
             raise ValueError(f"`{key}` has {length} bytes CS, its checksum makes {CHECKSUMS[self.kind].length}")
@@ -212,12 +216,16 @@ class SerialFrame(Gauge[ByteLine]):
     def reply_identity(self) -> str | None:
         return self._frame.beginning.decode("latin-1") or None
 
+    @property
+    def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
+        return self._protocol.line_needs
+
     def traffic(self) -> Sequence[tuple[int, int]]:
         return [(len(self._request), len(self._frame.fixed))]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: as the line does, CRC for a wrong checksum, MISMATCH for other fixed bytes."""
-        time_s = line.send(self._request)
+        time_s = ask(line, self._protocol, self._request)
         data, error = self._receive(line)
         nothing_behind(line, self._protocol, data)
         if error is not None:

@@ -55,8 +55,13 @@ class Transcript:
     over_tcp: bool
 
 
+PULSE = b"a pulse of DTR"
+
+
 def octets(text: str) -> bytes:
-    """Quoted text or hexadecimal bytes."""
+    """Quoted text or hexadecimal bytes; `dtr` for a request by DTR."""
+    if text == "dtr":
+        return PULSE
     if text.startswith('"'):
         return ast.literal_eval("b" + text)
     return bytes.fromhex(text)
@@ -125,6 +130,10 @@ class ReplayedLine:
         self._waiting = expected.received
         self._time_s += 0.01
         return self._time_s
+
+    def pulse_dtr(self, low_s: float) -> float:
+        assert low_s > 0
+        return self.send(PULSE)
 
     def listen(self) -> float:
         raise AssertionError("a transcript is of a device that is asked")
@@ -241,7 +250,7 @@ def replay_transcript(path: Path) -> None:
             replay(gauge, tcp, transcript.polls, lambda poll: None)
         return
     wire = ReplayedLine()
-    line = RtuMaster(wire, alternate=False) if gauge.line_kind == "registers" else wire  # type: ignore[arg-type]
+    line = RtuMaster(wire, ask_one_more=False) if gauge.line_kind == "registers" else wire  # type: ignore[arg-type]
 
     def begin(poll: Poll) -> None:
         if poll is not transcript.polls[0]:
@@ -271,6 +280,7 @@ def check_simulated_device(path: Path) -> None:
         if gauge.line_kind == "registers":
             device = ModbusSlaves([device], over_tcp=transcript.over_tcp)
         for exchange in marked:
-            assert device.hear(exchange.sent) == exchange.received, f"line {poll.line}"
+            reply = device.asked_by_dtr() if exchange.sent == PULSE else device.hear(exchange.sent)
+            assert reply == exchange.received, f"line {poll.line}"
             compared += 1
     assert compared, "mark with <* what the simulated device answers"

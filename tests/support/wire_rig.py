@@ -60,6 +60,7 @@ class ScriptedPort:
         self._device = device
         self.written: list[bytes] = []
         self.closed = False
+        self.control: list[str] = []  # what was done to DTR and break
 
     def read(self, timeout_s: float) -> bytes:
         data = self.script.pop(0) if self.script else b""
@@ -71,6 +72,12 @@ class ScriptedPort:
         self.written.append(data)
         if self._device is not None:
             self.script += [piece for piece in (self._device(data),) if piece]
+
+    def set_dtr(self, high: bool) -> None:
+        self.control.append(f"dtr {'high' if high else 'low'}")
+
+    def set_break(self, on: bool) -> None:
+        self.control.append(f"break {'on' if on else 'off'}")
 
     def close(self) -> None:
         self.closed = True

@@ -83,6 +83,8 @@ def scan(
         return
     for port in ports:
         typer.echo(f"{port.path}\n    {port.device}  {port.description}")
+        if port.note:
+            typer.echo(f"    {port.note}")
     if not probe:
         return
     typer.echo(

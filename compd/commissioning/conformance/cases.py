@@ -21,6 +21,8 @@ NO_VALUE = frozenset(
 GOOD = frozenset({Quality.OK})
 EXCEPTIONS = (1, 2, 3, 4, 6, 11)  # of Modbus, those that a slave or gateway answers a read with
 
+ENDS_OF_MAPS = (2, 3, 4)  # of them, those with which slaves answer where their registers end
+
 BY_TCP = "TCP's own checksum keeps it from the driver"
 
 REAL_TIME_TRIES = 3
@@ -75,6 +77,8 @@ def run_cases(session: ConformanceSession, subject: Subject) -> list[CaseResult]
     off = ", ".join(sorted({f"{tolerance / 2:.2g}" for tolerance in session.tolerance.values()}))
     results = [CaseResult("units and scale", required, f"largest differences {off}", "pass")]
     results += [run_case(case, session, subject) for case in CASES]
+    if subject.registers and not subject.over_tcp:
+        results += [run_case(case, session, subject) for case in CASES_ON_RTU]
     return results
 
 
@@ -272,6 +276,23 @@ def _errors(session: ConformanceSession, subject: Subject) -> CaseResult:
     return next((result for result in results if result.verdict != "pass"), results[-1])
 
 
+def _end_of_map(session: ConformanceSession, _: Subject) -> CaseResult:
+    """A slave whose registers end behind the last one that is read, which the line asks beyond: it must learn that."""
+    complaints = []
+    for beyond in (faults.SILENT, *(faults.refused(code, over_tcp=False) for code in ENDS_OF_MAPS)):
+        session.reopen()
+        session.wire.peer.end_map(beyond)
+        polls = [session.poll()]
+        learning = 2 * session.wire.peer.blocks + 1
+        polls += [session.poll() for _ in range(learning)]
+        complaints += [f"{beyond.name}: {text}" for poll in polls for text in poll.wrong]
+        last = [session.poll() for _ in range(learning)]
+        complaints += [f"{beyond.name}, still: {text}" for poll in last for text in _complaints(poll, GOOD)]
+    session.wire.peer.end_map(None)
+    session.reopen()
+    return _result("the map ends: silent, exceptions 2, 3, 4", GOOD, "ok, once the line knows", complaints)
+
+
 def _unplugged(session: ConformanceSession, _: Subject) -> CaseResult:
     session.poll()
     session.wire.unplug()
@@ -307,6 +328,7 @@ CASES: Sequence[Case] = (
     _errors,
     _unplugged,
 )
+CASES_ON_RTU: Sequence[Case] = (_end_of_map,)
 
 
 def slowest_line(session: ConformanceSession, baud: int) -> CaseResult:

@@ -119,6 +119,12 @@ class ConformanceSession:
             for _ in range(SETTLING_DRAINS):
                 self._line.drain()
 
+    def reopen(self) -> None:
+        """Close the line; the next poll opens it anew."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
+
     def close(self) -> None:
         """Close the line and the wire."""
         if self._line is not None:

@@ -55,10 +55,25 @@ class Peer:
         self.longest = 0
         self._sensors = sensors
         self._faults: Iterator[Fault] = iter(())
+        self._beyond: Fault | None = None
+        self._counts: dict[bytes, int] = {}  # of registers, by unit, function and address: the fewest asked for
 
     def set_faults(self, faults: Iterable[Fault]) -> None:
         """Set the faults of the next replies, one each."""
         self._faults = iter(faults)
+
+    def end_map(self, beyond: Fault | None) -> None:
+        """Let the map of a Modbus slave on a serial line end with what the driver reads; None: as it was.
+
+        beyond : what happens to the reply where one register more is asked for.
+        """
+        self._beyond = beyond
+        self._counts.clear()
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of registers that were asked for since `end_map`."""
+        return len(self._counts)
 
     def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
         """The pieces that come back when `request` has arrived at `heard_s`."""
@@ -68,4 +83,12 @@ class Peer:
         self._sensors.sensed_s = heard_s
         self.replies += 1
         self.longest = max(self.longest, len(reply))
+        if self._beyond is not None and self._is_beyond(request):
+            return self._beyond.act(reply, timeout_s)
         return next(self._faults, NONE).act(reply, timeout_s)
+
+    def _is_beyond(self, request: bytes) -> bool:
+        """Whether a request asks for one register more than the driver needs."""
+        block, count = request[:4], int.from_bytes(request[4:6], "big")
+        fewest = self._counts[block] = min(self._counts.get(block, count), count)
+        return count == fewest + 1

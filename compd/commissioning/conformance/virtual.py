@@ -102,5 +102,11 @@ class VirtualPort:
         self._wire.check()
         self._wire.carry(data)
 
+    def set_dtr(self, high: bool) -> None:
+        """Simulated devices do not see it."""
+
+    def set_break(self, on: bool) -> None:
+        """Nor this."""
+
     def close(self) -> None:
         """Nothing to give back."""

@@ -20,6 +20,7 @@ from compd.clock import Clock
 from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
+from compd.lines.echo import explained
 from compd.lines.stream import shown
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.reading_trust import ReadingTrust
@@ -48,6 +49,10 @@ class OpenLine(Protocol):
     @property
     def unexpected_bytes(self) -> int:
         """Bytes that came without a request, since the line was opened."""
+
+    @property
+    def request_came_back(self) -> bool:
+        """Whether the first bytes that came after the last request are that request."""
 
     def drain(self, quiet_s: float | None = None) -> bytes:
         """Wait until nothing has come for `quiet_s`, the line's timeout if None; what came."""
@@ -277,7 +282,7 @@ class LineThread:
         except LineFault as fault:
             if fault.quality is Quality.LINE_LOST:
                 raise
-            self._fail(gauge, line, fault.quality, fault.detail)
+            self._fail(gauge, line, fault.quality, explained(fault, line).detail)
         except MemoryError:  # it is the whole process that has none left
             raise
         except Exception as error:  # a driver may raise anything; it must not end the line's thread

@@ -164,7 +164,8 @@ class ReadingTrust:
         return reading
 
     def _refused(self, reading: Reading) -> Reading:
-        return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))
+        limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
+        return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i) + limits)
 
     def _returned(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
         """The first readings of a gauge that was away."""
@@ -218,7 +219,14 @@ class ReadingTrust:
             self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)
             return self._refused(reading)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
-        return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm")
+        return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm{self._limits_text()}")
+
+    def _limits_text(self) -> str:
+        """Which keys of the gauge limit its motion: one that is too small looks like a gauge that jumps."""
+        limits = self._settings.limits
+        set_to = {"fastest_mm_per_s": limits.speed, "acceleration_mm_per_s2": limits.acceleration}
+        keys = ", ".join(f"`{key}: {limit:g}`" for key, limit in set_to.items() if math.isfinite(limit))
+        return f"; its motion is limited by {keys}" if keys else ""
 
     def _has_moved_alone(self, sample: Sample, before: NDArray[np.float64]) -> bool:
         """Whether a gauge that may count anew shows another value after a silence, and no other gauge does."""

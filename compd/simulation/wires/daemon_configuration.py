@@ -16,6 +16,8 @@ from compd.output_file import check_replaceable
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
+# What a pty does not have, and a simulated line does not do.
+NOT_SIMULATED = ("dtr", "rts", "rs485", "echo")
 Port = str | tuple[str, int]
 
 
@@ -48,6 +50,8 @@ def daemon_configuration(
     data = read_document(configuration.path).data
     for name, port in ports.items():
         line = data["lines"][name]
+        for key in NOT_SIMULATED:
+            line.pop(key, None)
         if isinstance(port, str):
             line["port"] = port
         else:

@@ -7,7 +7,7 @@ It is written from the device's manual, not from the driver; the two share no co
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 # Present value at the device's sensor by channel name, in the channel's unit; nan: the sensor is off.
@@ -26,6 +26,10 @@ class SimulatedByteDevice(ABC):
     def hear(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the reply to complete requests, or b""."""
 
+    def asked_by_dtr(self) -> bytes:
+        """The reply to a pulse of DTR; b"" for a device that is not asked so. A simulated port has no DTR."""
+        return b""
+
 
 class SimulatedRegisterDevice(ABC):
     """Registers of a Modbus slave; the line does the framing."""
@@ -43,3 +47,11 @@ class SimulatedRegisterDevice(ABC):
     @abstractmethod
     def registers(self, function: int, address: int, count: int) -> list[int] | None:
         """Unsigned 16-bit values, or None for an illegal address or function."""
+
+    def bits(self, function: int, address: int, count: int) -> list[bool] | None:
+        """Coils (function 1) or discrete inputs (2), or None for an illegal address."""
+        return None
+
+    def write(self, function: int, address: int, values: Sequence[int]) -> bool:
+        """Take what is written by function 5 (0 or 1), 6 or 16; False for an illegal address."""
+        return False

@@ -11,13 +11,21 @@ from collections.abc import Sequence
 from pymodbus.framer.rtu import FramerRTU
 from pymodbus.framer.socket import FramerSocket
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
-from pymodbus.pdu.register_message import ReadHoldingRegistersResponse, ReadInputRegistersResponse
+from pymodbus.pdu.bit_message import ReadCoilsResponse, ReadDiscreteInputsResponse, WriteSingleCoilResponse
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersResponse,
+    ReadInputRegistersResponse,
+    WriteMultipleRegistersResponse,
+    WriteSingleRegisterResponse,
+)
 
 from compd.simulation.wires.device import SimulatedRegisterDevice
 
-READ_HOLDING, READ_INPUT = 3, 4
+READ_COILS, READ_HOLDING, WRITE_REGISTERS = 1, 3, 16
+COIL_ON = 0xFF00
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS = 1, 2
-RTU_REQUEST = 8  # unit, function, address, count, CRC
+RTU_REQUEST = 8  # unit, function, address, count or value, CRC
+RTU_WRITE = 9  # unit, function, address, count, byte count, CRC; and the registers
 MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
 
 
@@ -49,13 +57,21 @@ class ModbusSlaves:
                     self._received = b""
                 length += rest
         else:
-            length = RTU_REQUEST
+            length = self._rtu_length()
             while len(self._received) >= length and not _crc_matches(self._received[:length]):
                 self._received = self._received[1:]  # noise before a frame
+                length = self._rtu_length()
         if len(self._received) < length:
             return b""
         request, self._received = self._received[:length], self._received[length:]
         return request
+
+    def _rtu_length(self) -> int:
+        """Length of the RTU request at the beginning of what was received."""
+        if len(self._received) < RTU_REQUEST or self._received[1] != WRITE_REGISTERS:
+            return RTU_REQUEST
+        count, byte_count = struct.unpack_from(">HB", self._received, 4)
+        return RTU_WRITE + byte_count if byte_count == 2 * count else RTU_REQUEST
 
     def _answer(self, request: bytes) -> bytes:
         """The reply to one complete frame; b"" for an absent unit."""
@@ -63,6 +79,10 @@ class ModbusSlaves:
             transaction, unit, message = MBAP.unpack_from(request)[0], request[6], request[7:]
         else:
             transaction, unit, message = 0, request[0], request[1:-2]
+        if unit == 0 and not self._over_tcp:  # a broadcast, which nobody answers
+            for each in self._devices.values():
+                _reply(each, message)
+            return b""
         device = self._devices.get(unit)
         if device is None:
             return b""
@@ -77,11 +97,27 @@ def _crc_matches(frame: bytes) -> bool:
 
 def _reply(device: SimulatedRegisterDevice, message: bytes) -> ModbusPDU:
     function = message[0]
-    if function not in (READ_HOLDING, READ_INPUT) or len(message) != 5:
+    if len(message) < 5:
         return ExceptionResponse(function, ILLEGAL_FUNCTION)
-    address, count = struct.unpack(">HH", message[1:])
-    registers = device.registers(function, address, count)
-    if registers is None:
-        return ExceptionResponse(function, ILLEGAL_ADDRESS)
-    kind = ReadHoldingRegistersResponse if function == READ_HOLDING else ReadInputRegistersResponse
-    return kind(registers=registers)
+    address, count = struct.unpack_from(">HH", message, 1)
+    match function:
+        case 1 | 2 if len(message) == 5:
+            bits = device.bits(function, address, count)
+            kind = ReadCoilsResponse if function == READ_COILS else ReadDiscreteInputsResponse
+            return ExceptionResponse(function, ILLEGAL_ADDRESS) if bits is None else kind(bits=bits)
+        case 3 | 4 if len(message) == 5:
+            registers = device.registers(function, address, count)
+            holding = ReadHoldingRegistersResponse if function == READ_HOLDING else ReadInputRegistersResponse
+            return ExceptionResponse(function, ILLEGAL_ADDRESS) if registers is None else holding(registers=registers)
+        case 5 if len(message) == 5:
+            values: tuple[int, ...] = (int(count == COIL_ON),)
+            written: ModbusPDU = WriteSingleCoilResponse(address=address, bits=[bool(values[0])])
+        case 6 if len(message) == 5:
+            values = (count,)
+            written = WriteSingleRegisterResponse(address=address, registers=[count])
+        case 16 if len(message) == 6 + 2 * count:
+            values = struct.unpack_from(f">{count}H", message, 6)
+            written = WriteMultipleRegistersResponse(address=address, count=count)
+        case _:
+            return ExceptionResponse(function, ILLEGAL_FUNCTION)
+    return written if device.write(function, address, values) else ExceptionResponse(function, ILLEGAL_ADDRESS)

@@ -6,6 +6,7 @@ description has for it; without one the device is silent.
 
 from __future__ import annotations
 
+import binascii
 import math
 import re
 from typing import Any
@@ -15,7 +16,8 @@ from compd_drivers.simulated.shared import number_for
 
 ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
 TOKEN = re.compile(
-    r"%%|%(0?)(\d*)<(\w+)>|%\*\??(\d*)(?:[cdefxs]|\[(\^?)\]?([^\]]*)\])|%(?:\((\w+)\))?([+ 0]*\d*(?:\.\d+)?)([fdex])"
+    r"%%|%([0#]?)(\d*)(?:\.(\d+))?<(\w+)>|%\*\??(\d*)(?:[cdefxs]|\[(\^?)\]?([^\]]*)\])"
+    r"|%(?:\((\w+)\))?([+ 0]*\d*(?:\.\d+)?)(?:([fdex])|\{([^}]*)\})"
 )
 
 
@@ -34,8 +36,10 @@ class SimulatedAscii(SimulatedByteDevice):
         end = plain(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
         self._replies = {(plain(exchange.out) + end).encode("latin-1"): exchange.in_ for exchange in exchanges}
-        if options.out:
-            self._replies[(plain(options.out) + end).encode("latin-1")] = options.in_
+        self._forms = [options.in_, *(request.in_ for request in options.requests)]  # of replies with values
+        for out, form in [(options.out, options.in_), *((request.out, request.in_) for request in options.requests)]:
+            if out:
+                self._replies[(plain(out) + end).encode("latin-1")] = form
         self._heard = b""
 
     @property
@@ -48,8 +52,11 @@ class SimulatedAscii(SimulatedByteDevice):
         self._heard += data
         replies = ""
         while asked := self._next():
-            replies += self._answer(asked)
+            replies += self._answer(self._replies[asked])
         return replies.encode("latin-1")
+
+    def asked_by_dtr(self) -> bytes:
+        return self._answer(self.options.in_).encode("latin-1") if self.options.dtr_pulse_s else b""
 
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""
@@ -62,11 +69,12 @@ class SimulatedAscii(SimulatedByteDevice):
         self._heard = self._heard[requests[first] + len(first) :]
         return first
 
-    def _answer(self, request: bytes) -> str:
+    def _answer(self, form: str) -> str:
         end = plain(self.options.in_terminator)
-        form = self._replies[request]
         words = {}
-        for channel in self.options.channels if form == self.options.in_ else ():
+        for channel in self.options.channels if form in self._forms else ():
+            if f"({channel.name})" not in form and self.options.requests:
+                continue
             value = self.sense(channel.name)
             if not math.isfinite(value):
                 word = next((word for word, meant in channel.instead.items() if meant == "sensor_fault"), None)
@@ -94,39 +102,81 @@ class SimulatedAscii(SimulatedByteDevice):
     def _token(self, token: re.Match[str], before: str, words: dict[str, str]) -> str:
         if token[0] == "%%":
             return "%"
-        if token[3]:
-            return checksum(token[3], before[int(token[2] or 0) :].encode("latin-1"), bool(token[1]))
-        if token[9]:
-            name = token[7] or self.options.channels[0].name
-            return words.get(name) or self._number(name, f"%{token[8]}{token[9]}")
+        if token[4]:
+            covered = before[int(token[2] or 0) : len(before) - int(token[3] or 0)]
+            return checksum(token[4], covered.encode("latin-1"), token[1])
+        name = token[8] or self.options.channels[0].name
+        if token[11] is not None:
+            return self._factor(name, token[11])[0]
+        if token[10]:
+            return words.get(name) or self._number(name, f"%{token[9]}{token[10]}")
         if "?" in token[0]:
             return ""
-        filler = "0" if token[0][-1] in "cdefx" or token[5] else (token[6] or "x")[0]
-        return filler * int(token[4] or 1)
+        filler = "0" if token[0][-1] in "cdefx" or token[6] else (token[7] or "x")[0]
+        return filler * int(token[5] or 1)
+
+    def _factor(self, name: str, choices: str) -> tuple[str, float]:
+        """The word beside a channel's number, and its factor: the first whose sign is that of the value."""
+        pairs = [(word, float(factor)) for word, _, factor in (part.rpartition("=") for part in choices.split("|"))]
+        value = self._scaled(name)
+        turned = any(factor < 0 for _, factor in pairs) and value < 0
+        return next(((word, factor) for word, factor in pairs if (factor < 0) == turned), pairs[0])
+
+    def _channel(self, name: str) -> Any:
+        return next(channel for channel in self.options.channels if channel.name == name)
+
+    def _scaled(self, name: str) -> float:
+        """The number before the words beside it."""
+        channel = self._channel(name)
+        value = self.sense(name)
+        return number_for(channel, value) / channel.scale * 10**channel.decimals if math.isfinite(value) else 0.0
 
     def _number(self, name: str, form: str) -> str:
-        channel = next(channel for channel in self.options.channels if channel.name == name)
-        value = number_for(channel, self.sense(name)) / channel.scale * 10**channel.decimals
+        value = self._scaled(name)
+        for token in TOKEN.finditer(plain("".join(self._forms))):
+            if token[11] is not None and (token[8] or name) == name:
+                value /= self._factor(name, token[11])[1]
         width = int(re.sub(r"\D", "", form.partition(".")[0]) or 0)
         if form[-1] == "x" and "+" in form:  # two's complement
             return f"{round(value) % 16**width:0{width}X}"
         text = str(form % (round(value) if form[-1] in "dx" else value))
         # an exact width without room for the zero before the point: -.050000
-        return text.replace("0.", ".", 1) if 0 < width < len(text) and abs(value) < 1 else text
+        text = text.replace("0.", ".", 1) if 0 < width < len(text) and abs(value) < 1 else text
+        return text.replace(".", self.options.decimal_mark)
 
 
 def _beyond(channel: Any, value: float) -> bool:
     return channel.range is not None and not channel.range[0] <= value <= channel.range[1]
 
 
-def checksum(kind: str, data: bytes, hexadecimal: bool) -> str:
+def checksum(kind: str, data: bytes, digits: str) -> str:
+    """A checksum as it stands on the wire. digits : "" for bytes, "0" for hexadecimal, "#" for decimal digits."""
+    length, low_first, value = 1, True, 0
     if kind == "crc16_modbus":
-        crc = 0xFFFF
+        length, value = 2, 0xFFFF
         for byte in data:
-            crc ^= byte
+            value ^= byte
             for _ in range(8):
-                crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
-        return f"{crc:04X}" if hexadecimal else crc.to_bytes(2, "little").decode("latin-1")
+                value = (value >> 1) ^ (0xA001 if value & 1 else 0)
+    elif kind in ("crc_ccitt", "crc_xmodem"):
+        length, low_first = 2, False
+        value = binascii.crc_hqx(data, 0xFFFF if kind == "crc_ccitt" else 0)
+    elif kind == "sum16":
+        length, low_first, value = 2, False, sum(data) & 0xFFFF
+    elif kind == "sum100":
+        value = sum(data) % 100
+    elif kind == "modbus_lrc":
+        value = (0x100 - sum(binascii.unhexlify(data))) & 0xFF
+    else:
+        value = _byte_checksum(kind, data)
+    if digits == "#":
+        return f"{value:0{2 if kind == 'sum100' else 5 if length == 2 else 3}d}"
+    if digits:
+        return f"{value:0{2 * length}X}"
+    return value.to_bytes(length, "little" if low_first else "big").decode("latin-1")
+
+
+def _byte_checksum(kind: str, data: bytes) -> int:
     value = 0
     for byte in data:
         match kind:
@@ -140,4 +190,4 @@ def checksum(kind: str, data: bytes, hexadecimal: bool) -> str:
                 value ^= byte
                 for _ in range(8):
                     value = ((value << 1) ^ (0x07 if value & 0x80 else 0)) & 0xFF
-    return f"{value:02X}" if hexadecimal else chr(value)
+    return value

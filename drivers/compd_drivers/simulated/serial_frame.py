@@ -76,6 +76,7 @@ class SimulatedFrame(SimulatedByteDevice):
 def with_checksum(tokens: list[str], frame: bytearray, check: Any) -> bytes:
     """The frame with its checksum where `tokens` say CS, made as the description's `check` says."""
     first = tokens.index("CS")
-    made = checksum(check.kind, bytes(frame[check.first : check.end or first]), hexadecimal=False).encode("latin-1")
-    frame[first : first + len(made)] = made if check.byte_order == "little" else made[::-1]
+    digits = checksum(check.kind, bytes(frame[check.first : check.end or first]), "0")
+    made = bytes.fromhex(digits)
+    frame[first : first + len(made)] = made[::-1] if check.byte_order == "little" else made
     return bytes(frame)

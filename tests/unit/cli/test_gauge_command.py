@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -110,6 +111,53 @@ def test_watch_counts(scale: str) -> None:
     assert code == 0
     assert "5 polls" in output
     assert "faults: none" in output
+
+
+def usb_port(device: Path, serial_number: str | None, pid: int = 0x7523) -> Any:
+    """What pyserial says of an adapter."""
+    return SimpleNamespace(
+        device=str(device), vid=0x1A86, pid=pid, serial_number=serial_number, manufacturer="QinHeng", product="CH340",
+        description="CH340",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def adapters(tmp_path: Path) -> Path:
+    """Four adapters: two without serial numbers, which share one name, and two of one serial number, a clone."""
+    for folder in ("by-id", "by-path"):
+        (tmp_path / folder).mkdir()
+    for k in range(5):
+        device = tmp_path / f"ttyUSB{k}"
+        device.touch()
+        (tmp_path / "by-path" / f"pci-0000:00:14.0-usb-0:{k}:1.0-port0").symlink_to(device)
+    (tmp_path / "by-id" / "usb-1a86_USB2.0-Serial-if00-port0").symlink_to(tmp_path / "ttyUSB1")
+    (tmp_path / "by-id" / "usb-FTDI_0001-if00-port0").symlink_to(tmp_path / "ttyUSB3")
+    (tmp_path / "by-id" / "usb-FTDI_A7-if00-port0").symlink_to(tmp_path / "ttyUSB4")
+    return tmp_path
+
+
+def test_adapters_that_share_a_name_are_named_by_their_sockets(adapters: Path) -> None:
+    found = [
+        *(usb_port(adapters / f"ttyUSB{k}", None) for k in (0, 1)),
+        *(usb_port(adapters / f"ttyUSB{k}", "0001", pid=0x6001) for k in (2, 3)),
+        usb_port(adapters / "ttyUSB4", "A7", pid=0x6001),
+    ]
+    ports = {
+        Path(port.device).name: port for port in serial_ports(adapters / "by-id", adapters / "by-path", lambda: found)
+    }
+    for k in range(4):
+        assert ports[f"ttyUSB{k}"].path.endswith(f"usb-0:{k}:1.0-port0")
+        assert "USB socket" in ports[f"ttyUSB{k}"].note
+    assert ports["ttyUSB4"].path.endswith("usb-FTDI_A7-if00-port0")
+    assert ports["ttyUSB4"].note == ""
+
+
+def test_a_single_adapter_without_a_serial_number_is_named_by_its_socket(adapters: Path) -> None:
+    """The next one that is plugged in would take its name."""
+    found = [usb_port(adapters / "ttyUSB1", None)]
+    ports = serial_ports(adapters / "by-id", adapters / "by-path", lambda: found)
+    (port,) = [port for port in ports if port.device.endswith("ttyUSB1")]
+    assert port.path.endswith("usb-0:1:1.0-port0")
 
 
 def test_scan_and_probe(scale: str, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.lines.modbus_rtu import RtuMaster
 from compd.plugins import GAUGES, names
 from compd.simulation.wires.device import SimulatedByteDevice
 
@@ -34,6 +35,12 @@ def test_installed_driver_in_virtual_time(name: str) -> None:
     results = list(run_conformance(driver_under_test(name), on_real_wires=False))
     assert failures(results) == []
     assert sum(result.verdict == "pass" for _, result in results) >= 12
+
+
+def test_a_line_that_never_learns_where_a_map_ends_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RtuMaster, "_may_extend", lambda *_: True)
+    results = list(run_conformance(driver_under_test("modbus"), on_real_wires=False))
+    assert any("the map ends" in text and "no reply, still: timeout" in text for text in failures(results))
 
 
 @pytest.mark.parametrize("name", ["heidenhain_nd28x", "modbus"])

@@ -30,6 +30,13 @@ def rtu(baud: int, **more: float) -> ModbusRtuLine:
 INT16, FLOAT32, UNITS = [(8, 23)], [(8, 41)], [(8, 7)] * 9
 
 
+def test_a_pause_between_requests_counts() -> None:
+    plain, paused = (budget_of_line("l", rtu(19200, **more), {"a": UNITS}) for more in ({}, {"pause_s": 0.02}))
+    assert paused.ideal_s - plain.ideal_s == pytest.approx(9 * (0.02 - 3.5 * 10 / 19200))
+    tcp = ModbusTcpLine(kind="modbus_tcp", host="x", timeout_s=0.1, pause_s=0.05)
+    assert budget_of_line("l", tcp, {"a": INT16}).ideal_s > 0.05
+
+
 @pytest.mark.parametrize(
     ("traffic", "count", "baud", "ideal_hz", "usual_hz"),
     [

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -42,6 +43,8 @@ def test_shipped_machines_are_complete(name: str) -> None:
     assert set(configuration.gauge_objects()) == set(configuration.gauges)
 
 
+ND28X = "scale_1: {driver: heidenhain_nd28x, line: scale_1"
+SYLVAC = "scale_1: {driver: sylvac_optors, unit: mm, line: scale_1"
 CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("  rate_hz: 200", "  rat_hz: 200"), "loop.rat_hz: unknown key", "did you mean `rate_hz`?"),
     (lambda t: t.replace("  on_stale: hold", "  #"), "loop.on_stale: is missing", "add `on_stale:`"),
@@ -73,6 +76,17 @@ CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("state:\n", "stat:\n"), "section `state` is missing", "add `state:`"),
     (lambda t: t + "acquisition: {own_process: [joint]}\n", "acquisition.own_process[1]: no such line", "frame_u"),
     (lambda t: t + "acquisition: {own_process: [joints, joints]}\n", "own_process[2]: named twice", "each line once"),
+    (
+        lambda t: t.replace("    low_latency: true ", "    rts: true ", 1).replace(ND28X, SYLVAC),
+        "gauges.scale_1: is powered from RTS, which `rts: true` of line `scale_1` sets otherwise",
+        "rts: false",
+    ),
+    (
+        lambda t: t.replace("    low_latency: true ", "    rs485: {} ", 1).replace(ND28X, SYLVAC),
+        "gauges.scale_1: is powered from RTS, which `rs485` of line `scale_1` sets otherwise",
+        "rts: false",
+    ),
+    (lambda t: t.replace("    low_latency: true ", "    rs485: {rts: 1} ", 1), "lines.scale_1.rs485.rts: unknown", ""),
     (lambda t: t + "acquisition: {own_proces: [joints]}\n", "unknown key", "did you mean `own_process`?"),
     (lambda t: t + "acquisition: {memory_mb: 0}\n", "acquisition.memory_mb", "32 or more"),
 ]
@@ -117,6 +131,22 @@ def test_a_file_that_is_no_configuration(tmp_path: Path, text: str) -> None:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"nowhere\.yaml"):
         load(tmp_path / "nowhere.yaml")
+
+
+def test_nine_addressed_gauges_are_one_entry_and_a_list(tmp_path: Path) -> None:
+    """By a merge key: the first entry is written out, the others say what is different."""
+    first = """  c1: &comparator
+    driver: modbus
+    line: frame_u
+    unit: 1
+    channels: [{name: value, function: 4, address: 0, type: int16, scale: 0.0001, unit: mm, lowest: -1, highest: 1}]
+"""
+    others = "".join(f"  c{k}: {{<<: *comparator, unit: {k}}}\n" for k in range(2, 10))
+    path = tmp_path / "machine.yaml"
+    path.write_text(TRIPOD.read_text().replace("gauges:\n", f"gauges:\n{first}{others}", 1))
+    gauges: Any = load(path).gauges
+    assert [gauges[f"c{k}"].unit for k in range(1, 10)] == list(range(1, 10))
+    assert {gauges[f"c{k}"].channels[0].scale for k in range(1, 10)} == {1e-4}
 
 
 def test_a_serial_format_is_a_word_and_an_exponent_a_number(tmp_path: Path) -> None:

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from compd.gauge import LineFault, Quality, Reading, RegisterReply
-from compd_drivers.modbus import Modbus, ModbusChannel, RegisterBlock, blocks, decode
+from compd_drivers.modbus import Modbus, RegisterBlock, blocks
+from compd_drivers.modbus_description import ModbusChannel
+from compd_drivers.modbus_number import decode
 
 
 def channel(**keys: Any) -> dict[str, Any]:
@@ -52,11 +54,75 @@ def read(registers: list[int], *channels: dict[str, Any]) -> list[Reading]:
         ("float32", "high_first", "big", [0x3F80, 0x0000], 1.0),
         ("float32", "low_first", "big", [0x0000, 0xC000], -2.0),
         ("float32", "high_first", "little", [0x803F, 0x0000], 1.0),
+        ("int64", "high_first", "big", [0xFFFF, 0xFFFF, 0xFFFF, 0xFFFE], -2.0),
+        ("uint64", "low_first", "big", [1, 2, 0, 0], 0x20001),
+        ("float64", "high_first", "big", [0xBFC0, 0, 0, 0], -0.125),
+        ("float64", "low_first", "little", [0, 0, 0, 0xC0BF], -0.125),
+        ("bcd16", "high_first", "big", [0x1234], 1234.0),
+        ("bcd32", "high_first", "big", [0x1234, 0x5678], 12345678.0),
+        ("bcd32", "low_first", "big", [0x5678, 0x1234], 12345678.0),
     ],
 )
 def test_numbers_out_of_registers(kind: str, order: str, byte_order: str, registers: list[int], value: float) -> None:
     made = ModbusChannel.model_validate(channel(type=kind, word_order=order, byte_order=byte_order))
     assert decode(made, registers) == value
+
+
+@pytest.mark.parametrize(
+    ("keys", "registers", "value"),
+    [
+        # Beckhoff IP5209: word 0 is D0 and the status, word 1 is D2 and D1
+        ({"type": "uint24", "word_order": "low_first"}, [0xD055, 0xD2D1], 0xD2D1D0),
+        ({"type": "int24", "word_order": "low_first"}, [0xFE55, 0xFFFF], -2.0),
+        ({"type": "int16", "at_byte": 1}, [0x55FF, 0xFE55], -2.0),
+        ({"type": "float32", "at_byte": 1}, [0x55BE, 0x0000, 0x0055], -0.125),
+        ({"type": "int8"}, [0xFE55], -2.0),
+        ({"type": "uint8", "at_byte": 1}, [0x55FE], 254.0),
+        ({"type": "uint8", "byte_order": "little"}, [0x55FE], 254.0),
+        ({"type": "int16", "mask": 0xFFF0, "shift": 4}, [0xFFE5], -2.0),
+        ({"type": "uint16", "mask": 0xFFF0, "shift": 4}, [0xFFE5], 0xFFE),
+        ({"type": "int32", "mask": 0x00FFFF00, "shift": 8}, [0x55FF, 0xFE55], -2.0),
+        ({"type": "uint16", "mask": 0x0003}, [0xFFFE], 2.0),
+        ({"type": "uint16", "minus": 0x8000}, [0x8002], -2.0),
+        ({"type": "uint16", "minus": 0x8000, "mask": 0x0FFF}, [0xF002], -2.0),
+        ({"type": "bcd16", "minus": 0x8000, "mask": 0x0FFF}, [0x8123], -123.0),
+        ({"type": "bcd16", "minus": 0x8000}, [0x8123], -123.0),
+    ],
+)
+def test_numbers_that_are_parts_of_registers(keys: dict[str, Any], registers: list[int], value: float) -> None:
+    made = ModbusChannel.model_validate(channel(**keys))
+    assert made.length == len(registers)
+    assert decode(made, registers) == value
+
+
+def test_what_is_no_decimal_digit_is_no_number() -> None:
+    (reading,) = read([0x12A4], channel(type="bcd16"))
+    assert reading.quality is Quality.MISMATCH
+    assert reading.detail == "12A4 are no decimal digits, see `type` and `mask`"
+
+
+@pytest.mark.parametrize(
+    ("keys", "problem"),
+    [
+        ({"type": "float32", "mask": 1}, "belong to whole numbers"),
+        ({"type": "int16", "mask": 0x10000}, "beyond int16"),
+        ({"type": "int16", "mask": 0xFF00}, "side by side"),
+        ({"type": "int16", "mask": 0xFF00, "shift": 9}, "side by side"),
+        ({"type": "int16", "mask": 0x0F0F}, "side by side"),
+        ({"type": "int16", "shift": 4}, "needs a `mask`"),
+        ({"type": "int16", "minus": 0x8000}, "a sign of its own"),
+        ({"type": "uint16", "minus": 0x8001}, "must be one bit"),
+        ({"type": "uint16", "minus": 0x0001, "mask": 0x0003}, "must not stand in `mask`"),
+        ({"type": "bit"}, "functions 1 and 2 read type bit"),
+        ({"function": 2}, "functions 1 and 2 read type bit"),
+        ({"type": "bit", "function": 2, "at_byte": 1}, "has no `at_byte`"),
+        ({"address": 65535, "at_byte": 1}, "beyond register 65535"),
+        ({"status": {"address": 1, "mask": 0x0C, "ok": [1]}}, "it never comes"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(keys: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        options(channel(**keys))
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
@@ -85,6 +151,10 @@ def test_scale_and_offset_give_the_unit() -> None:
         ([5, 3], {"status": {"address": 1, "under_range": [3]}}, Quality.UNDER_RANGE),
         ([5, 0], {"status": {"address": 1}}, Quality.OK),
         ([5, 7], {"status": {"address": 1, "ok": [6, 7]}}, Quality.OK),
+        ([5, 0xF3], {"status": {"address": 1, "mask": 0x0C}}, Quality.OK),
+        ([5, 0xF4], {"status": {"address": 1, "mask": 0x0C}}, Quality.SENSOR_FAULT),
+        ([5, 0xF8], {"status": {"address": 1, "mask": 0x0C, "over_range": [8]}}, Quality.OVER_RANGE),
+        ([0xD005, 0], {"type": "uint8", "status": {"address": 0, "mask": 0x0C}}, Quality.SENSOR_FAULT),
     ],
 )
 def test_values_that_are_none_are_named(registers: list[int], keys: dict[str, Any], quality: Quality) -> None:
@@ -141,7 +211,7 @@ def test_a_block_that_fails_leaves_no_values() -> None:
         ([channel(), channel(address=1)], "channel named twice: a"),
         ([channel(address=65535, type="float32")], "beyond register 65535"),
         ([channel(unit="um")], "unit"),
-        ([channel(function=1)], "function"),
+        ([channel(function=5)], "function"),
         ([channel(scale=math.inf)], "scale"),
         ([], "channels"),
     ],

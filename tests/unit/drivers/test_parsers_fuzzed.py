@@ -38,7 +38,7 @@ def outcome(gauge: Any, reply: bytes) -> list[Reading] | LineFault:
     clock = InstantClock()
     line: Any = StreamLine(ScriptedPort(clock, device=lambda request: reply), 0.1, 0.002, clock)
     if gauge.line_kind == "registers":
-        line = RtuMaster(line, alternate=False)
+        line = RtuMaster(line, ask_one_more=False)
     try:
         readings = list(gauge.read(line))
     except LineFault as fault:

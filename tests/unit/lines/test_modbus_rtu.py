@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Callable
 
@@ -39,15 +40,15 @@ def counting_slave(end: int = 100) -> Device:
     return answer
 
 
-def master(device: Device, alternate: bool = True) -> tuple[RtuMaster, ScriptedPort]:
+def master(device: Device, ask_one_more: bool = True) -> tuple[RtuMaster, ScriptedPort]:
     clock = InstantClock()
     port = ScriptedPort(clock, device=device)
-    return RtuMaster(StreamLine(port, 0.1, 0.002, clock), alternate), port
+    return RtuMaster(StreamLine(port, 0.1, 0.002, clock), ask_one_more), port
 
 
 def fault_of(device: Device, count: int = 2) -> LineFault:
     with pytest.raises(LineFault) as caught:
-        master(device, alternate=False)[0].read_registers(UNIT, 4, 10, count)
+        master(device, ask_one_more=False)[0].read_registers(UNIT, 4, 10, count)
     return caught.value
 
 
@@ -70,7 +71,7 @@ def test_crc_is_the_one_that_pymodbus_computes(data: bytes) -> None:
 
 
 def test_request_on_the_wire() -> None:
-    line, port = master(counting_slave(), alternate=False)
+    line, port = master(counting_slave(), ask_one_more=False)
     line.read_registers(0x01, 3, 0, 10)
     assert port.written == [bytes.fromhex("01030000000AC5CD")]
 
@@ -100,6 +101,87 @@ def test_a_map_that_ends_there_is_asked_beyond_only_once() -> None:
     asked = [struct.unpack(">BBHH", request[:-2])[3] for request in port.written]
     assert asked.count(4) == 1
     assert len(asked) == 7
+
+
+Beyond = Callable[[bytes], bytes]
+BEYOND: dict[str, Beyond] = {
+    "silent": lambda request: b"",
+    "exception 2": lambda request: framed(bytes([request[0], request[1] | 0x80, 2])),
+    "exception 3": lambda request: framed(bytes([request[0], request[1] | 0x80, 3])),
+    "exception 4": lambda request: framed(bytes([request[0], request[1] | 0x80, 4])),
+    "shorter reply": lambda request: registers_of(request[0], request[1], [1010, 1011, 1012]),
+}
+
+
+def polled(line: RtuMaster, polls: int) -> list[str]:
+    """What each of so many polls of three registers gives: "ok" or the fault's quality. Drained as the daemon does."""
+    outcomes = []
+    for _ in range(polls):
+        try:
+            assert line.read_registers(UNIT, 4, 10, 3).registers == (1010, 1011, 1012)
+            outcomes.append("ok")
+        except LineFault as fault:
+            outcomes.append(str(fault.quality))
+            line.drain()
+    return outcomes
+
+
+@pytest.mark.parametrize("beyond", BEYOND)
+def test_whatever_a_slave_does_beyond_its_map_it_does_once(beyond: str) -> None:
+    within = counting_slave(end=13)
+
+    def slave(request: bytes) -> bytes:
+        _, _, address, count = struct.unpack(">BBHH", request[:-2])
+        return BEYOND[beyond](request) if address + count > 13 else within(request)
+
+    line, port = master(slave)
+    outcomes = polled(line, 10)
+    assert outcomes.count("ok") >= 9, outcomes
+    asked = [struct.unpack(">BBHH", request[:-2])[3] for request in port.written]
+    assert asked.count(4) == 1
+
+
+def test_a_slave_that_has_the_register_is_asked_for_it_again_after_a_silence() -> None:
+    """Or a cable that was off once would leave the line without the check for the time that it is open."""
+    slave = counting_slave()
+    off = [False]
+    line, port = master(lambda request: b"" if off[0] else slave(request))
+    polled(line, 4)
+    off[0] = True
+    assert set(polled(line, 4)) == {"timeout"}
+    off[0] = False
+    port.written.clear()
+    assert set(polled(line, 6)) == {"ok"}
+    assert [struct.unpack(">BBHH", request[:-2])[3] for request in port.written].count(4) == 3
+
+
+def test_a_first_longer_reply_that_is_late_says_nothing_about_the_map() -> None:
+    slave = counting_slave()
+    clock = InstantClock()
+    port = ScriptedPort(clock)
+    port._device = lambda request: b"" if len(port.written) == 2 else slave(request)
+    line = RtuMaster(StreamLine(port, 0.1, 0.002, clock))
+    line.read_registers(UNIT, 4, 10, 3)
+    with pytest.raises(LineFault, match="timeout"):
+        line.read_registers(UNIT, 4, 10, 3)
+    port.script = [slave(port.written[-1]), b""]  # comes after all, and is dropped
+    assert polled(line, 6) == ["ok"] * 6
+    assert [struct.unpack(">BBHH", request[:-2])[3] for request in port.written].count(4) == 4
+
+
+def test_one_more_is_not_asked_for_where_the_line_says_so() -> None:
+    line, port = master(counting_slave(), ask_one_more=False)
+    polled(line, 4)
+    assert {struct.unpack(">BBHH", request[:-2])[3] for request in port.written} == {3}
+
+
+def test_blocks_of_different_length_in_turn_need_no_register_more() -> None:
+    line, port = master(counting_slave())
+    for _ in range(4):
+        line.read_registers(UNIT, 4, 10, 3)
+        line.read_registers(UNIT, 4, 20, 4)
+    asked = [struct.unpack(">BBHH", request[:-2])[3] for request in port.written]
+    assert all(count != before for before, count in itertools.pairwise(asked)), "a late reply is one too long"
 
 
 def test_the_last_register_has_none_beyond_it() -> None:

@@ -14,7 +14,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.lines.modbus_tcp import ModbusTcp
-from tests.support.wire_rig import Rig, rig
+from tests.support.wire_rig import InstantClock, Rig, rig
 
 LINE = {"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}
 GAUGE: dict[str, Any] = {
@@ -46,6 +46,16 @@ def test_registers_of_both_functions(bench: Rig) -> None:
 def test_an_exception_has_its_name(bench: Rig) -> None:
     with bench.open() as line, pytest.raises(LineFault, match="illegal data address"):
         line.read_registers(7, 4, 4, 10)
+
+
+def test_the_pause_before_the_next_request(bench: Rig) -> None:
+    clock = InstantClock()
+    settings: Any = bench.settings.model_copy(update={"pause_s": 0.03})
+    line = open_line(settings, clock)
+    for _ in range(3):
+        line.read_registers(7, 4, 0, 1)  # type: ignore[union-attr]
+    line.close()
+    assert clock.waits_s == pytest.approx([0.03, 0.03]), "none before the first"
 
 
 def test_an_absent_unit_times_out(bench: Rig) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import socket
 import termios
 import tty
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -112,6 +115,45 @@ def test_drain_waits_for_quiet_and_gives_what_came() -> None:
     start_s = clock.now_s
     assert line.drain() == b"later"
     assert clock.now_s - start_s == pytest.approx(TIMEOUT_S)
+
+
+def test_the_timeout_begins_when_the_request_has_left() -> None:
+    """A request of 15 bytes takes 0.125 s at 1200 baud, longer than this timeout."""
+    clock = InstantClock()
+    port = ScriptedPort(clock)
+    port.character_s = 10 / 1200
+    line = StreamLine(port, TIMEOUT_S, 0.001, clock)
+    sent_s = line.send(bytes(15))
+    with pytest.raises(LineFault, match=r"no byte within 0\.1 s"):
+        line.receive(1)
+    assert clock.now_s == pytest.approx(sent_s + TIMEOUT_S)
+
+
+def test_a_device_that_is_deaf_after_its_reply_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`pause_s`: from the reply's last byte to the next request. This one hears nothing for 15 ms."""
+    clock = InstantClock()
+    replied_s = [-math.inf]
+
+    def deaf(request: bytes) -> bytes:
+        if clock.now_s - replied_s[0] < 0.015:
+            return b""
+        replied_s[0] = clock.now_s
+        return b"+1.5\r\n"
+
+    monkeypatch.setattr("compd.lines.open.TcpPort", lambda *_: ScriptedPort(clock, device=deaf))
+    answers = {}
+    for pause_s in (0.0, 0.015):
+        settings = {"kind": "tcp", "host": "x", "port": 1, "timeout_s": TIMEOUT_S, "pause_s": pause_s}
+        line: Any = open_line(SETTINGS.validate_python(settings), clock)
+        replied_s[0] = -math.inf
+        answers[pause_s] = 0
+        for _ in range(10):
+            line.send(b"?")
+            with suppress(LineFault):
+                line.receive_until(b"\r\n", 10)
+                answers[pause_s] += 1
+    assert answers[0.015] == 10
+    assert answers[0.0] < 10
 
 
 # --- real ptys and sockets ---------------------------------------------------------------------------------

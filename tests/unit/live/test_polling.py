@@ -28,6 +28,7 @@ class Line:
 
     last_request_s = -math.inf
     unexpected_bytes = 0
+    request_came_back = False
 
     def __init__(self) -> None:
         self.drained = 0

@@ -14,6 +14,8 @@ from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
 from compd.live.acquisition.reading_trust import LONGEST_OWN_GAP_S, ReadingTrust, TrustSettings, tolerance_mm
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
+from compd.plugins import GAUGES as GAUGES_GROUP
+from compd.plugins import load, names
 
 NOISE_UM = 0.1
 POLL_S = 0.005
@@ -153,12 +155,38 @@ def test_a_jump_that_the_next_answer_confirms_is_not_believed_until_a_person_acc
     assert reading.quality is Quality.DISTRUSTED
     assert f"jumped by {jump_mm:.3f} mm" in reading.detail
     assert "`compd accept scale_1`" in reading.detail
+    assert "limited by `fastest_mm_per_s: 60`, `acceleration_mm_per_s2: 400`" in reading.detail
     shop.shows["scale_1"] = lambda _: 0.0
     shop.poll(10)
     assert shop.reading("scale_1").quality is Quality.DISTRUSTED, "not by itself"
     assert shop.memory.accept("scale_1") == ["scale_1.value"]
     shop.poll()
     assert shop.reading("scale_1").ok
+
+
+def test_a_limit_of_speed_that_is_too_small_is_named_in_the_fault():
+    """A scale that moves faster than a comparator, for which the key was written."""
+    shop = Shop(MotionLimits(speed=0.5))
+    shop.poll(5)
+    start_s = shop.now_s
+    shop.shows["scale_1"] = lambda time_s: 10.0 * (time_s - start_s)
+    shop.poll(5)
+    assert "its motion is limited by `fastest_mm_per_s: 0.5`" in shop.gauges["scale_1"].detail
+
+
+def test_without_limits_a_scale_is_followed_at_every_speed():
+    shop = Shop(MotionLimits())
+    shop.poll(5)
+    start_s = shop.now_s
+    shop.shows["scale_1"] = lambda time_s: 10.0 * (time_s - start_s)
+    for _ in range(20):
+        shop.poll()
+        assert shop.reading("scale_1").ok
+
+
+@pytest.mark.parametrize("driver", names(GAUGES_GROUP))
+def test_no_driver_limits_the_speed_of_what_it_measures_by_default(driver):
+    assert load(GAUGES_GROUP, driver, driver).Options.model_fields["fastest_mm_per_s"].default is None
 
 
 def test_without_limits_a_jump_that_two_answers_agree_on_is_believed():
