@@ -11,7 +11,8 @@ import math
 import select
 import socket
 import time
-from typing import Any, Callable, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 # Reasons of the bridge, as its pin `reason` shows them; compd_arming.py has the others and all texts.
 NOT_CONNECTED, NOT_VALID, EXPIRED, OLD_SEQ, NOT_FINITE, WRONG_LINKS, TOO_LARGE, UNREADABLE, CLOCKS = range(2, 11)

@@ -183,6 +183,7 @@ def _status(simulation: Simulation) -> Text:
         "tour": f"{truth['phase']}, point {truth['point']}",
         "plan": _planned(truth.get("plan", {})),
         "commanded": f"commanded, {truth['phase']}",
+        "following": f"following a controller, {truth['phase']}",
         "blocked": "blocked: the links cannot meet there",
     }[truth["mode"]]
     tip = " ".join(f"{value:9.4f}" for value in truth["tip_mm"])

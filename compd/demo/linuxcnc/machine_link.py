@@ -136,7 +136,7 @@ class Link:
             nominal_mm, drive_mm = values[:LINKS], values[LINKS:]
             self._watch(nominal_mm, drive_mm)
             if number % FOLLOWED == 0:
-                commands.append([self._clock.time_s(number), *drive_mm])
+                commands.append([number * PERIOD_S, *drive_mm])
             if number % LOGGED == 0:
                 bits = [bool(int(value)) for value in sample[1 + 2 * LINKS :]]
                 looked.append((number, nominal_mm, drive_mm, bits))

@@ -3,7 +3,7 @@
     {"class": "TRUTH"}                                the true tip, and what the machine does
     {"class": "MEASURE"}                              the tip as a laser tracker shows it, and the links' lengths
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
-    {"class": "FOLLOW", "commands": [[t, ..], ..]}    follow a controller's stream: time (CLOCK_MONOTONIC), scale values
+    {"class": "FOLLOW", "commands": [[t, ..], ..]}    follow a controller's stream: time (s), scale values
     {"class": "TOUR"}                                 visit random points from now on
     {"class": "PLAN"}                                 measure the planned rows, from the first
     {"class": "TIP_FOR", "scale_mm": [..]}            the tip if the scales were there now

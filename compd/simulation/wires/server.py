@@ -173,11 +173,10 @@ class Simulation:
 
     def _follow(self, message: Mapping[str, Any]) -> Answer:
         commands = [
-            (float(time_s), np.array(scale_mm, dtype=float)) for time_s, *scale_mm in message["commands"]
+            MotorCommand(float(time_s), np.array(scale_mm, dtype=float)) for time_s, *scale_mm in message["commands"]
         ]
         with self._live.now() as world:
-            now_s = self._clock.monotonic()
-            world.follow([MotorCommand(now_s - time_s, scale_mm) for time_s, scale_mm in commands])
+            world.follow(commands)
             mode, phase = world.mode, world.phase
         return {"class": "FOLLOWS", "mode": mode, "moving": phase == "moving"}
 
