@@ -4,11 +4,12 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
+	@echo "make demo-linuxcnc  LinuxCNC corrected, a hidden effect probed, diagnosed, adopted (8 min; Debian's linuxcnc-uspace)"
 	@echo "make live    the same machine live in the browser, until Ctrl-C"
 	@echo "make test    the tests; a hidden cause is found on wires among them (10 to 15 min)"
 	@echo "make sample  some of the longer ones: the page in a real browser, drivers that misbehave, worked examples (7 min)"
@@ -46,6 +47,10 @@ workbench: $(STAMP)
 
 live: $(STAMP)
 	@$(BIN)/compd demo --live
+
+# Needs Debian's linuxcnc-uspace: eight minutes.
+demo-linuxcnc: $(STAMP)
+	@$(BIN)/compd demo --linuxcnc
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. Each takes a
 # third of a processor: four at a time leave two processors enough for everything to be in time.

@@ -135,9 +135,7 @@ class _SmallestDelay:
 class Stream:
     """The daemon's messages, without ever waiting for them. Connects again by itself."""
 
-    def __init__(
-        self, address: str, token: str | None = None, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, address: str, token: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         """address : path of a Unix socket, or host:port. token : that of the daemon, where its TCP socket wants one."""
         self._target: Any = address
         self._family = socket.AF_UNIX

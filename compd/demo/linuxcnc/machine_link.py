@@ -130,7 +130,8 @@ class Link:
 
     def __init__(self, directory: Path, component: Any) -> None:
         self._simulation = Simulation(directory / "control.sock")
-        self._log: IO[str] = Path("motion.log").open("w", buffering=1)
+        # open as long as the process lives, and whole lines at once: others read it meanwhile
+        self._log: IO[str] = Path("motion.log").open("w", buffering=1)  # noqa: SIM115
         self._clock = SampleClock()
         self._sampler = subprocess.Popen(["halsampler", "-t"], stdout=subprocess.PIPE)
         self._rest = b""

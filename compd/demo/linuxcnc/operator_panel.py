@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """What stands in for LinuxCNC's screen: does what a person does there, as a program asks for on a Unix socket.
 
-LinuxCNC starts it as its DISPLAY, and ends when it ends. Requests and answers are JSON objects, one a line, on panel.sock
-in the working directory; `{"do": "home"}` calls `Operator.home`. Every answer has "result", and "errors": what LinuxCNC
-has shown its operator since the last answer. Runs under the Python of LinuxCNC.
+LinuxCNC starts it as its DISPLAY, and ends when it ends. Requests and answers are JSON objects, one a line, on
+panel.sock in the working directory; `{"do": "home"}` calls `Operator.home`. Every answer has "result", and "errors":
+what LinuxCNC has shown its operator since the last answer. Runs under the Python of LinuxCNC.
 """
 
 from __future__ import annotations
