@@ -138,11 +138,10 @@ def _between(
     times_s: FloatArray, rows: Sequence[Mapping[str, str]], start_s: float, end_s: float
 ) -> list[dict[str, float]]:
     """Rows of that time in which no cell is empty, with the time as it is in `times_s`."""
-    inside = np.flatnonzero((times_s >= start_s) & (times_s <= end_s))
     return [
-        {name: float(cell) for name, cell in rows[i].items()} | {"time_s": float(times_s[i])}
-        for i in inside
-        if all(rows[i].values())
+        {name: float(cell) for name, cell in row.items()} | {"time_s": time_s}
+        for time_s, row in zip(times_s.tolist(), rows, strict=True)
+        if start_s <= time_s <= end_s and all(row.values())
     ]
 
 

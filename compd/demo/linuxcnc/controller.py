@@ -169,7 +169,7 @@ class LinuxCnc:
         """
         shown, start_s = len(self.errors), time.monotonic()
         self.start(program)
-        self.do("wait_for_end", timeout_s + ANSWER_S, timeout_s=timeout_s)
+        self.do("wait_for_end", timeout_s + ANSWER_S, seconds=timeout_s)
         if self.errors[shown:]:
             raise self._problem(f"stopped {program.name}: {self.errors[shown:]}")
         return start_s, time.monotonic()

@@ -77,15 +77,13 @@ def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> li
 def tip_errors(mechanism: Mechanism, samples: Sequence[MotionSample]) -> TipErrors:
     """Of every sample with a look at the true tip."""
     rest = _at_rest(samples)
-    looked = [number for number, sample in enumerate(samples) if sample.tip_mm is not None]
-    wanted_mm = wanted_tips_mm(mechanism, (samples[number].nominal_mm for number in looked))
+    looked = [(number, sample, sample.tip_mm) for number, sample in enumerate(samples) if sample.tip_mm is not None]
+    wanted_mm = wanted_tips_mm(mechanism, (sample.nominal_mm for _, sample, _ in looked))
     distance_um = np.array(
-        [
-            np.linalg.norm(np.subtract(samples[number].tip_mm, tip_mm)) * UM_PER_MM
-            for number, tip_mm in zip(looked, wanted_mm, strict=True)
-        ]
+        [np.linalg.norm(tip_mm - wanted) * UM_PER_MM for (_, _, tip_mm), wanted in zip(looked, wanted_mm, strict=True)]
     )
-    return TipErrors(distance_um[rest[looked]], distance_um[~rest[looked]])
+    at_rest = rest[[number for number, _, _ in looked]]
+    return TipErrors(distance_um[at_rest], distance_um[~at_rest])
 
 
 def _at_rest(samples: Sequence[MotionSample]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

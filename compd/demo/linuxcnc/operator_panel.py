@@ -66,9 +66,9 @@ class Operator:
         self._command.auto(linuxcnc.AUTO_RUN, 0)
         return self._wait(lambda: bool(self._stat.interp_state != linuxcnc.INTERP_IDLE), COMMAND_S)
 
-    def wait_for_end(self, timeout_s: float) -> bool:
+    def wait_for_end(self, seconds: float) -> bool:
         """Until the program has ended, or was aborted."""
-        return self._wait(lambda: bool(self._stat.interp_state == linuxcnc.INTERP_IDLE), timeout_s)
+        return self._wait(lambda: bool(self._stat.interp_state == linuxcnc.INTERP_IDLE), seconds)
 
     def abort(self) -> bool:
         self._command.abort()
