@@ -18,6 +18,8 @@
 | compd.clear         | bit in    | while not armed: offsets to 0                                                    |
 | compd.machine-on    | bit in    | halui.machine.is-on                                                              |
 | compd.homed         | bit in    | motion.is-all-homed                                                              |
+| compd.base.N.x ..   | float out | with --live-base: how far base joint N has moved, mm                             |
+| compd.pose.x .. c   | float in  | with --live-base: the commanded pose, axis.x.pos-cmd and so on                   |
 
 The standard library and LinuxCNC's `hal` alone.
 """
@@ -28,10 +30,12 @@ import argparse
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import hal
 from compd_arming import REASONS, Arming, Inputs, Outputs
+from compd_live_base import Hexapod, base_shifts_mm, length_changes_mm, read_geometry
 from compd_setpoints import Judge, Refused, Setpoint, Stream
 
 # A setpoint is read as soon as it comes; without one the loop looks at its pins so often.
@@ -41,8 +45,12 @@ PERIOD_S = 0.005
 class Bridge:
     """The component, its connection to the daemon, and what the last messages were."""
 
-    def __init__(self, component: hal.component, stream: Stream, links: int, limit_mm: float) -> None:
+    def __init__(
+        self, component: hal.component, stream: Stream, links: int, limit_mm: float, live_base: Hexapod | None
+    ) -> None:
+        """live_base : nominal joints of genhexkins, whose base is to follow the frame; None to leave it."""
         self._pins = component
+        self._live_base = live_base
         self._stream = stream
         self._links, self._limit_mm = links, limit_mm
         self._judge = self._new_judge()
@@ -58,6 +66,12 @@ class Bridge:
             component.newpin(name, hal.HAL_BIT, hal.HAL_IN)
         component.newpin("reason", hal.HAL_U32, hal.HAL_OUT)
         component.newpin("age", hal.HAL_FLOAT, hal.HAL_OUT)
+        if live_base is not None:
+            for link in range(links):
+                for axis in "xyz":
+                    component.newpin(f"base.{link}.{axis}", hal.HAL_FLOAT, hal.HAL_OUT)
+            for axis in "xyzabc":
+                component.newpin(f"pose.{axis}", hal.HAL_FLOAT, hal.HAL_IN)
 
     def run(self) -> None:
         """Until the process is told to end."""
@@ -67,7 +81,7 @@ class Bridge:
             self._write(self._arming.step(self._inputs()))
 
     def _new_judge(self) -> Judge:
-        return Judge(self._links, self._limit_mm, self._stream.same_clock)
+        return Judge(self._links, self._limit_mm, self._stream.same_clock, self._live_base is not None)
 
     def _read(self) -> None:
         for message in self._stream.poll():
@@ -96,13 +110,13 @@ class Bridge:
 
     def _write(self, outputs: Outputs) -> None:
         pins = self._pins
-        for link in range(self._links):
-            if self._setpoint is not None:
-                pins[f"link.{link}.asked"] = self._setpoint.correction_mm[link]
-            if outputs.zero:
-                pins[f"link.{link}.offset"] = 0.0
-            elif outputs.applied is not None:
-                pins[f"link.{link}.offset"] = outputs.applied.correction_mm[link]
+        if self._setpoint is not None:
+            for link, asked_mm in enumerate(self._setpoint.correction_mm):
+                pins[f"link.{link}.asked"] = asked_mm
+        if outputs.zero:
+            self._write_offsets([0.0] * self._links, [[0.0] * 3] * self._links)
+        elif outputs.applied is not None:
+            self._apply(outputs.applied)
         pins["armed"] = outputs.armed
         pins["fault"] = outputs.fault
         pins["reason"] = outputs.reason
@@ -111,6 +125,24 @@ class Bridge:
         # last: a beat says that all of the above is written
         pins["heartbeat"] = outputs.heartbeat
 
+    def _apply(self, setpoint: Setpoint) -> None:
+        if self._live_base is None or setpoint.frame is None:
+            self._write_offsets(setpoint.correction_mm, [])
+            return
+        pose = [self._pins[f"pose.{axis}"] for axis in "xyzabc"]
+        shifts_mm = base_shifts_mm(self._live_base, setpoint.frame)
+        made_mm = length_changes_mm(self._live_base, pose, shifts_mm)
+        offsets_mm = [all_mm - base_mm for all_mm, base_mm in zip(setpoint.correction_mm, made_mm, strict=True)]
+        self._write_offsets(offsets_mm, shifts_mm)
+
+    def _write_offsets(self, offsets_mm: Sequence[float], shifts_mm: Sequence[Sequence[float]]) -> None:
+        for link, offset_mm in enumerate(offsets_mm):
+            self._pins[f"link.{link}.offset"] = offset_mm
+        if self._live_base is not None:
+            for link, shift_mm in enumerate(shifts_mm):
+                for axis, way_mm in zip("xyz", shift_mm, strict=True):
+                    self._pins[f"base.{link}.{axis}"] = way_mm
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -118,6 +150,9 @@ def main() -> None:
     parser.add_argument("--links", type=int, choices=(3, 6), default=6, help="links of the machine")
     parser.add_argument("--limit", type=float, default=0.2, help="largest correction of a link that is used, mm")
     parser.add_argument("--token-file", type=Path, help="the daemon's token, for host:port")
+    parser.add_argument(
+        "--live-base", metavar="GEOMETRY.hal", type=Path, help="let the base joints of genhexkins follow the frame"
+    )
     parser.add_argument("--reasons", action="store_true", help="print what the numbers of the pin `reason` mean")
     options = parser.parse_args()
     if options.reasons:
@@ -125,9 +160,10 @@ def main() -> None:
         return
     if options.address is None:
         parser.error("address: the daemon's Unix socket is needed, or host:port")
+    live_base = read_geometry(options.live_base.read_text()) if options.live_base else None
     token = options.token_file.read_text().strip() if options.token_file else None
     component = hal.component("compd")
-    bridge = Bridge(component, Stream(options.address, token), options.links, options.limit)
+    bridge = Bridge(component, Stream(options.address, token), options.links, options.limit, live_base)
     # LinuxCNC ends its components with SIGTERM
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     component.ready()

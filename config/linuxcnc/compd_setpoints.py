@@ -20,6 +20,9 @@ NOT_CONNECTED, NOT_VALID, EXPIRED, OLD_SEQ, NOT_FINITE, WRONG_LINKS, TOO_LARGE, 
 # States whose setpoints are valid. One that is not known here comes from a newer daemon, and is not used.
 VALID_STATES = frozenset(("ok", "slewing", "clamped", "hold", "fade", "degraded"))
 
+# Of a setpoint's `frame`, three numbers each.
+FRAME_KEYS = ("origin_M_mm", "displacement_M_mm", "rotation_M_rad")
+
 RECONNECT_EVERY_S = 0.5
 # A daemon sends a setpoint per cycle: after this silence the connection is half open.
 SILENCE_S = 2.0
@@ -36,8 +39,8 @@ class Setpoint(NamedTuple):
 
     correction_mm : what is added to the command of each link, mm.
     expires_s : until when, on this computer's monotonic clock, s.
-    frame : displacement (mm) and rotation vector (rad) of the base platform in {M} since machine zero, (6); None
-        where it was not asked for.
+    frame : origin of the base platform in {M} (mm), its displacement (mm) and rotation vector (rad) since machine
+        zero, (9); None where it was not asked for.
     """
 
     seq: int
@@ -92,11 +95,10 @@ class Judge:
         if not self._frame:
             return Setpoint(seq, tuple(correction_mm), expires_s)
         try:
-            frame = [*message["frame"]["displacement_M_mm"], *message["frame"]["rotation_M_rad"]]
+            frame = [x for name in FRAME_KEYS for x in message["frame"][name]]
         except (KeyError, TypeError):
             return Refused(UNREADABLE)
-        # a rotation of the base is an angle in rad, far below the limit of a length in mm
-        reason = UNREADABLE if len(frame) != 6 else _unusable(frame, math.inf)
+        reason = UNREADABLE if len(frame) != 9 else _unusable(frame, math.inf)
         return Refused(reason) if reason else Setpoint(seq, tuple(correction_mm), expires_s, tuple(frame))
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong while LinuxCNC moves the machine: no step, no motion beyond the clamp, no feed, and nothing arms again.
+"""What goes wrong while LinuxCNC moves the machine: no step, no motion beyond the clamp, no feed, nothing arms again.
 
 The machine is moving with corrections when each fault comes. -rP prints how long the feed took to be inhibited.
 """

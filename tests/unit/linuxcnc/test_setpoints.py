@@ -115,11 +115,15 @@ def test_clocks_that_drift_apart_are_followed() -> None:
 
 
 def test_the_frames_displacement_is_refused_like_a_correction() -> None:
-    frame = {"displacement_M_mm": [0.0, 0.0, 0.01], "rotation_M_rad": [1e-5, 0.0, 0.0]}
+    frame = {
+        "origin_M_mm": [0.0, 0.0, 900.01],
+        "displacement_M_mm": [0.0, 0.0, 0.01],
+        "rotation_M_rad": [1e-5, 0.0, 0.0],
+    }
     wanted = judge(frame=True)
     good = wanted.judge(setpoint(frame=frame), NOW_S)
     assert isinstance(good, bridge.Setpoint)
-    assert good.frame == (0.0, 0.0, 0.01, 1e-5, 0.0, 0.0)
+    assert good.frame == (0.0, 0.0, 900.01, 0.0, 0.0, 0.01, 1e-5, 0.0, 0.0)
     assert wanted.judge(setpoint(seq=8), NOW_S) == bridge.Refused(bridge.UNREADABLE)
     bad = frame | {"rotation_M_rad": [math.nan, 0.0, 0.0]}
     assert wanted.judge(setpoint(seq=9, frame=bad), NOW_S) == bridge.Refused(bridge.NOT_FINITE)
