@@ -77,8 +77,12 @@ class Bridge:
         """Until the process is told to end."""
         while True:
             self._stream.wait(PERIOD_S)
-            self._read()
-            self._write(self._arming.step(self._inputs()))
+            self.step()
+
+    def step(self) -> None:
+        """Read what has come and the pins, and write what follows."""
+        self._read()
+        self._write(self._arming.step(self._inputs()))
 
     def _new_judge(self) -> Judge:
         return Judge(self._links, self._limit_mm, self._stream.same_clock, self._live_base is not None)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import socket
 from typing import Any
 
 import pytest
 
 from compd.live.loop.states import State
+from tests.support.bridge_daemon import BridgeDaemon
 from tests.support.hand_clock import HandClock
 from tests.support.simulated import run_directory
 
@@ -129,41 +129,17 @@ def test_the_frames_displacement_is_refused_like_a_correction() -> None:
     assert wanted.judge(setpoint(seq=9, frame=bad), NOW_S) == bridge.Refused(bridge.NOT_FINITE)
 
 
-class Daemon:
-    """The daemon's end of a Unix socket."""
-
-    def __init__(self, path: str) -> None:
-        self._listener = socket.socket(socket.AF_UNIX)
-        self._listener.bind(path)
-        self._listener.listen()
-        self.connection: socket.socket | None = None
-
-    def greet(self) -> None:
-        self.connection, _ = self._listener.accept()
-        self.send(b'{"class":"VERSION"}\n')
-
-    def send(self, data: bytes) -> None:
-        assert self.connection is not None
-        self.connection.sendall(data)
-
-    def close(self) -> None:
-        if self.connection is not None:
-            self.connection.close()
-        self._listener.close()
-
-
 def test_the_stream_asks_for_setpoints_reads_lines_that_come_in_pieces_and_connects_again() -> None:
     clock = HandClock()
     with run_directory() as directory:
         path = str(directory / "compd.sock")
         stream = bridge.Stream(path, clock=clock.monotonic)
         assert stream.poll() == []  # nobody there
-        daemon = Daemon(path)
+        daemon = BridgeDaemon(directory / "compd.sock")
         assert stream.poll() == []  # it tries again after half a second
         clock.now_s += 0.6
         stream.poll()
         daemon.greet()
-        assert daemon.connection is not None
         assert [message["class"] for message in stream.poll()] == ["VERSION"]
         assert stream.greeted
         assert json.loads(daemon.connection.recv(1000)) == {"class": "WATCH"}
@@ -186,7 +162,7 @@ def test_the_stream_asks_for_setpoints_reads_lines_that_come_in_pieces_and_conne
 def test_the_stream_leaves_what_is_not_a_living_daemon(what: str) -> None:
     clock = HandClock()
     with run_directory() as directory:
-        daemon = Daemon(str(directory / "compd.sock"))
+        daemon = BridgeDaemon(directory / "compd.sock")
         stream = bridge.Stream(str(directory / "compd.sock"), clock=clock.monotonic)
         stream.poll()
         daemon.greet()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.simulation.truth.mechanism import Mechanism
-from tests.support.live_machine import RAW_AT_ZERO_MM, machine
+from tests.support.live_machine import machine
 from tests.support.paths import CONFIG
 from tests.support.simulated import HEXAPOD, hexapod, section
 
@@ -75,7 +75,6 @@ def test_with_the_base_up_by_10_um_each_command_is_9_14_um_longer_and_the_tip_is
             before_M = supports_M[support] - drawn.plate0_M[point]
             change_mm = np.linalg.norm(before_M + up_mm) - np.linalg.norm(before_M)
             live.change_mm[wire["gauge"]] = float(change_mm)
-    assert RAW_AT_ZERO_MM > 0
     values = live.settle().values
     assert values is not None
     np.testing.assert_allclose(values.correction_mm * 1e3, 9.14, atol=0.005)
@@ -90,3 +89,31 @@ def test_with_the_base_up_by_10_um_each_command_is_9_14_um_longer_and_the_tip_is
     assert tip_z_mm(np.zeros(6)) - 320.0 == pytest.approx(UP_MM, abs=1e-6)
     assert tip_z_mm(values.correction_mm) == pytest.approx(320.0, abs=2e-5)
     assert tip_z_mm(-values.correction_mm) - 320.0 == pytest.approx(2 * UP_MM, abs=1e-4)
+
+
+def test_a_correction_is_limited_before_it_is_added_and_taken_out_before_motion_reads_it() -> None:
+    order = re.findall(r"^addf (\S+) servo-thread$", (LINUXCNC / "compd.hal").read_text(), re.MULTILINE)
+    places = {function: order.index(function) for function in order}
+    assert len(places) == len(order)
+    motion = places["motion-controller"]
+    for joint in range(6):
+        assert places["watchdog.process"] < places[f"limit3.{joint}"]
+        assert places[f"limit3.{joint}"] < places[f"offset.{joint}.update-feedback"]
+        assert places[f"offset.{joint}.update-feedback"] < places["motion-command-handler"] < motion
+        assert motion < places[f"offset.{joint}.update-output"]
+
+
+def test_each_link_is_wired_to_itself() -> None:
+    text = (LINUXCNC / "compd.hal").read_text() + (LINUXCNC / "loopback_drives.hal").read_text()
+    for joint in range(6):
+        for line in (
+            f"net compd-{joint} compd.link.{joint}.offset => limit3.{joint}.in",
+            f"net correction-{joint} limit3.{joint}.out => offset.{joint}.offset",
+            f"net command-{joint} joint.{joint}.motor-pos-cmd => offset.{joint}.in",
+            f"net feedback-{joint} offset.{joint}.fb-out => joint.{joint}.motor-pos-fb",
+            f"net drive-{joint} offset.{joint}.out => offset.{joint}.fb-in",
+            f"setp limit3.{joint}.min -[COMPD]LIMIT",
+            f"setp limit3.{joint}.max [COMPD]LIMIT",
+            f"setp limit3.{joint}.maxv [COMPD]SLEW",
+        ):
+            assert line in text
