@@ -24,6 +24,8 @@ END_S = 30.0
 POLL_S = 0.05
 # Longer than anything the panel waits for by itself.
 ANSWER_S = 30.0
+# There can be one LinuxCNC on a computer.
+LOCK = Path("/tmp/linuxcnc.lock")
 _HERE = Path(__file__).parent
 _SCRIPTS = ("machine_link.py", "operator_panel.py")
 _HAL_FILES = ("machine.hal", "probe.hal")
@@ -63,6 +65,14 @@ class LinuxCnc:
     def __enter__(self) -> Self:
         if lacking := missing():
             raise DaemonError(Problem(where="LinuxCNC", what="cannot run", value=lacking, next_step="install it"))
+        if LOCK.exists():
+            raise DaemonError(
+                Problem(
+                    where=str(LOCK),
+                    what="LinuxCNC runs already on this computer, or was killed",
+                    next_step="end it; where none runs, `halrun -U` and remove this file",
+                )
+            )
         self._write_files()
         with (self.directory / "output.log").open("wb") as log:
             self._process = subprocess.Popen(
@@ -124,9 +134,7 @@ class LinuxCnc:
 
     def arm(self) -> None:
         """Give the bridge a rising edge, and wait until it is armed. Raises DaemonError with its reason."""
-        self.set_signal("compd-arm", "0")
-        self.wait_for("compd.arm", False)
-        self.set_signal("compd-arm", "1")
+        self.do("press", name="compd-arm")
         self.wait_for("compd.armed", True)
 
     def without_corrections(self) -> None:
@@ -235,6 +243,7 @@ class LinuxCnc:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
             subprocess.run([*self._as_ordinary_user(), "halrun", "-U"], check=False, capture_output=True)
+            LOCK.unlink(missing_ok=True)
 
     def _problem(self, what: str) -> DaemonError:
         log = self.directory / "output.log"

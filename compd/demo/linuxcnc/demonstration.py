@@ -31,13 +31,14 @@ SPEEDUP = 30.0
 # The machine stands at machine zero until the controller commands it.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
-# Rounds of probing: the drives work hard in the first of them, and idle in the last, so that what grows with the links'
-# temperature is told from what grows with time.
-HARD_ROUNDS, IDLE_ROUNDS = 3, 2
-HARD_W, IDLE_W = 3.0, 0.3
+# What each drive gives off during each round of probing, W. The drives work hard, idle, and work hard again, so that what
+# grows with the links' temperature is told from what grows with time.
+ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
 # The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
 _OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
 LONGEST_PROGRAM_S = 600.0
+# An error below so many times the noise is not worth a further effect in the model.
+NOISE_RATIO = 2.0
 # The correction of another model is reached at `limits.slew_mm_per_s`: 0.2 mm in 0.4 s.
 ADOPTED_S = 10.0
 
@@ -63,7 +64,8 @@ def run_linuxcnc_demo(
     program: Path = SHIPPED_PROGRAM,
     speedup: float = SPEEDUP,
 ) -> LinuxCncDemo:
-    """Run the program without corrections and with them, probe, diagnose, adopt what was found, and run it again.
+    """Probe while the machine warms up; run the program without corrections and with them; diagnose what was probed,
+    adopt what was found, and run the program again.
 
     Parameters
     ----------
@@ -84,14 +86,14 @@ def run_linuxcnc_demo(
         with LinuxCnc(directory / "controller", directory) as controller:
             session = _Session(configuration, directory, controller, program)
             controller.switch_on()
-            controller.without_corrections()
-            tell("LinuxCNC is homed. The program, without corrections ...")
-            demo.errors[OFF] = session.run_program()
-            session.heat(HARD_W)
             controller.with_corrections()
-            tell(f"The corrections are on. Probing {len(CORNERS_mm)} calibrated corners while the machine warms up ...")
+            tell(f"LinuxCNC is homed. Probing {len(CORNERS_mm)} calibrated corners while the machine warms up ...")
             recording = out / "probed.csv"
             demo.rows = session.probe(recording, tell)
+            controller.without_corrections()
+            tell("The program, without corrections ...")
+            demo.errors[OFF] = session.run_program()
+            controller.with_corrections()
             tell("The program, with corrections ...")
             demo.errors[ON] = session.run_program()
             tell(f"compd diagnose {recording}")
@@ -128,11 +130,10 @@ class _Session:
             ready=self._directory / "gauges-0001.csv",
         )
         with run_commands([record], log=self._directory / "record.log"):
-            for number in range(HARD_ROUNDS + IDLE_ROUNDS):
-                if number == HARD_ROUNDS:
-                    self.heat(IDLE_W)
+            for number, drive_W in enumerate(ROUNDS_W, 1):
+                tell(f"  round {number} of {len(ROUNDS_W)}, {drive_W:g} W in each drive")
+                self.heat(drive_W)
                 rounds.append(self._run(self._probing))
-                tell(f"  round {number + 1} of {HARD_ROUNDS + IDLE_ROUNDS}")
         return write_probed_recording(recording, sorted(self._directory.glob("gauges-*.csv")), rounds)
 
     def heat(self, drive_W: float) -> None:
@@ -161,9 +162,14 @@ class _Session:
 
 
 def diagnose(recording: Path, machine: Path) -> tuple[str, list[str]]:
-    """`compd diagnose` on a recording: its verdict, and the effects that it found."""
+    """`compd diagnose` on a recording: its verdict, and the effects that it found, as many as are worth their place."""
     result = json.loads(_compd("diagnose", str(recording), "--machine", str(machine), "--json"))
-    return result["verdict"], [step["effect"] for step in result["steps"]]
+    found = []
+    for step in result["steps"]:
+        found.append(step["effect"])
+        if step["heldout_rms_um"] <= NOISE_RATIO * result["noise_floor_um"]:
+            break
+    return result["verdict"], found
 
 
 def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: Path) -> None:

@@ -20,6 +20,7 @@ import hal
 import linuxcnc
 
 POLL_S = 0.01
+PRESS_S = 0.1
 # LinuxCNC's own answer to one command.
 COMMAND_S = 5.0
 SOCKET = Path("panel.sock")
@@ -80,6 +81,13 @@ class Operator:
 
     def set_signal(self, name: str, value: str) -> bool:
         return subprocess.run(["halcmd", "sets", name, value], check=False).returncode == 0
+
+    def press(self, name: str) -> bool:
+        """Let a switch go, and press it again, as slowly as a finger: a rising edge for everybody."""
+        if not self.set_signal(name, "0"):
+            return False
+        time.sleep(PRESS_S)
+        return self.set_signal(name, "1")
 
     def new_errors(self) -> list[str]:
         errors = []
