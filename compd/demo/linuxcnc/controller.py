@@ -22,6 +22,8 @@ ORDINARY_USER = "nobody"
 START_S = 60.0
 END_S = 30.0
 POLL_S = 0.05
+# How often a person presses a switch that does nothing, and waits for it, s.
+PRESSES, PRESSED_S = 3, 1.0
 # Longer than anything the panel waits for by itself.
 ANSWER_S = 30.0
 # There can be one LinuxCNC on a computer.
@@ -133,9 +135,15 @@ class LinuxCnc:
         self.do("home")
 
     def arm(self) -> None:
-        """Give the bridge a rising edge, and wait until it is armed. Raises DaemonError with its reason."""
-        self.do("press", name="compd-arm")
-        self.wait_for("compd.armed", True)
+        """Press the bridge's switch until it is armed. Raises DaemonError with its reason where it refuses."""
+        for tries_left in reversed(range(PRESSES)):
+            self.do("press", name="compd-arm")
+            try:
+                self.wait_for("compd.armed", True, PRESSED_S)
+                return
+            except DaemonError:  # a setpoint was late just then
+                if not tries_left:
+                    raise
 
     def without_corrections(self) -> None:
         """Let the machine move although the bridge is not armed."""

@@ -31,8 +31,8 @@ SPEEDUP = 30.0
 # The machine stands at machine zero until the controller commands it.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
-# What each drive gives off during each round of probing, W. The drives work hard, idle, and work hard again, so that what
-# grows with the links' temperature is told from what grows with time.
+# What each drive gives off during each round of probing, W. The drives work hard, idle, and work hard again, so that
+# what grows with the links' temperature is told from what grows with time.
 ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
 # The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
 _OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
