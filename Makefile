@@ -62,7 +62,7 @@ DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 # System tests have both processors for themselves: they run the daemon in real time.
 test: $(STAMP)
 	$(BIN)/pytest -n 2 --ignore=tests/system
-	$(BIN)/pytest tests/system
+	$(BIN)/pytest -rs tests/system
 
 long: $(STAMP)
 	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)

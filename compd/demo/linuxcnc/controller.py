@@ -30,7 +30,7 @@ ANSWER_S = 30.0
 LOCK = Path("/tmp/linuxcnc.lock")
 _HERE = Path(__file__).parent
 _SCRIPTS = ("machine_link.py", "operator_panel.py")
-_HAL_FILES = ("machine.hal", "probe.hal")
+SIMULATED_MACHINE = ("machine.hal", "probe.hal")
 
 
 def missing() -> str:
@@ -53,13 +53,15 @@ class LinuxCnc:
     motion_log : what its motors were commanded, and where the tip truly was: see `motion_log`.
     """
 
-    def __init__(self, directory: Path, simulation: Path) -> None:
+    def __init__(self, directory: Path, simulation: Path, hal_files: Sequence[str] = SIMULATED_MACHINE) -> None:
         """directory : to be made, with the controller's files. simulation : has control.sock of the simulated machine,
-        compd.sock of the daemon, and artefact.json where there is something to probe."""
+        compd.sock of the daemon, and artefact.json where there is something to probe. hal_files : of this folder, to be
+        loaded as well; none for drives without a machine."""
         self.directory = directory
         self.motion_log = directory / "motion.log"
         self.programs = directory
         self._simulation = simulation
+        self._hal_files = hal_files
         self._process: subprocess.Popen[bytes] | None = None
         self._panel: socket.socket | None = None
         self.errors: list[str] = []
@@ -197,7 +199,7 @@ class LinuxCnc:
         for file in sorted(shipped_configuration("linuxcnc/hexapod.ini").parent.iterdir()):
             if file.is_file():
                 shutil.copy(file, self.directory)
-        for name in (*_SCRIPTS, *_HAL_FILES):
+        for name in (*_SCRIPTS, *self._hal_files):
             shutil.copy(_HERE / name, self.directory)
         (self.directory / "operator_panel.py").chmod(0o755)
         text = (self.directory / "hexapod.ini").read_text()
@@ -206,7 +208,7 @@ class LinuxCnc:
             ("SOCKET = /run/compd/hexapod.sock", f"SOCKET = {self._simulation / 'compd.sock'}"),
             (
                 "HALFILE = loopback_drives.hal",
-                "HALFILE = loopback_drives.hal\n" + "\n".join(f"HALFILE = {name}" for name in _HAL_FILES),
+                "\n".join(f"HALFILE = {name}" for name in ("loopback_drives.hal", *self._hal_files)),
             ),
         ):
             assert text.count(before) == 1, before
@@ -214,8 +216,7 @@ class LinuxCnc:
         text += f"\n[SIMULATION]\nLINK = ./machine_link.py\nDIRECTORY = {self._simulation}\n"
         (self.directory / "machine.ini").write_text(text)
         if os.geteuid() == 0:
-            sockets = [self._simulation / name for name in ("control.sock", "compd.sock")]
-            for path in (self.directory, *self.directory.iterdir(), *sockets):
+            for path in (self.directory, *self.directory.iterdir(), *self._simulation.glob("*.sock")):
                 shutil.chown(path, ORDINARY_USER)
             # so that the user can come to what is its own
             self._simulation.chmod(0o711)
