@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,15 +12,20 @@ from compd.demo.processes import Command, run_commands
 
 
 @contextmanager
-def simulated_daemon(configuration: Configuration, seed: int, speedup: float, zero_hold_s: float) -> Iterator[Path]:
+def simulated_daemon(
+    configuration: Configuration, seed: int, speedup: float, zero_hold_s: float, effects: Sequence[str] = ()
+) -> Iterator[Path]:
     """Both run during the block; the directory with their sockets, `control.sock` and `compd.sock`.
 
     seed : of weather, joints and targets.  speedup : of the weather.  zero_hold_s : how long the machine stands at
-    machine zero, s.  Raises DaemonError where one does not start.
+    machine zero, s.  effects : hidden in the machine, as for `compd simulate --effect`.
+
+    Raises DaemonError where one does not start.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         directory = Path(temporary)
         options = ["--seed", str(seed), "--speedup", str(speedup), "--zero-hold", str(zero_hold_s)]
+        options += [f"--effect={effect}" for effect in effects]
         commands = [
             Command(
                 ["simulate", str(configuration.path), "--directory", temporary, *options],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,6 +39,12 @@ def simulate(
             help="Hide a cause that follows from this number, in a machine whose gauges see all else.",
         ),
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ID[=STRENGTH]", help="Hide this cause likewise; without a strength three times the noise."
+        ),
+    ] = None,
     plan: Annotated[
         Path | None,
         typer.Option(help="After machine zero go through these rows, as `compd plan --out` has written them."),
@@ -51,7 +57,7 @@ def simulate(
     waits (--speedup takes that much of it away), dwells; then it stands still.
 
     `compd fault` breaks a line of it. At the end the daemon's configuration, ports, sockets and machine zero are
-    removed; only the sealed answer of --hidden stays, until the next machine is simulated there.
+    removed; only the sealed answer of --hidden and --effect stays, until the next machine is simulated there.
     """
     import contextlib
     import math
@@ -75,7 +81,7 @@ def simulate(
     configuration = load(config)
     measured = [quantity.name for quantity in configuration.wiring.quantities]
     rows = () if plan is None else read_plan(plan, Mechanism(configuration.geometry), measured)
-    sized = [_hidden(configuration, seed, number) for number in hidden or ()]
+    sized = _hidden(configuration, seed, hidden or (), effect or ())
     world = World(
         configuration.geometry,
         configuration.wiring,
@@ -113,12 +119,13 @@ def simulate(
                     done = True
 
 
-def _hidden(configuration: Configuration, seed: int, number: int) -> SizedCause:
+def _hidden(configuration: Configuration, seed: int, numbers: Sequence[int], texts: Sequence[str]) -> list[SizedCause]:
+    """The causes to be hidden: drawn from numbers, or stated."""
     from compd.simulation.campaign.sizing import CauseSizer
-    from compd.simulation.causes.hidden_cause import draw_hidden
+    from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden
 
     sizer = CauseSizer(configuration.geometry, configuration.wiring, seed)
-    return sizer.size(draw_hidden(number, sizer.mechanism))
+    return [sizer.size(cause) for cause in (*(draw_hidden(n, sizer.mechanism) for n in numbers), *parse_hidden(texts))]
 
 
 def _lines(simulation: Simulation) -> Table:
@@ -183,6 +190,7 @@ def _status(simulation: Simulation) -> Text:
         "tour": f"{truth['phase']}, point {truth['point']}",
         "plan": _planned(truth.get("plan", {})),
         "commanded": f"commanded, {truth['phase']}",
+        "following": f"following a controller, {truth['phase']}",
         "blocked": "blocked: the links cannot meet there",
     }[truth["mode"]]
     tip = " ".join(f"{value:9.4f}" for value in truth["tip_mm"])

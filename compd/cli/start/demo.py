@@ -22,8 +22,21 @@ def demo(
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="With --live: where the page is; 0: any free port.")
     ] = 7760,
+    linuxcnc: Annotated[
+        bool,
+        typer.Option("--linuxcnc", help="Correct LinuxCNC on the shipped hexapod instead, and find a hidden effect."),
+    ] = False,
+    program: Annotated[
+        Path | None, typer.Option(help="With --linuxcnc: the G-code that it runs; a shipped one if left out.")
+    ] = None,
+    effect: Annotated[
+        str, typer.Option(metavar="ID=STRENGTH", help="With --linuxcnc: the effect that is hidden in the machine.")
+    ] = "link_expansion=8",
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show what compensation gains."""
+    if linuxcnc:
+        _show_linuxcnc(seed, program, effect)
+        return
     if live:
         _show_live(config, seed, port)
         return
@@ -85,3 +98,32 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
         )
 
     run_live(configuration, seed, serve)
+
+
+def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.configuration import load
+    from compd.configuration.shipped import shipped_configuration
+    from compd.demo.linuxcnc.demonstration import SHIPPED_PROGRAM, SPEEDUP, run_linuxcnc_demo
+
+    console = Console(highlight=False)
+    out = Path("out/linuxcnc")
+    out.mkdir(parents=True, exist_ok=True)
+    console.print(
+        f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {SPEEDUP:g} times faster than "
+        f"real. {effect.partition('=')[0]} is hidden in the machine. About eight minutes."
+    )
+    demo = run_linuxcnc_demo(
+        load(shipped_configuration("hexapod.yaml")), out, seed, [effect], console.print, program or SHIPPED_PROGRAM
+    )
+    table = Table(
+        "",
+        *("looks", "rms, um", "largest, um") * 2,
+        title="distance of the true tip from where the program wants it: at rest, and on the move",
+    )
+    for label, errors in demo.errors.items():
+        table.add_row(*errors.row(label))
+    console.print(table)
+    console.print(f"{demo.rows} rows probed: {demo.verdict}, {', '.join(demo.found) or 'no effect found'}.")

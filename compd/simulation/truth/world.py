@@ -14,6 +14,7 @@ from compd.errors import CompdError, KinematicsError, Problem
 from compd.simulation.truth.cause import Cause, Interval
 from compd.simulation.truth.closure import Posture
 from compd.simulation.truth.equilibrium import Equilibrium, EquilibriumState
+from compd.simulation.truth.follow_motion import FollowMotion, MotorCommand
 from compd.simulation.truth.frame import Frame
 from compd.simulation.truth.joints import Joints
 from compd.simulation.truth.mechanism import Mechanism
@@ -26,7 +27,7 @@ from compd.simulation.truth.warm_up import Heat, WarmUp
 from compd.simulation.truth.weather import Weather
 from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
 
-Mode = Literal["zero", "tour", "plan", "commanded", "blocked"]
+Mode = Literal["zero", "tour", "plan", "commanded", "following", "blocked"]
 
 
 class World:
@@ -70,7 +71,7 @@ class World:
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
         self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
-        self._motion: TourMotion | SetpointMotion | PlanMotion = SetpointMotion(
+        self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
             standing(np.zeros(self._mechanism.links))
         )
         self._rows = rows
@@ -166,6 +167,19 @@ class World:
             self._motion = SetpointMotion(self._braking())
         self._motion.setpoint_mm = setpoint_mm
         self.mode, self.zero_hold_s = "commanded", 0.0
+
+    def follow(self, commands: Sequence[MotorCommand]) -> None:
+        """Go where a controller commands its drives, in a stream of commands, oldest first, without a limit of speed.
+
+        Raises CompdError for a wrong number of values, or beyond the stroke; the machine then follows none of them.
+        """
+        for command in commands:
+            self._checked(command.scale_mm.tolist())
+        self._leave_plan()
+        if not isinstance(self._motion, FollowMotion):
+            self._motion = FollowMotion(self._motion.position_mm)
+        self._motion.follow(commands)
+        self.mode, self.zero_hold_s = "following", 0.0
 
     # --- true state ---------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
     {"class": "TRUTH"}                                the true tip, and what the machine does
     {"class": "MEASURE"}                              the tip as a laser tracker shows it, and the links' lengths
     {"class": "DRIVE", "scale_mm": [..]}              drive to these scale values at limited speed
+    {"class": "FOLLOW", "commands": [[t, ..], ..]}    follow a controller's stream: time (s), scale values
     {"class": "TOUR"}                                 visit random points from now on
     {"class": "PLAN"}                                 measure the planned rows, from the first
     {"class": "TIP_FOR", "scale_mm": [..]}            the tip if the scales were there now
@@ -11,7 +12,7 @@
     {"class": "FAULT", "line": "..", "fault": ".."}   break a line; "fault": null repairs it
     {"class": "LINES"}                                the lines, the fault of each, and those it can have
 
-Every request gets one answer: TRUTH, MEASURED, TIP, LINES, or ERROR with code and text.
+Every request gets one answer: TRUTH, MEASURED, FOLLOWS, TIP, LINES, or ERROR with code and text.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from typing import Any
 
 from compd.errors import CompdError
 
-LONGEST_REQUEST = 4096  # bytes
+LONGEST_REQUEST = 65536  # bytes
 Answer = Mapping[str, Any]
 Handler = Callable[[Mapping[str, Any]], Answer]
 

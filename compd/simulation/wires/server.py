@@ -13,6 +13,7 @@ import numpy as np
 from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.plugins import SIMULATED_GAUGES, load
+from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER
 from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.world import World
@@ -71,6 +72,7 @@ class Simulation:
             "TRUTH": lambda _: self.truth(),
             "MEASURE": lambda _: self.measure(),
             "DRIVE": self._drive,
+            "FOLLOW": self._follow,
             "TOUR": self._tour,
             "PLAN": self._plan,
             "TIP_FOR": self._tip_for,
@@ -168,6 +170,15 @@ class Simulation:
         with self._live.now() as world:
             world.command(message["scale_mm"])
         return self.truth()
+
+    def _follow(self, message: Mapping[str, Any]) -> Answer:
+        commands = [
+            MotorCommand(float(time_s), np.array(scale_mm, dtype=float)) for time_s, *scale_mm in message["commands"]
+        ]
+        with self._live.now() as world:
+            world.follow(commands)
+            mode, phase = world.mode, world.phase
+        return {"class": "FOLLOWS", "mode": mode, "moving": phase == "moving"}
 
     def _tour(self, _: Mapping[str, Any]) -> Answer:
         with self._live.now() as world:

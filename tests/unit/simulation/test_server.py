@@ -139,6 +139,19 @@ def test_machine_zero_is_held_until_somebody_drives(start: Callable[[Path], Runn
     assert truth["weather_time_s"] == pytest.approx(200.0)
 
 
+def test_a_stream_of_commands_is_followed_and_a_wrong_one_is_refused(start: Callable[[Path], Running]) -> None:
+    running = start(TRIPOD)
+    commands = [[0.1 * k, 0.05 * k, 0.0, -0.05 * k] for k in range(21)]
+    assert ask(running.control, {"class": "FOLLOW", "commands": commands})["mode"] == "following"
+    for _ in range(12):
+        running.clock.turn(0.5)
+    truth = ask(running.control, {"class": "TRUTH"})
+    assert truth["scale_mm"] == pytest.approx([1.0, 0.0, -1.0])
+    refused = ask(running.control, {"class": "FOLLOW", "commands": [[3.0, 900.0, 0.0, 0.0]]})
+    assert refused["code"] == "refused"
+    assert ask(running.control, {"class": "FOLLOW", "commands": [3.0]})["code"] == "wrong_value"
+
+
 def test_a_tracker_shows_the_tip_with_its_noise(start: Callable[[Path], Running]) -> None:
     running = start(TRIPOD)
     ask(running.control, {"class": "DRIVE", "scale_mm": [3.0, -4.0, 5.0]})
@@ -257,6 +270,15 @@ def test_the_command_hides_a_cause_under_seal() -> None:
         assert name == draw_hidden(3, Mechanism(load(TRIPOD).geometry)).id
         assert answer["error_in_floors"][name] > 0.5
         assert name not in finished.stdout
+
+
+def test_the_command_hides_a_cause_that_was_stated() -> None:
+    with run_directory() as directory:
+        options = ["--directory", str(directory), "--effect", "link_expansion=8", "--seconds", "0"]
+        command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), *options]
+        subprocess.run(command, capture_output=True, text=True, check=True)
+        answer = json.loads((directory / "hidden.answer.json").read_text(encoding="utf-8"))
+        assert answer["effects"] == {"link_expansion": 8.0}
 
 
 def test_the_machines_own_directory_is_refused_and_left_alone() -> None:

@@ -1,0 +1,260 @@
+"""LinuxCNC as a process: without a screen, as an ordinary user, on the motors of a simulated machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from compd.configuration.shipped import shipped_configuration
+from compd.errors import DaemonError, Problem
+
+# LinuxCNC refuses to run as root. Debian has this user everywhere, and it owns nothing.
+ORDINARY_USER = "nobody"
+START_S = 60.0
+END_S = 30.0
+POLL_S = 0.05
+# How often a person presses a switch that does nothing, and waits for it, s.
+PRESSES, PRESSED_S = 3, 1.0
+# Longer than anything the panel waits for by itself.
+ANSWER_S = 30.0
+# There can be one LinuxCNC on a computer.
+LOCK = Path("/tmp/linuxcnc.lock")
+_HERE = Path(__file__).parent
+_SCRIPTS = ("machine_link.py", "operator_panel.py")
+SIMULATED_MACHINE = ("machine.hal", "probe.hal")
+
+
+def missing() -> str:
+    """What LinuxCNC on a simulated machine lacks on this computer; "" where nothing does."""
+    for program, package in (
+        ("linuxcnc", "linuxcnc-uspace"),
+        ("halcmd", "linuxcnc-uspace"),
+        ("/usr/bin/python3", "python3"),
+    ):
+        if shutil.which(program) is None:
+            return f"{program} is not there: apt-get install {package} (Debian 12 or newer)"
+    if os.geteuid() == 0 and shutil.which("runuser") is None:
+        return "runuser is not there, and LinuxCNC does not run as root: apt-get install util-linux"
+    return ""
+
+
+class LinuxCnc:
+    """The shipped LinuxCNC machine in a directory of its own. A context manager: it runs in the block.
+
+    motion_log : what its motors were commanded, and where the tip truly was: see `motion_log`.
+    """
+
+    def __init__(self, directory: Path, simulation: Path, hal_files: Sequence[str] = SIMULATED_MACHINE) -> None:
+        """directory : to be made, with the controller's files. simulation : has control.sock of the simulated machine,
+        compd.sock of the daemon, and artefact.json where there is something to probe. hal_files : of this folder, to be
+        loaded as well; none for drives without a machine."""
+        self.directory = directory
+        self.motion_log = directory / "motion.log"
+        self.programs = directory
+        self._simulation = simulation
+        self._hal_files = hal_files
+        self._process: subprocess.Popen[bytes] | None = None
+        self._panel: socket.socket | None = None
+        self.errors: list[str] = []
+
+    def __enter__(self) -> Self:
+        if lacking := missing():
+            raise DaemonError(Problem(where="LinuxCNC", what="cannot run", value=lacking, next_step="install it"))
+        if LOCK.exists():
+            raise DaemonError(
+                Problem(
+                    where=str(LOCK),
+                    what="LinuxCNC runs already on this computer, or was killed",
+                    next_step="end it; where none runs, `halrun -U` and remove this file",
+                )
+            )
+        self._write_files()
+        with (self.directory / "output.log").open("wb") as log:
+            self._process = subprocess.Popen(
+                [*self._as_ordinary_user(), "linuxcnc", "-r", "machine.ini"],
+                cwd=self.directory,
+                env={**os.environ, "HOME": str(self.directory)},
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        try:
+            self._panel = self._connect()
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._panel is not None:
+            self._panel.sendall(b'{"do": "quit"}\n')
+            self._panel.close()
+        self._end()
+
+    # --- what an operator does ------------------------------------------------------------------------
+
+    def ask(self, do: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Any:
+        """A request to the panel, and its result. What LinuxCNC has shown meanwhile is appended to `errors`.
+
+        Raises DaemonError where LinuxCNC has gone.
+        """
+        assert self._panel is not None
+        self._panel.settimeout(timeout_s)
+        answer = b""
+        try:
+            self._panel.sendall(json.dumps({"do": do, **arguments}).encode() + b"\n")
+            while not answer.endswith(b"\n"):
+                piece = self._panel.recv(1 << 16)
+                if not piece:
+                    raise self._problem("has ended")
+                answer += piece
+        except OSError as error:
+            raise self._problem(f"does not answer: {error}") from error
+        message = json.loads(answer)
+        self.errors += message["errors"]
+        return message["result"]
+
+    def do(self, do: str, timeout_s: float = ANSWER_S, **arguments: Any) -> None:
+        """A request that must come about. Raises DaemonError where it does not, with LinuxCNC's messages."""
+        if not self.ask(do, timeout_s, **arguments):
+            raise self._problem(f"did not {do} {arguments or ''}: {self.errors[-3:]}")
+
+    def switch_on(self) -> None:
+        """Switch on, and home where the machine stands: at machine zero."""
+        self.do("on")
+        self.do("home")
+
+    def arm(self) -> None:
+        """Press the bridge's switch until it is armed. Raises DaemonError with its reason where it refuses."""
+        for tries_left in reversed(range(PRESSES)):
+            self.do("press", name="compd-arm")
+            try:
+                self.wait_for("compd.armed", True, PRESSED_S)
+                return
+            except DaemonError:  # a setpoint was late just then
+                if not tries_left:
+                    raise
+
+    def without_corrections(self) -> None:
+        """Let the machine move although the bridge is not armed."""
+        self.set_signal("compd-arm", "0")
+        self.set_signal("compd-required", "0")
+
+    def with_corrections(self) -> None:
+        """Let the machine move only while the bridge is armed, and arm it."""
+        self.set_signal("compd-required", "1")
+        self.arm()
+
+    def set_signal(self, name: str, value: str) -> None:
+        self.do("set_signal", name=name, value=value)
+
+    def value(self, name: str) -> Any:
+        return self.values([name])[name]
+
+    def values(self, names: Sequence[str]) -> dict[str, Any]:
+        """Of pins and signals, by name."""
+        result: dict[str, Any] = self.ask("values", names=list(names))
+        return result
+
+    def wait_for(self, pin: str, value: Any, timeout_s: float = 10.0) -> None:
+        """Return when a pin has a value. Raises DaemonError, with the bridge's reason, where it does not get it."""
+        end_s = time.monotonic() + timeout_s
+        while self.value(pin) != value:
+            if time.monotonic() > end_s:
+                raise self._problem(f"{pin} does not become {value}; compd.reason is {self.value('compd.reason')}")
+            time.sleep(POLL_S / 5)
+
+    def start(self, program: Path) -> None:
+        """Begin a G-code program."""
+        self.do("start", program=str(program))
+
+    def run(self, program: Path, timeout_s: float) -> tuple[float, float]:
+        """Run a G-code program to its end; returns when it began and ended, s on CLOCK_MONOTONIC.
+
+        Raises DaemonError where it does not come to its end, or LinuxCNC shows an error.
+        """
+        shown, start_s = len(self.errors), time.monotonic()
+        self.start(program)
+        self.do("wait_for_end", timeout_s + ANSWER_S, seconds=timeout_s)
+        if self.errors[shown:]:
+            raise self._problem(f"stopped {program.name}: {self.errors[shown:]}")
+        return start_s, time.monotonic()
+
+    # --- process --------------------------------------------------------------------------------------
+
+    def _write_files(self) -> None:
+        self.directory.mkdir(parents=True)
+        for file in sorted(shipped_configuration("linuxcnc/hexapod.ini").parent.iterdir()):
+            if file.is_file():
+                shutil.copy(file, self.directory)
+        for name in (*_SCRIPTS, *self._hal_files):
+            shutil.copy(_HERE / name, self.directory)
+        (self.directory / "operator_panel.py").chmod(0o755)
+        text = (self.directory / "hexapod.ini").read_text()
+        for before, after in (
+            ("DISPLAY = axis", "DISPLAY = ./operator_panel.py"),
+            ("SOCKET = /run/compd/hexapod.sock", f"SOCKET = {self._simulation / 'compd.sock'}"),
+            (
+                "HALFILE = loopback_drives.hal",
+                "\n".join(f"HALFILE = {name}" for name in ("loopback_drives.hal", *self._hal_files)),
+            ),
+        ):
+            assert text.count(before) == 1, before
+            text = text.replace(before, after)
+        text += f"\n[SIMULATION]\nLINK = ./machine_link.py\nDIRECTORY = {self._simulation}\n"
+        (self.directory / "machine.ini").write_text(text)
+        if os.geteuid() == 0:
+            for path in (self.directory, *self.directory.iterdir(), *self._simulation.glob("*.sock")):
+                shutil.chown(path, ORDINARY_USER)
+            # so that the user can come to what is its own
+            self._simulation.chmod(0o711)
+
+    def give(self, path: Path) -> None:
+        """Let the controller's user have a file that was written into the directory, or a socket that is new."""
+        if os.geteuid() == 0:
+            shutil.chown(path, ORDINARY_USER)
+
+    def _as_ordinary_user(self) -> list[str]:
+        return ["runuser", "-u", ORDINARY_USER, "--"] if os.geteuid() == 0 else []
+
+    def _connect(self) -> socket.socket:
+        path, end_s = self.directory / "panel.sock", time.monotonic() + START_S
+        assert self._process is not None
+        while True:
+            panel = socket.socket(socket.AF_UNIX)
+            try:
+                panel.connect(str(path))
+                return panel
+            except OSError:
+                panel.close()
+            if self._process.poll() is not None or time.monotonic() > end_s:
+                raise self._problem("did not start")
+            time.sleep(POLL_S)
+
+    def _end(self) -> None:
+        """LinuxCNC ends its parts itself when the panel has ended; what is then left is killed."""
+        assert self._process is not None
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+            subprocess.run([*self._as_ordinary_user(), "halrun", "-U"], check=False, capture_output=True)
+            LOCK.unlink(missing_ok=True)
+
+    def _problem(self, what: str) -> DaemonError:
+        log = self.directory / "output.log"
+        tail = log.read_text(errors="replace")[-3000:] if log.exists() else ""
+        return DaemonError(Problem(where="LinuxCNC", what=what, next_step=f"read what it printed:\n{tail}"))

@@ -1,0 +1,191 @@
+"""The whole demand through a controller: a program's error, corrected, its rest diagnosed by probing, and adopted."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from compd.client import connect
+from compd.configuration import Configuration
+from compd.demo.linuxcnc.artefact import (
+    CORNERS_mm,
+    probing_program,
+    write_artefact,
+    write_probed_recording,
+)
+from compd.demo.linuxcnc.controller import LinuxCnc
+from compd.demo.linuxcnc.motion_log import MotionSample, TipErrors, read_motion_log, tip_errors
+from compd.demo.live import take_zero
+from compd.demo.processes import Command, run_commands
+from compd.demo.simulated_daemon import simulated_daemon
+from compd.errors import CompdError, Problem
+from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.wires.control_client import ControlClient
+
+# A minute of demonstration is half an hour of weather and warm-up.
+SPEEDUP = 30.0
+# The machine stands at machine zero until the controller commands it.
+ZERO_HOLD_S = 600.0
+SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
+# What each drive gives off during each round of probing, W. The drives work hard, idle, and work hard again, so that
+# what grows with the links' temperature is told from what grows with time.
+ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
+# The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
+_OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
+LONGEST_PROGRAM_S = 600.0
+# An error below so many times the noise is not worth a further effect in the model.
+NOISE_RATIO = 2.0
+# The correction of another model is reached at `limits.slew_mm_per_s`: 0.2 mm in 0.4 s.
+ADOPTED_S = 10.0
+
+OFF, ON, ADOPTED = "corrections off", "corrections on", "with the effect adopted"
+
+
+@dataclass
+class LinuxCncDemo:
+    """What came of it. errors : of the program, by how it was run. found : effects of the diagnosis, in order."""
+
+    errors: dict[str, TipErrors] = field(default_factory=dict)
+    rows: int = 0
+    verdict: str = ""
+    found: list[str] = field(default_factory=list)
+
+
+def run_linuxcnc_demo(
+    configuration: Configuration,
+    out: Path,
+    seed: int,
+    effects: Sequence[str],
+    tell: Callable[[str], None],
+    program: Path = SHIPPED_PROGRAM,
+    speedup: float = SPEEDUP,
+) -> LinuxCncDemo:
+    """Probe while the machine warms up; run the program without corrections and with them; diagnose what was probed,
+    adopt what was found, and run the program again.
+
+    Parameters
+    ----------
+    configuration : of the shipped hexapod.
+    out : existing directory for recording and model file.
+    seed : of weather and joints.
+    effects : hidden in the machine, as for `compd simulate --effect`.
+    tell : called with what happens.
+    program : G-code, to be run at the machine's zero, which it comes back to.
+    speedup : factor by which weather and warm-up run faster than the machine moves.
+
+    Raises CompdError where LinuxCNC is not installed, something does not start, or the program stops.
+    """
+    demo = LinuxCncDemo()
+    with simulated_daemon(configuration, seed, speedup, ZERO_HOLD_S, effects) as directory:
+        write_artefact(directory / "artefact.json")
+        take_zero(directory / "compd.sock")
+        with LinuxCnc(directory / "controller", directory) as controller:
+            session = _Session(configuration, directory, controller, program)
+            controller.switch_on()
+            controller.with_corrections()
+            tell(f"LinuxCNC is homed. Probing {len(CORNERS_mm)} calibrated corners while the machine warms up ...")
+            recording = out / "probed.csv"
+            demo.rows = session.probe(recording, tell)
+            controller.without_corrections()
+            tell("The program, without corrections ...")
+            demo.errors[OFF] = session.run_program()
+            controller.with_corrections()
+            tell("The program, with corrections ...")
+            demo.errors[ON] = session.run_program()
+            tell(f"compd diagnose {recording}")
+            demo.verdict, demo.found = diagnose(recording, configuration.path)
+            tell(f"{demo.verdict}: {', '.join(demo.found) or 'no effect'}")
+            if demo.found:
+                model = out / "probed.model.yaml"
+                add_effects(demo.found, recording, configuration.path, model)
+                session.adopt(model)
+                tell("The model is adopted. The program again ...")
+                demo.errors[ADOPTED] = session.run_program()
+    return demo
+
+
+class _Session:
+    """A controller on a simulated machine with its daemon, and what is done there more than once."""
+
+    def __init__(self, configuration: Configuration, directory: Path, controller: LinuxCnc, program: Path) -> None:
+        self._directory, self._controller = directory, controller
+        self._mechanism = Mechanism(configuration.geometry)
+        self._links = configuration.geometry.links
+        self._program = self._copied("program.ngc", program.read_text())
+        self._probing = self._copied("probing.ngc", probing_program())
+
+    def run_program(self) -> TipErrors:
+        return tip_errors(self._mechanism, self._run(self._program))
+
+    def probe(self, recording: Path, tell: Callable[[str], None]) -> int:
+        """Probe every corner some times beside a recorder; write the recording, and return its rows."""
+        stem = self._directory / "gauges"
+        rounds = []
+        record = Command(
+            ["record", str(stem), "--daemon", str(self._directory / "compd.sock")],
+            ready=self._directory / "gauges-0001.csv",
+        )
+        with run_commands([record], log=self._directory / "record.log"):
+            for number, drive_W in enumerate(ROUNDS_W, 1):
+                tell(f"  round {number} of {len(ROUNDS_W)}, {drive_W:g} W in each drive")
+                self.heat(drive_W)
+                rounds.append(self._run(self._probing))
+        return write_probed_recording(recording, sorted(self._directory.glob("gauges-*.csv")), rounds)
+
+    def heat(self, drive_W: float) -> None:
+        """What the drives give off from now on, each."""
+        with ControlClient(self._directory / "control.sock") as machine:
+            machine.ask("HEAT", drives_W=[drive_W] * self._links, **_OTHER_HEAT)
+
+    def adopt(self, model: Path) -> None:
+        """Give the daemon the model; returns when the correction has slewed to it."""
+        with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
+            daemon.model(str(model.absolute()))
+        with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
+            for setpoint in daemon.watch(10.0):
+                if setpoint.get("model") and setpoint["state"] == "ok":
+                    return
+
+    def _run(self, program: Path) -> list[MotionSample]:
+        start_s, end_s = self._controller.run(program, LONGEST_PROGRAM_S)
+        return read_motion_log(self._controller.motion_log, start_s, end_s)
+
+    def _copied(self, name: str, text: str) -> Path:
+        path = self._controller.directory / name
+        path.write_text(text)
+        self._controller.give(path)
+        return path
+
+
+def diagnose(recording: Path, machine: Path) -> tuple[str, list[str]]:
+    """`compd diagnose` on a recording: its verdict, and the effects that it found, as many as are worth their place."""
+    result = json.loads(_compd("diagnose", str(recording), "--machine", str(machine), "--json"))
+    found = []
+    for step in result["steps"]:
+        found.append(step["effect"])
+        if step["heldout_rms_um"] <= NOISE_RATIO * result["noise_floor_um"]:
+            break
+    return result["verdict"], found
+
+
+def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: Path) -> None:
+    """`compd effect add`, for one effect after the other, into a new model file."""
+    model.unlink(missing_ok=True)
+    for effect in effects:
+        _compd("effect", "add", effect, "--recording", str(recording), "--machine", str(machine), "--model", str(model))
+
+
+def _compd(*arguments: str) -> str:
+    """A command of compd as a person enters it: what it prints. Raises CompdError with its message."""
+    result = subprocess.run([sys.executable, "-m", "compd", *arguments], capture_output=True, text=True, check=False)
+    if result.returncode:
+        raise CompdError(
+            Problem(
+                where=f"compd {' '.join(arguments)}", what="failed", next_step=f"read what it says:\n{result.stderr}"
+            )
+        )
+    return result.stdout

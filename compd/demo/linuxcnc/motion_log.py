@@ -1,0 +1,98 @@
+"""What the motors were commanded along a program, and how far the true tip was from where the program wanted it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray, rms
+from compd.simulation.truth.mechanism import Mechanism
+from compd.units import UM_PER_MM
+
+# The machine is at rest when its nominal commands have been the same for so long, s.
+REST_S = 0.4
+SAME_MM = 1e-6
+
+
+class MotionSample(NamedTuple):
+    """One line of motion.log; machine_link.py says what is in it."""
+
+    time_s: float
+    nominal_mm: FloatArray
+    drive_mm: FloatArray
+    tip_mm: FloatArray | None
+    watched: bool
+    inhibited: bool
+    reading: bool
+    largest_mm: float
+    step_mm: float
+
+
+class TipErrors(NamedTuple):
+    """Distances of the true tip from where the program wanted it, um. at_rest, moving : one per look."""
+
+    at_rest_um: FloatArray
+    moving_um: FloatArray
+
+    def row(self, label: str) -> list[str]:
+        """For a table: number of looks, rms and largest, at rest and on the move."""
+        cells = [label]
+        for errors_um in self:
+            cells += [
+                str(len(errors_um)),
+                *([f"{rms(errors_um):.2f}", f"{errors_um.max():.2f}"] if len(errors_um) else "--"),
+            ]
+        return cells
+
+
+def read_motion_log(path: Path, start_s: float = -np.inf, end_s: float = np.inf) -> list[MotionSample]:
+    """The whole lines of a log from `start_s` to `end_s`, CLOCK_MONOTONIC; the last may not be written yet."""
+    text = path.read_text()
+    samples = []
+    for line in text[: text.rfind("\n") + 1].splitlines():
+        time_s, nominal_mm, drive_mm, tip_mm, *others = json.loads(line)
+        if start_s <= time_s <= end_s:
+            tip = None if tip_mm is None else np.array(tip_mm)
+            samples.append(MotionSample(time_s, np.array(nominal_mm), np.array(drive_mm), tip, *others))
+    return samples
+
+
+def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> list[FloatArray]:
+    """Where the tip would be with these scale values, all parts as drawn: that is where the program wants it.
+
+    Follows the hexapod from one place to the next, from machine zero or near it.
+    """
+    posture, tips_mm = mechanism.posture0, []
+    for scale_mm in nominal_mm:
+        lengths_mm = mechanism.lengths0_mm + scale_mm
+        posture = mechanism.closure.by_lengths(mechanism.joints0_M, mechanism.joints_P, lengths_mm, posture)
+        tips_mm.append(posture[0] + mechanism.tip0_P @ posture[1:])
+    return tips_mm
+
+
+def tip_errors(mechanism: Mechanism, samples: Sequence[MotionSample]) -> TipErrors:
+    """Of every sample with a look at the true tip."""
+    rest = _at_rest(samples)
+    looked = [(number, sample, sample.tip_mm) for number, sample in enumerate(samples) if sample.tip_mm is not None]
+    wanted_mm = wanted_tips_mm(mechanism, (sample.nominal_mm for _, sample, _ in looked))
+    distance_um = np.array(
+        [np.linalg.norm(tip_mm - wanted) * UM_PER_MM for (_, _, tip_mm), wanted in zip(looked, wanted_mm, strict=True)]
+    )
+    at_rest = rest[[number for number, _, _ in looked]]
+    return TipErrors(distance_um[at_rest], distance_um[~at_rest])
+
+
+def _at_rest(samples: Sequence[MotionSample]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(N,) whether the commands have been the same for REST_S."""
+    rest = np.zeros(len(samples), dtype=bool)
+    since_s = np.inf
+    for number, sample in enumerate(samples):
+        before = samples[number - 1] if number else sample
+        if number == 0 or np.abs(sample.nominal_mm - before.nominal_mm).max() > SAME_MM:
+            since_s = sample.time_s
+        rest[number] = sample.time_s - since_s >= REST_S
+    return rest

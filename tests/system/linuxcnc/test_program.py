@@ -1,0 +1,76 @@
+"""A G-code program through LinuxCNC on a simulated hexapod that warms up: the tip's error with corrections and without.
+
+-rP prints the figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from compd.arrays import rms
+from compd.configuration import load
+from compd.demo.linuxcnc.controller import LinuxCnc, missing
+from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON, SHIPPED_PROGRAM, run_linuxcnc_demo
+from compd.demo.linuxcnc.motion_log import TipErrors, read_motion_log, tip_errors
+from compd.demo.live import take_zero
+from compd.demo.simulated_daemon import simulated_daemon
+from compd.simulation.truth.mechanism import Mechanism
+from tests.support.simulated import HEXAPOD
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(bool(missing()), reason=missing()),
+]
+
+SPEEDUP = 60.0
+LONGEST_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def machine() -> Iterator[LinuxCnc]:
+    """LinuxCNC on, homed, and with a program, on a machine with every ordinary error."""
+    with simulated_daemon(load(HEXAPOD), 3, SPEEDUP, 3600.0) as directory:
+        take_zero(directory / "compd.sock")
+        with LinuxCnc(directory / "controller", directory) as controller:
+            controller.switch_on()
+            yield controller
+
+
+def run(machine: LinuxCnc, program: Path) -> TipErrors:
+    start_s, end_s = machine.run(program, LONGEST_S)
+    return tip_errors(Mechanism(load(HEXAPOD).geometry), read_motion_log(machine.motion_log, start_s, end_s))
+
+
+@pytest.mark.sample
+@pytest.mark.timeout(400)
+def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: LinuxCnc) -> None:
+    """Half an hour of warming up passes first, with corrections; then the program runs without them, and with them."""
+    program = machine.directory / "program.ngc"
+    program.write_text(SHIPPED_PROGRAM.read_text())
+    machine.give(program)
+    machine.with_corrections()
+    run(machine, program)
+    machine.without_corrections()
+    machine.set_signal("compd-clear", "1")
+    without = run(machine, program)
+    machine.set_signal("compd-clear", "0")
+    machine.with_corrections()
+    corrected = run(machine, program)
+    print("looks, rms and largest in um, at rest and on the move")
+    print(*without.row("without"))
+    print(*corrected.row("with"))
+    assert rms(without.at_rest_um) >= 10 * rms(corrected.at_rest_um)
+    assert rms(without.moving_um) >= 5 * rms(corrected.moving_um)
+
+
+@pytest.mark.timeout(1200)
+def test_what_is_left_is_probed_diagnosed_and_adopted(tmp_path: Path) -> None:
+    demo = run_linuxcnc_demo(load(HEXAPOD), tmp_path, 3, ["link_expansion=8"], print)
+    for label, errors in demo.errors.items():
+        print(*errors.row(label))
+    assert "link_expansion" in demo.found
+    assert rms(demo.errors[ON].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)
+    assert rms(demo.errors[OFF].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)

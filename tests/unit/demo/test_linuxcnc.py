@@ -1,0 +1,87 @@
+"""What the demonstration on LinuxCNC makes of the controller's log and of the recorder's files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compd.demo.linuxcnc.artefact import (
+    CLEAR_mm,
+    CORNERS_mm,
+    probing_program,
+    reading_times_s,
+    write_probed_recording,
+)
+from compd.demo.linuxcnc.motion_log import read_motion_log, tip_errors, wanted_tips_mm
+from compd.recording.sidecar import sidecar_contents
+from compd.recording.writer import write_recording
+from compd.simulation.truth.mechanism import Mechanism
+from tests.support.simulated import hexapod
+
+PERIOD_S = 0.01
+UP_MM = 0.004
+
+
+def scales_mm(tip_M_mm: np.ndarray) -> np.ndarray:
+    drawn = Mechanism(hexapod())
+    return drawn.lengths(drawn.posture_at(tip_M_mm, np.zeros(3))) - drawn.lengths0_mm
+
+
+def write_log(path: Path, readings: tuple[tuple[float, float], ...] = ()) -> None:
+    """Two seconds on the move, two at rest; the true tip is 4 um above where the program wants it, every fifth time."""
+    lines = []
+    for number in range(400):
+        tip_mm = np.array([0.1 * min(number, 200), 0.0, 320.0])
+        nominal_mm = scales_mm(tip_mm).tolist()
+        true_mm = np.add(tip_mm, [0.0, 0.0, UP_MM]).tolist() if number % 5 == 0 else None
+        time_s = 1000.0 + number * PERIOD_S
+        reading = any(start_s <= time_s <= end_s for start_s, end_s in readings)
+        lines.append(json.dumps([time_s, nominal_mm, nominal_mm, true_mm, True, False, reading, 0.0, 0.0]))
+    path.write_text("\n".join([*lines, "[1004.0, [0.0, 0"]))
+
+
+def test_tip_errors_at_rest_and_on_the_move(tmp_path: Path) -> None:
+    write_log(tmp_path / "motion.log")
+    samples = read_motion_log(tmp_path / "motion.log")
+    assert len(samples) == 400  # the last line is not written yet
+    errors = tip_errors(Mechanism(hexapod()), samples)
+    assert len(errors.at_rest_um) == pytest.approx(32, abs=1)
+    assert len(errors.moving_um) == pytest.approx(48, abs=1)
+    np.testing.assert_allclose(np.concatenate(errors), UP_MM * 1e3, atol=1e-6)
+    assert errors.row("label")[2] == "4.00"
+
+
+def test_the_wanted_tip_is_that_of_the_kinematics_as_drawn() -> None:
+    tips_mm = [np.array([0.0, 0.0, 320.0]), np.array([20.0, -10.0, 330.0]), np.array([50.0, 40.0, 300.0])]
+    found_mm = wanted_tips_mm(Mechanism(hexapod()), [scales_mm(tip_mm) for tip_mm in tips_mm])
+    np.testing.assert_allclose(found_mm, tips_mm, atol=1e-9)
+
+
+def test_a_probed_recording_has_the_gauges_of_each_mark_and_the_calibrated_place(tmp_path: Path) -> None:
+    marks = ((1002.5, 1002.9), (1003.3, 1003.7))
+    write_log(tmp_path / "motion.log", marks)
+    samples = read_motion_log(tmp_path / "motion.log")
+    times = reading_times_s(samples)
+    np.testing.assert_allclose(times, marks, atol=0.011)
+    time_s = np.arange(0.0, 5.0, 0.1)
+    columns = {"time_s": time_s, "scale_1_mm": np.where(time_s < 3.0, 7.0, 9.0), "joint_1_um": np.full(50, 1.5)}
+    columns["joint_1_um"][26] = np.nan  # a gauge that was late: the row does not count
+    sidecar = sidecar_contents("hexapod", provenance={"started_at_monotonic_s": 1000.0})
+    write_recording(tmp_path / "gauges-0001.csv", columns, sidecar)
+    rows = write_probed_recording(tmp_path / "probed.csv", [tmp_path / "gauges-0001.csv"], [samples])
+    assert rows == 2
+    head, *lines = (tmp_path / "probed.csv").read_text().splitlines()
+    first, second = (dict(zip(head.split(","), map(float, line.split(",")), strict=True)) for line in lines)
+    assert (first["scale_1_mm"], second["scale_1_mm"]) == (7.0, 9.0)
+    assert (first["session"], first["point"], second["point"]) == (1, 1, 2)
+    assert [second[f"reference_{axis}_mm"] for axis in "xyz"] == [place + CLEAR_mm for place in CORNERS_mm[1]]
+
+
+def test_the_probing_program_touches_three_faces_of_every_corner() -> None:
+    program = probing_program()
+    assert program.count("o<corner> call") == len(CORNERS_mm)
+    assert program.count("o<face> call") == 3
+    assert program.count("G38.2") == 2
