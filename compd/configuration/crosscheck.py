@@ -140,7 +140,7 @@ def _line_problems(sections: Sections) -> Iterator[Problem]:
                 where=sections.document.where(location),
                 what=f"driver {options['driver']} needs a line that carries {sections.drivers[name].line_kind}",
                 value=f"{line_name} (kind {kind})",
-                allowed="kind modbus_rtu or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
+                allowed="kind modbus_rtu, modbus_ascii or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
             )
 
 
