@@ -39,6 +39,7 @@ def problems(sections: Sections) -> list[Problem]:
     return [
         *_port_problems(sections),
         *_line_problems(sections),
+        *_signal_problems(sections),
         *_power_problems(sections),
         *_process_problems(sections),
         *_channel_problems(sections),
@@ -141,6 +142,21 @@ def _line_problems(sections: Sections) -> Iterator[Problem]:
                 what=f"driver {options['driver']} needs a line that carries {sections.drivers[name].line_kind}",
                 value=f"{line_name} (kind {kind})",
                 allowed="kind modbus_rtu, modbus_ascii or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
+            )
+
+
+def _signal_problems(sections: Sections) -> Iterator[Problem]:
+    """A gauge that is asked by what its line does not have."""
+    for name, options in sections.gauges.items():
+        line = sections.lines.get(options.line)
+        over_tcp = getattr(line, "kind", None) == "tcp" or str(getattr(line, "port", "")).startswith("socket://")
+        if over_tcp and (signals := sections.drivers[name](options).serial_signals):
+            yield Problem(
+                where=sections.document.where(("gauges", name, "line")),
+                what=f"is asked by {' and '.join(signals)}, which a TCP connection does not have",
+                value=options.line,
+                allowed="a serial port, or rfc2217://host:port",
+                next_step="let the device server speak RFC 2217, or use a port of this computer",
             )
 
 

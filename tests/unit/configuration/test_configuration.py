@@ -48,6 +48,7 @@ def test_shipped_machines_are_complete(name: str) -> None:
 
 
 ND28X = "scale_1: {driver: heidenhain_nd28x, line: scale_1"
+SIMPLEX = "scale_1: {driver: sylvac_optors, unit: mm, cable: simplex, line: scale_1"
 SYLVAC = "scale_1: {driver: sylvac_optors, unit: mm, line: scale_1"
 CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("  rate_hz: 200", "  rat_hz: 200"), "loop.rat_hz: unknown key", "did you mean `rate_hz`?"),
@@ -89,6 +90,11 @@ CASES: list[tuple[Edit, str, str]] = [
         lambda t: t.replace("    low_latency: true ", "    rs485: {} ", 1).replace(ND28X, SYLVAC),
         "gauges.scale_1: is powered from RTS, which `rs485` of line `scale_1` sets otherwise",
         "rts: false",
+    ),
+    (
+        lambda t: t.replace("port: /dev/serial/by-id/usb-scale-1", "port: socket://x:1", 1).replace(ND28X, SIMPLEX),
+        "gauges.scale_1.line: is asked by DTR, which a TCP connection does not have",
+        "rfc2217://",
     ),
     (lambda t: t.replace("    low_latency: true ", "    rs485: {rts: 1} ", 1), "lines.scale_1.rs485.rts: unknown", ""),
     (lambda t: t + "acquisition: {own_proces: [joints]}\n", "unknown key", "did you mean `own_process`?"),

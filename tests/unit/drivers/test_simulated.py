@@ -73,7 +73,8 @@ CASES = {
     "modbus RTU over TCP": Case({**RTU, "port": "socket://x:1"}, MAP, SEEN, 1e-4),
     "modbus TCP": Case({"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}, MAP, SEEN, 1e-4),
 }
-# What each fault is called: on lines of bytes, with RTU, with Modbus TCP (where pymodbus drops what does not fit)
+# What each fault is called: on lines of bytes, with RTU, with Modbus TCP (where pymodbus drops what does not fit), and
+# with Modbus ASCII
 NAMES: dict[str, tuple[set[Quality], ...]] = {
     "silent": ({Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}),
     "garble": ({Quality.MISMATCH}, {Quality.CRC}, {Quality.TIMEOUT}, {Quality.CRC}),
