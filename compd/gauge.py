@@ -351,6 +351,11 @@ class Gauge(ABC, Generic[LineT]):
         """
         return {}
 
+    @property
+    def serial_signals(self) -> Sequence[Literal["DTR", "break"]]:
+        """What its requests use of a serial port beside bytes: a TCP connection has neither."""
+        return ()
+
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         """(bytes sent, bytes received) of every exchange that one `read` makes, for planning lines; None = unknown.
 

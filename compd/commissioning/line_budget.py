@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from compd.configuration import Configuration
-from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
+from compd.configuration.lines import LineSettings, ModbusAsciiLine, ModbusRtuLine, SerialPortSettings
 from compd.errors import Problem
 from compd.gauge import replies_tell_whose
 from compd.lines.open import QUIET_CHARACTERS
@@ -70,7 +70,7 @@ def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = No
 
 def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
     """A configured line's pace. Behind socket:// the device server's baud rate counts: it is the configured one."""
-    if isinstance(line, SerialLine | ModbusRtuLine):
+    if isinstance(line, SerialPortSettings):
         serial = serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
         return replace(serial, quiet_s=max(serial.quiet_s, line.pause_s))
     return Pace(0.0, line.pause_s, TCP_EXCHANGE_S if turnaround_s is None else max(turnaround_s, TCP_EXCHANGE_S))
@@ -121,6 +121,8 @@ def budget_of_line(
 
     tells_whose : whether replies on this line say whose they are.
     """
+    if isinstance(line, ModbusAsciiLine):
+        gauges = {name: traffic and [_as_text(*exchange) for exchange in traffic] for name, traffic in gauges.items()}
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
     slowest = pace(line, USUAL_TURNAROUND_S)
     # The request goes out, and nothing comes for the timeout.
@@ -139,6 +141,11 @@ def budget_of_line(
         absent_s=absent_s,
         unknown=tuple(gauge for gauge, traffic in gauges.items() if traffic is None),
     )
+
+
+def _as_text(sent: int, received: int) -> tuple[int, int]:
+    """Bytes in Modbus ASCII of what has so many in RTU: two digits each, one byte of LRC for two of CRC, : CR LF."""
+    return 2 * (sent - 1) + 3, 2 * (received - 1) + 3 if received else 0
 
 
 def _silence_s(line_pace: Pace, traffic: Traffic) -> float:

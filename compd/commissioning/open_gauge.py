@@ -12,7 +12,15 @@ from pydantic import ValidationError
 
 from compd.clock import Clock
 from compd.configuration import load as load_configuration
-from compd.configuration.lines import LineSettings, ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine, powered
+from compd.configuration.lines import (
+    LineSettings,
+    ModbusAsciiLine,
+    ModbusRtuLine,
+    ModbusTcpLine,
+    SerialLine,
+    TcpLine,
+    powered,
+)
 from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
@@ -22,17 +30,21 @@ from compd.lines.port import Port
 from compd.lines.stream import StreamLine
 from compd.plugins import GAUGES, load
 
-SettingsT = TypeVar("SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusTcpLine)
+SettingsT = TypeVar("SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusAsciiLine, ModbusTcpLine)
 
 
 @dataclass(frozen=True)
 class PortArguments:
-    """A port as it is given on the command line; `baud` and `format` (8N1 ...) are None over TCP."""
+    """A port as it is given on the command line; `baud` and `format` (8N1 ...) are None over TCP.
+
+    keys : other keys of the line, as KEY=VALUE (VALUE in YAML).
+    """
 
     port: str
     baud: int | None
     format: str | None
     timeout_s: float
+    keys: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -72,14 +84,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
     Raises ConfigurationError for an assignment that is none, and for options that the driver refuses.
     """
     kind = load(GAUGES, driver, f"driver {driver}")
-    options: dict[str, Any] = {"driver": driver, "line": "command_line"}
-    for assignment in assignments:
-        key, equals, value = assignment.partition("=")
-        if not equals:
-            raise ConfigurationError(
-                Problem(where="--set", what="is not KEY=VALUE", value=assignment, allowed="--set heads=9")
-            )
-        options[key], _ = parse_yaml(value, Path(f"--set {key}"))
+    options = {"driver": driver, "line": "command_line", **_assigned("--set", assignments, "heads=9")}
     try:
         gauge = kind(kind.Options.model_validate(options))
     except ValidationError as error:
@@ -105,15 +110,36 @@ def line_settings(port: PortArguments, registers: bool) -> LineSettings:
     if not registers:
         return byte_line_settings(port)
     if address := _tcp_address(port.port):
-        return _validated(ModbusTcpLine, kind="modbus_tcp", host=address[0], port=address[1], timeout_s=port.timeout_s)
-    return _validated(ModbusRtuLine, kind="modbus_rtu", **_serial_settings(port))
+        return _validated(ModbusTcpLine, kind="modbus_tcp", **_tcp_settings(address, port))
+    keys = _serial_settings(port)
+    if keys.get("kind") == "modbus_ascii":
+        return _validated(ModbusAsciiLine, **keys)
+    return _validated(ModbusRtuLine, **{"kind": "modbus_rtu", **keys})
 
 
 def byte_line_settings(port: PortArguments) -> SerialLine | TcpLine:
     """Settings of a line of bytes, as `line_settings` makes them."""
     if address := _tcp_address(port.port):
-        return _validated(TcpLine, kind="tcp", host=address[0], port=address[1], timeout_s=port.timeout_s)
-    return _validated(SerialLine, kind="serial", **_serial_settings(port))
+        return _validated(TcpLine, kind="tcp", **_tcp_settings(address, port))
+    return _validated(SerialLine, **{"kind": "serial", **_serial_settings(port)})
+
+
+def _assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
+    """The data of KEY=VALUE. ConfigurationError for an assignment that is none."""
+    data = {}
+    for assignment in assignments:
+        key, equals, value = assignment.partition("=")
+        if not equals:
+            raise ConfigurationError(
+                Problem(where=option, what="is not KEY=VALUE", value=assignment, allowed=f"{option} {example}")
+            )
+        data[key], _ = parse_yaml(value, Path(f"{option} {key}"))
+    return data
+
+
+def _tcp_settings(address: tuple[str, int], port: PortArguments) -> dict[str, Any]:
+    keys = _assigned("--line", port.keys, "pause_s=0.02")
+    return {"host": address[0], "port": address[1], "timeout_s": port.timeout_s, **keys}
 
 
 def _tcp_address(port: str) -> tuple[str, int] | None:
@@ -132,7 +158,8 @@ def _serial_settings(port: PortArguments) -> dict[str, Any]:
                 next_step="look them up in the device's manual; they differ from device to device",
             )
         )
-    return {"port": port.port, "baud": port.baud, "format": port.format, "timeout_s": port.timeout_s}
+    keys = _assigned("--line", port.keys, "echo=true")
+    return {"port": port.port, "baud": port.baud, "format": port.format, "timeout_s": port.timeout_s, **keys}
 
 
 def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
@@ -141,7 +168,11 @@ def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
     except ValidationError as error:
         raise ConfigurationError(
             [
-                Problem(where=f"--{detail['loc'][-1]}", what=detail["msg"], value=str(detail["input"]))
+                Problem(
+                    where=f"--{'.'.join(map(str, detail['loc'])) or 'line'}",
+                    what=detail["msg"],
+                    value=str(detail["input"]) if detail["loc"] else "",
+                )
                 for detail in error.errors()
             ]
         ) from error

@@ -40,7 +40,9 @@ _ECHO = "the adapter repeats every request (two-wire RS-485): take that out"
 _URL_HAS_NONE = "a device server has these lines only behind rfc2217://host:port, and switches RS-485 itself"
 
 
-class _SerialSettings(_LineSettings):
+class SerialPortSettings(_LineSettings):
+    """A line on a serial port, or behind a pyserial URL."""
+
     port: Text = Field(
         description="device (prefer /dev/serial/by-id/...) or a pyserial URL (socket://host:port, rfc2217://host:port)"
     )
@@ -73,7 +75,7 @@ class _SerialSettings(_LineSettings):
 _HOST = "name or address of the device or of the serial device server"
 
 
-class SerialLine(_SerialSettings):
+class SerialLine(SerialPortSettings):
     """RS-232 or RS-485: a serial port, or a pyserial URL."""
 
     kind: Literal["serial"] = Field(description="bytes over a serial port")
@@ -88,15 +90,24 @@ class TcpLine(_LineSettings):
     echo: bool = Field(default=False, description=_ECHO)
 
 
-class ModbusRtuLine(_SerialSettings):
-    """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
-
-    kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
+class _ModbusSerialSettings(SerialPortSettings):
     ask_one_more: bool = Field(
         default=True,
         description="ask for a register more every second time, so that a late reply has another length; a slave that "
         "refuses it, or is silent, is not asked again: switch it off for one that does worse",
     )
+
+
+class ModbusRtuLine(_ModbusSerialSettings):
+    """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
+
+    kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
+
+
+class ModbusAsciiLine(_ModbusSerialSettings):
+    """Modbus ASCII on a serial port, or over TCP with port: socket://host:port."""
+
+    kind: Literal["modbus_ascii"] = Field(description="Modbus ASCII registers")
 
 
 class ModbusTcpLine(_LineSettings):
@@ -109,7 +120,7 @@ class ModbusTcpLine(_LineSettings):
 
 def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
     """The line with DTR and RTS as its gauges need them, where its own keys leave them open."""
-    if not isinstance(line, _SerialSettings) or line.port.startswith("socket://"):
+    if not isinstance(line, SerialPortSettings) or line.port.startswith("socket://"):
         return line
     needs: dict[str, bool] = {
         name: high for gauge in gauges for name, high in gauge.line_needs.items() if getattr(line, name) is None
@@ -117,4 +128,6 @@ def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
     return line.model_copy(update=needs)
 
 
-LineSettings = Annotated[SerialLine | TcpLine | ModbusRtuLine | ModbusTcpLine, Field(discriminator="kind")]
+LineSettings = Annotated[
+    SerialLine | TcpLine | ModbusRtuLine | ModbusAsciiLine | ModbusTcpLine, Field(discriminator="kind")
+]

@@ -27,6 +27,7 @@ from compd.configuration.operation import (
 )
 from compd.configuration.plausible import implausible
 from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
+from compd.configuration.sections import Sections
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
@@ -261,7 +262,7 @@ def examine(path: Path) -> Examined:
         for location, what, value, allowed, step in contradictions(part["geometry"])
     ]
     kinematics = getattr(part["geometry"], "kinematics", None)
-    checked = crosscheck.Sections(
+    checked = Sections(
         document,
         LINKS[kinematics] if kinematics is not None else None,
         part["lines"] or {},

@@ -6,12 +6,11 @@ Source: Modbus over Serial Line V1.02 (frame, CRC, 3.5 characters of silence).
 from __future__ import annotations
 
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, SerialMaster
+from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
 from compd.lines.stream import shown
 
 SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
-CONFIRMATION = 8  # unit, function, address, what was written, CRC
-WRITES = (WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS)
+CONFIRMATION = 2 + CONFIRMED + 2  # of a write
 
 
 def gap_s(baud: int) -> float:

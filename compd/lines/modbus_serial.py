@@ -32,6 +32,8 @@ EXCEPTIONS = {
 }
 READ_BITS = (1, 2)
 WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS = 5, 6, 16
+WRITES = (WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS)
+CONFIRMED = 4  # bytes behind the function of a write's confirmation: the address, and what was written
 MOST_REGISTERS, MOST_BITS = 125, 2000  # of one reply
 COIL_ON = 0xFF00
 BROADCAST = 0  # the unit that is all slaves of a serial line

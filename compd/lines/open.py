@@ -7,12 +7,13 @@ from typing import Literal, Protocol
 
 from compd.clock import Clock
 from compd.lines.control_lines import ControlLines, Rs485Settings
+from compd.lines.modbus_ascii import AsciiMaster
 from compd.lines.modbus_rtu import RtuMaster, gap_s
 from compd.lines.modbus_tcp import ModbusTcp
 from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import StreamLine
 
-Line = StreamLine | RtuMaster | ModbusTcp
+Line = StreamLine | RtuMaster | AsciiMaster | ModbusTcp
 WrapPort = Callable[[Port], Port]
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
@@ -65,7 +66,7 @@ class ModbusSerialSettings(_Serial, Protocol):
     """The keys of a Modbus line on a serial port in the configuration that are needed to open it."""
 
     @property
-    def kind(self) -> Literal["modbus_rtu"]: ...
+    def kind(self) -> Literal["modbus_rtu", "modbus_ascii"]: ...
     @property
     def ask_one_more(self) -> bool: ...
 
@@ -105,7 +106,12 @@ def open_line(settings: StreamSettings | ModbusTcpSettings, clock: Clock, wrap_p
     if settings.kind == "modbus_tcp":
         return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock, settings.pause_s)
     stream = open_stream(settings, clock, wrap_port)
-    return RtuMaster(stream, settings.ask_one_more) if settings.kind == "modbus_rtu" else stream
+    match settings.kind:
+        case "modbus_rtu":
+            return RtuMaster(stream, settings.ask_one_more)
+        case "modbus_ascii":
+            return AsciiMaster(stream, settings.ask_one_more)
+    return stream
 
 
 def open_stream(settings: StreamSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> StreamLine:

@@ -118,6 +118,14 @@ class SerialAscii(Gauge[ByteLine]):
     def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
         return self._protocol.line_needs
 
+    @property
+    def serial_signals(self) -> Sequence[Literal["DTR", "break"]]:
+        signals: dict[Literal["DTR", "break"], float | None] = {
+            "DTR": self._protocol.dtr_pulse_s,
+            "break": self._protocol.break_s,
+        }
+        return [signal for signal, duration_s in signals.items() if duration_s is not None]
+
     def traffic(self) -> Sequence[tuple[int, int]] | None:
         exchanges = []
         for poll in self._description.polls:

@@ -220,6 +220,10 @@ class SerialFrame(Gauge[ByteLine]):
     def line_needs(self) -> Mapping[Literal["dtr", "rts"], bool]:
         return self._protocol.line_needs
 
+    @property
+    def serial_signals(self) -> Sequence[Literal["DTR", "break"]]:
+        return () if self._protocol.break_s is None else ("break",)
+
     def traffic(self) -> Sequence[tuple[int, int]]:
         return [(len(self._request), len(self._frame.fixed))]
 

@@ -12,7 +12,7 @@ from compd.cli.options import OverwriteOption
 
 if TYPE_CHECKING:
     from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import GaugeTarget
+    from compd.commissioning.open_gauge import GaugeTarget, PortArguments
     from compd.gauge import Reading
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
@@ -25,6 +25,10 @@ Format = Annotated[
     str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
 ]
 Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="How long to wait for the first byte, s.")]
+LineKeys = Annotated[
+    list[str] | None,
+    typer.Option("--line", help="Another key of the line: echo=true, pause_s=0.02, rts=false, kind=modbus_ascii."),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9.")]
 
 
@@ -104,6 +108,7 @@ def read(
     baud: Baud = None,
     format_: Format = None,
     timeout_s: Timeout = 1.0,
+    line_keys: LineKeys = None,
     assignments: Set = None,
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
@@ -111,7 +116,7 @@ def read(
     from compd.commissioning.open_gauge import read_gauge
     from compd.gauge import LineFault
 
-    gauge_target = _target(target, name, port, baud, format_, timeout_s, assignments)
+    gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
     started_s = clock.monotonic()
 
@@ -136,6 +141,7 @@ def watch(
     baud: Baud = None,
     format_: Format = None,
     timeout_s: Timeout = 1.0,
+    line_keys: LineKeys = None,
     assignments: Set = None,
     polls: Annotated[int | None, typer.Option(min=1, help="Stop after so many polls; Ctrl-C if left out.")] = None,
 ) -> None:
@@ -147,7 +153,7 @@ def watch(
     from compd.commissioning.gauge_statistics import GaugeStatistics
     from compd.commissioning.open_gauge import poll_gauge
 
-    gauge_target = _target(target, name, port, baud, format_, timeout_s, assignments)
+    gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
     statistics = GaugeStatistics(gauge_target.gauge.channels)
     with Live(console=Console(), refresh_per_second=5) as live:
@@ -169,6 +175,7 @@ def learn(
     baud: Baud = None,
     format_: Format = None,
     timeout_s: Timeout = 1.0,
+    line_keys: LineKeys = None,
     out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
     replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
     names: Annotated[str, typer.Option(help="Names of the channels, with commas between.")] = "",
@@ -187,7 +194,7 @@ def learn(
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
     from compd.commissioning.capture import capture_live, read_capture
     from compd.commissioning.describe import learn_gauge
-    from compd.commissioning.open_gauge import PortArguments, byte_line_settings
+    from compd.commissioning.open_gauge import byte_line_settings
     from compd.output_file import check_replaceable
 
     if to is not None:
@@ -195,7 +202,7 @@ def learn(
     if capture is not None:
         request, captured = read_capture(capture)
     elif port:
-        settings = byte_line_settings(PortArguments(port, baud, format_, timeout_s))
+        settings = byte_line_settings(_port(port, baud, format_, timeout_s, line_keys))
         request, captured = capture_live(settings, out, replies, _between_captures, typer.echo)
     else:
         raise typer.BadParameter("name a capture file, or a --port")
@@ -218,22 +225,22 @@ def _between_captures(done: int, wanted: int) -> None:
     typer.prompt(f"{done} of {wanted} captured; move the gauge, then Enter", default="", show_default=False)
 
 
-def _target(
-    target: str,
-    name: str | None,
-    port: str,
-    baud: int | None,
-    form: str | None,
-    timeout_s: float,
-    assignments: Sequence[str] | None,
-) -> GaugeTarget:
-    from compd.commissioning.open_gauge import PortArguments, gauge_of_configuration, gauge_of_driver
+def _port(
+    port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
+) -> PortArguments:
+    from compd.commissioning.open_gauge import PortArguments
+
+    return PortArguments(port, baud, form, timeout_s, line_keys or ())
+
+
+def _target(target: str, name: str | None, port: PortArguments, assignments: Sequence[str] | None) -> GaugeTarget:
+    from compd.commissioning.open_gauge import gauge_of_configuration, gauge_of_driver
 
     if target.endswith((".yaml", ".yml")):
         return gauge_of_configuration(Path(target), name)
-    if not port:
+    if not port.port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
-    return gauge_of_driver(target, PortArguments(port, baud, form, timeout_s), assignments or ())
+    return gauge_of_driver(target, port, assignments or ())
 
 
 def _reading_text(reading: Reading, unit: str) -> str:

@@ -1,13 +1,15 @@
-"""Modbus slaves behind one wire: requests in, replies out, in RTU or TCP framing.
+"""Modbus slaves behind one wire: requests in, replies out, in RTU, TCP or ASCII framing.
 
 Framing is done by pymodbus, so that compd's own RTU master is tested against an independent implementation.
 """
 
 from __future__ import annotations
 
+import binascii
 import struct
 from collections.abc import Sequence
 
+from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
 from pymodbus.framer.socket import FramerSocket
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
@@ -32,11 +34,14 @@ MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
 class ModbusSlaves:
     """The slaves on one wire, by unit number; requests to an absent unit get no reply."""
 
-    def __init__(self, devices: Sequence[SimulatedRegisterDevice], over_tcp: bool) -> None:
-        """over_tcp : Modbus TCP framing (MBAP) instead of RTU."""
+    def __init__(
+        self, devices: Sequence[SimulatedRegisterDevice], over_tcp: bool = False, as_text: bool = False
+    ) -> None:
+        """over_tcp : Modbus TCP framing (MBAP) instead of RTU. as_text : ASCII framing instead."""
         self._devices = {device.unit: device for device in devices}
         self._over_tcp = over_tcp
-        self._framer = FramerSocket(DecodePDU(True)) if over_tcp else FramerRTU(DecodePDU(True))
+        self._as_text = as_text
+        self._framer = (FramerAscii if as_text else FramerSocket if over_tcp else FramerRTU)(DecodePDU(True))
         self._received = b""
 
     def hear(self, data: bytes) -> bytes:
@@ -49,6 +54,12 @@ class ModbusSlaves:
 
     def _next(self) -> bytes:
         """Take the next complete request from the received bytes; b"" if there is none yet."""
+        if self._as_text:
+            text, end, rest = self._received.partition(b"\r\n")
+            if not end:
+                return b""
+            self._received = rest
+            return text[text.rfind(b":") :]
         if self._over_tcp:
             length = MBAP.size
             if len(self._received) >= length:
@@ -75,7 +86,12 @@ class ModbusSlaves:
 
     def _answer(self, request: bytes) -> bytes:
         """The reply to one complete frame; b"" for an absent unit."""
-        if self._over_tcp:
+        if self._as_text:
+            frame = _unit_and_message(request)
+            if not frame:
+                return b""
+            transaction, unit, message = 0, frame[0], frame[1:]
+        elif self._over_tcp:
             transaction, unit, message = MBAP.unpack_from(request)[0], request[6], request[7:]
         else:
             transaction, unit, message = 0, request[0], request[1:-2]
@@ -89,6 +105,15 @@ class ModbusSlaves:
         reply = _reply(device, message)
         reply.dev_id, reply.transaction_id = unit, transaction
         return self._framer.buildFrame(reply)
+
+
+def _unit_and_message(text: bytes) -> bytes:
+    """The bytes of an ASCII frame without its LRC; b"" for anything else, which a slave does not hear."""
+    try:
+        frame = binascii.unhexlify(text.removeprefix(b":"))
+    except binascii.Error:
+        return b""
+    return frame[:-1] if len(frame) > 2 and FramerAscii.check_LRC(frame[:-1], frame[-1]) else b""
 
 
 def _crc_matches(frame: bytes) -> bool:

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.lines import LineSettings, ModbusRtuLine, SerialLine
+from compd.configuration.lines import LineSettings, SerialPortSettings
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
 from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
@@ -46,6 +47,12 @@ def _other_unit_rtu(reply: bytes) -> bytes:
     return frame + FramerRTU.compute_CRC(frame).to_bytes(2, "big")
 
 
+def _other_unit_ascii(reply: bytes) -> bytes:
+    frame = bytearray(bytes.fromhex(reply[1:-4].decode()))
+    frame[0] = frame[0] % 247 + 1
+    return b":" + (bytes(frame) + bytes([FramerAscii.compute_LRC(bytes(frame))])).hex().upper().encode() + b"\r\n"
+
+
 def _other_unit_tcp(reply: bytes) -> bytes:
     return reply[:6] + bytes([reply[6] % 247 + 1]) + reply[7:]
 
@@ -64,6 +71,7 @@ DAMAGES: Mapping[str, Mapping[str, Damage]] = {
     "serial": _COMMON,
     "tcp": _COMMON,
     "modbus_rtu": {**_COMMON, "wrong unit": _other_unit_rtu},
+    "modbus_ascii": {**_COMMON, "wrong unit": _other_unit_ascii},
     "modbus_tcp": {**_COMMON, "garble": _garble_header, "wrong unit": _other_unit_tcp},
 }
 UNPLUGGED = "unplugged"
@@ -115,12 +123,14 @@ class SimulatedLine:
         self._listener: Listener
         if settings.kind.startswith("modbus"):
             registers = [device for device in devices if isinstance(device, SimulatedRegisterDevice)]
-            self._listener = ModbusSlaves(registers, over_tcp=settings.kind == "modbus_tcp")
+            self._listener = ModbusSlaves(
+                registers, over_tcp=settings.kind == "modbus_tcp", as_text=settings.kind == "modbus_ascii"
+            )
         else:
             self._listener = ByteDevices([device for device in devices if isinstance(device, SimulatedByteDevice)])
         self._character_s = 0.0
-        self._on_pty = isinstance(settings, SerialLine | ModbusRtuLine) and "://" not in settings.port
-        if isinstance(settings, SerialLine | ModbusRtuLine) and self._on_pty:
+        self._on_pty = isinstance(settings, SerialPortSettings) and "://" not in settings.port
+        if isinstance(settings, SerialPortSettings) and self._on_pty:
             bits = 1 + int(settings.format[0]) + (settings.format[1] != "N") + int(settings.format[2])
             self._character_s = bits / settings.baud
         self._tcp_port = 0
@@ -139,7 +149,7 @@ class SimulatedLine:
         self._thread.start()
         if self._on_pty:
             return str(self._link)
-        if isinstance(self._settings, SerialLine | ModbusRtuLine):
+        if isinstance(self._settings, SerialPortSettings):
             return f"socket://{LOOPBACK}:{self._tcp_port}"
         return LOOPBACK, self._tcp_port
 

@@ -22,6 +22,7 @@ from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
 
 RUNNER = CliRunner()
+MAP = "channels=[{name: a, function: 4, address: 0, type: int16, unit: mm}]"
 
 
 def device(name: str, **options: Any) -> Any:
@@ -102,6 +103,31 @@ def test_read_a_configured_gauge_that_is_not_there() -> None:
 def test_a_serial_port_needs_baud_and_format(scale: str) -> None:
     with pytest.raises(CompdError, match="needs both"):
         run_gauge("read", "heidenhain_nd28x", "--port", scale)
+
+
+def test_keys_of_the_line_stand_on_the_command_line(scale: str) -> None:
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--timeout", "0.2")
+    code, output = run_gauge("read", "heidenhain_nd28x", *port, "--line", "pause_s=0.02")
+    assert (code, "1.250000 mm" in output) == (0, True)
+    code, output = run_gauge("read", "heidenhain_nd28x", *port, "--line", "echo=true")
+    assert code == 1
+    assert "see `echo` of the line" in output
+    code, output = run_gauge("read", "modbus", *port, "--line", "kind=modbus_ascii", "--set", "unit=1", "--set", MAP)
+    assert "> 3a 30 31 30 34" in output, ":0104, as text"
+
+
+@pytest.mark.parametrize(
+    ("key", "problem"),
+    [
+        ("echo", "--line: is not KEY=VALUE"),
+        ("ecko=true", "--ecko"),
+        ("rs485={rts_when_sending: 5}", "--rs485.rts_when"),
+    ],
+)
+def test_a_key_of_the_line_that_cannot_be(scale: str, key: str, problem: str) -> None:
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1")
+    with pytest.raises(CompdError, match=problem):
+        RUNNER.invoke(gauge_cli.gauge, ["read", "heidenhain_nd28x", *port, "--line", key], catch_exceptions=False)
 
 
 def test_watch_counts(scale: str) -> None:

@@ -18,7 +18,7 @@ from compd.commissioning.line_budget import (
     line_warnings,
 )
 from compd.configuration import load
-from compd.configuration.lines import ModbusRtuLine, ModbusTcpLine, SerialLine
+from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, SerialLine
 from tests.support.paths import CONFIG
 
 
@@ -28,6 +28,11 @@ def rtu(baud: int, **more: float) -> ModbusRtuLine:
 
 # nine values as: one block of int16, one block of float32, nine units with one register each
 INT16, FLOAT32, UNITS = [(8, 23)], [(8, 41)], [(8, 7)] * 9
+
+
+def test_modbus_ascii_takes_two_characters_for_a_byte() -> None:
+    line = ModbusAsciiLine(kind="modbus_ascii", port="/dev/x", baud=9600, format="7E1", timeout_s=0.1)
+    assert budget_of_line("l", line, {"a": INT16}).bytes == len(":0104000000093A\r\n") + len(":") + 2 * 22 + len("\r\n")
 
 
 def test_a_pause_between_requests_counts() -> None:

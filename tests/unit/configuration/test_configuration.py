@@ -6,14 +6,18 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 
 from compd.configuration import load
+from compd.configuration.hashes import hash_of
+from compd.configuration.lines import ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.configuration.schema import json_schema
 from compd.errors import ConfigurationError
+from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd_drivers.heidenhain_nd28x import HeidenhainNd28x
 from tests.support.paths import ROOT
@@ -44,6 +48,7 @@ def test_shipped_machines_are_complete(name: str) -> None:
 
 
 ND28X = "scale_1: {driver: heidenhain_nd28x, line: scale_1"
+SIMPLEX = "scale_1: {driver: sylvac_optors, unit: mm, cable: simplex, line: scale_1"
 SYLVAC = "scale_1: {driver: sylvac_optors, unit: mm, line: scale_1"
 CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("  rate_hz: 200", "  rat_hz: 200"), "loop.rat_hz: unknown key", "did you mean `rate_hz`?"),
@@ -85,6 +90,11 @@ CASES: list[tuple[Edit, str, str]] = [
         lambda t: t.replace("    low_latency: true ", "    rs485: {} ", 1).replace(ND28X, SYLVAC),
         "gauges.scale_1: is powered from RTS, which `rs485` of line `scale_1` sets otherwise",
         "rts: false",
+    ),
+    (
+        lambda t: t.replace("port: /dev/serial/by-id/usb-scale-1", "port: socket://x:1", 1).replace(ND28X, SIMPLEX),
+        "gauges.scale_1.line: is asked by DTR, which a TCP connection does not have",
+        "rfc2217://",
     ),
     (lambda t: t.replace("    low_latency: true ", "    rs485: {rts: 1} ", 1), "lines.scale_1.rs485.rts: unknown", ""),
     (lambda t: t + "acquisition: {own_proces: [joints]}\n", "unknown key", "did you mean `own_process`?"),
@@ -166,6 +176,41 @@ def test_hashes_follow_what_they_stand_for(tmp_path: Path) -> None:
     assert moved.config_hash != first.config_hash
     path.write_text(TRIPOD.read_text().replace("zero_tip_M_mm: [0, 0, 190]", "zero_tip_M_mm: [0, 0, 191]"))
     assert load(path).zero_hash != first.zero_hash
+
+
+# What these drivers' sample options, and plain lines, gave before the keys that have come since.
+FORMER_HASHES = {
+    "adam_4017p": "3ed870fe739b7946",
+    "heidenhain_nd28x": "b34286aff1bfdf39",
+    "icpdas_m7017c": "d3f5d0764f18d6e5",
+    "keyence_dlen1": "0860e25cfa78c159",
+    "keyence_gt2_dlrs1a": "37090a4e118d798d",
+    "mahr_c1202": "f821897c5b1592d2",
+    "microepsilon_msc7": "897bc1b99b0561bd",
+    "modbus": "72088c3a76d2b61d",
+    "moxa_e1240": "ba4e6c27765b220e",
+    "r4dcb08": "c2e5d7b7d4e42b05",
+    "serial_ascii": "7f7fe85c9e2cc9b1",
+    "serial_frame": "046b90be97bea64d",
+    "sylvac_optors": "892952aec8a8d994",
+    "tesa_tt80": "e12f38ef40f38f10",
+}
+PORT = {"port": "/dev/x", "baud": 9600, "format": "8N1", "timeout_s": 0.1}
+PLAIN_LINES = {
+    "a": SerialLine(kind="serial", **PORT),  # type: ignore[arg-type]
+    "b": ModbusRtuLine(kind="modbus_rtu", **{**PORT, "port": "/dev/y"}),  # type: ignore[arg-type]
+    "c": TcpLine(kind="tcp", host="h", port=1, timeout_s=0.1),
+    "d": ModbusTcpLine(kind="modbus_tcp", host="h", timeout_s=0.1),
+}
+
+
+@pytest.mark.parametrize("driver", FORMER_HASHES)
+def test_keys_that_are_left_out_change_no_hash(driver: str) -> None:
+    """Machine zero and recordings name it: a new key with a default must not make them invalid."""
+    kind = load_plugin(GAUGES, driver, driver)
+    options = kind.Options.model_validate({"driver": driver, "line": "l", **(kind.sample_options or {})})
+    assert hash_of(SimpleNamespace(gauges={"g": options}), ("gauges",)) == FORMER_HASHES[driver]
+    assert hash_of(SimpleNamespace(lines=PLAIN_LINES), ("lines",)) == "25423cdb9d7fe15f"
 
 
 def test_lines_get_processes_of_their_own_only_where_the_file_says_so(tmp_path: Path) -> None:

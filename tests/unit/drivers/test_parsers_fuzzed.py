@@ -212,6 +212,31 @@ def test_serial_ascii(reply: bytes) -> None:
     check(described_ascii, reply, values)
 
 
+SIGN_BEHIND = [b"0012.300-mm*51\r\n", b"0500.000+um*56\r\n", b"0000.001 mm*33\r\n"]
+
+
+sign_behind = driver(
+    "serial_ascii",
+    out="?",
+    in_terminator=r"\r\n",
+    channels=[{"name": "a", "unit": "mm"}],
+    **{"in": r"%08.3f%{+=1|-=-1| =1}%{mm=1|um=0.001}*%#.1<sum100>"},
+)
+
+
+@bounded
+@given(mutated(SIGN_BEHIND))
+@example(b"-012.300-mm*48\r\n")
+def test_a_sign_behind_a_unit_by_table_and_a_decimal_sum(reply: bytes) -> None:
+    def values(reply: bytes) -> list[float | None] | None:
+        match = re.fullmatch(rb"( *[0-9]*\.[0-9]{3})([+ -])(mm|um)\*([0-9]{2})\r\n", reply)
+        if match is None or len(match[1]) != 8 or sum(reply[:-5]) % 100 != int(match[4]):
+            return None
+        return [number(match[1]) * (-1 if match[2] == b"-" else 1) * (1e-3 if match[3] == b"um" else 1)]
+
+    check(sign_behind, reply, values)
+
+
 def framed(data: bytes) -> bytes:
     return data + bytes([sum(data) % 256])
 
@@ -290,6 +315,7 @@ def test_modbus_frames(reply: bytes) -> None:
         (dlen1, DLEN1[0]),
         (c1202, b"1 +0012.3 um;2 ERR6;3 -0001.5 um = <\r"),
         (described_ascii, ASCII[0]),
+        *((sign_behind, reply) for reply in SIGN_BEHIND),
         (described_frame, FRAME[0]),
         (registers, RTU[0]),
     ],

@@ -69,21 +69,23 @@ CASES = {
     "keyence MS": Case(serial(38400, "8N1"), {**DLRS1A, "request": "MS"}, HEADS, 1e-4),
     "keyence over TCP": Case(TCP, DLRS1A, HEADS, 1e-4),
     "modbus RTU": Case(RTU, MAP, SEEN, 1e-4),
+    "modbus ASCII": Case({**RTU, "kind": "modbus_ascii", "format": "7E1"}, MAP, SEEN, 1e-4),
     "modbus RTU over TCP": Case({**RTU, "port": "socket://x:1"}, MAP, SEEN, 1e-4),
     "modbus TCP": Case({"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}, MAP, SEEN, 1e-4),
 }
-# What each fault is called: on lines of bytes, with RTU, with Modbus TCP (where pymodbus drops what does not fit)
-NAMES: dict[str, tuple[set[Quality], set[Quality], set[Quality]]] = {
-    "silent": ({Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}),
-    "garble": ({Quality.MISMATCH}, {Quality.CRC}, {Quality.TIMEOUT}),
-    "late": ({Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}),
-    "cut": ({Quality.INCOMPLETE}, {Quality.INCOMPLETE}, {Quality.TIMEOUT}),
-    "noise before": ({Quality.MISMATCH}, {Quality.CRC}, {Quality.TIMEOUT}),
-    "wrong unit": (set(), {Quality.MISMATCH}, {Quality.TIMEOUT}),
-    "doubled": ({OK}, {OK}, {OK}),
-    "unplugged": ({Quality.LINE_LOST}, {Quality.LINE_LOST}, {Quality.LINE_LOST}),
+# What each fault is called: on lines of bytes, with RTU, with Modbus TCP (where pymodbus drops what does not fit), and
+# with Modbus ASCII
+NAMES: dict[str, tuple[set[Quality], ...]] = {
+    "silent": ({Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}),
+    "garble": ({Quality.MISMATCH}, {Quality.CRC}, {Quality.TIMEOUT}, {Quality.CRC}),
+    "late": ({Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}, {Quality.TIMEOUT}),
+    "cut": ({Quality.INCOMPLETE}, {Quality.INCOMPLETE}, {Quality.TIMEOUT}, {Quality.INCOMPLETE}),
+    "noise before": ({Quality.MISMATCH}, {Quality.CRC}, {Quality.TIMEOUT}, {Quality.MISMATCH}),
+    "wrong unit": (set(), {Quality.MISMATCH}, {Quality.TIMEOUT}, {Quality.MISMATCH}),
+    "doubled": ({OK}, {OK}, {OK}, {OK}),
+    "unplugged": ({Quality.LINE_LOST}, {Quality.LINE_LOST}, {Quality.LINE_LOST}, {Quality.LINE_LOST}),
 }
-KINDS = {"serial": 0, "tcp": 0, "modbus_rtu": 1, "modbus_tcp": 2}
+KINDS = {"serial": 0, "tcp": 0, "modbus_rtu": 1, "modbus_tcp": 2, "modbus_ascii": 3}
 
 
 def made(tmp_path: Path, case: Case) -> Any:

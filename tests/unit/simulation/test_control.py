@@ -98,6 +98,20 @@ def test_daemon_configuration_differs_only_in_where_things_are(path: Path, direc
     assert daemon.state.directory == str(directory / "state")
 
 
+def test_what_a_simulated_port_does_not_have_is_left_out(directory: Path) -> None:
+    """An echo that never comes would make every poll of the simulated line a timeout."""
+    copy = directory / "machine.yaml"
+    keys = "    echo: true\n    dtr: true\n    rts: false\n    pause_s: 0.01\n"
+    copy.write_text(TRIPOD.read_text().replace("    low_latency: true ", f"{keys}    low_latency: true ", 1))
+    (directory / "simulated").mkdir()
+    original = load(copy)
+    line: Any = original.lines["scale_1"]
+    assert (line.echo, line.dtr, line.rts, line.pause_s) == (True, True, False, 0.01)
+    simulated: Any = daemon_configuration(original, ports(original, directory), directory / "simulated")
+    line = simulated.lines["scale_1"]
+    assert (line.echo, line.dtr, line.rts, line.pause_s) == (False, None, None, 0.01)
+
+
 def test_no_setpoint_leaves_this_computer(directory: Path) -> None:
     """The simulated machine's setpoints must never reach the real machine's controller."""
     abroad = {

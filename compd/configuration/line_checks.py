@@ -1,0 +1,133 @@
+"""Checks of the lines against each other and against the gauges on them: ports, kinds, signals, power, processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from compd.configuration.document import Location
+from compd.configuration.sections import Sections
+from compd.errors import Problem
+
+
+def line_problems(sections: Sections) -> Iterator[Problem]:
+    """Every contradiction between lines, and between a line and its gauges, as far as they could be read."""
+    yield from _port_problems(sections)
+    yield from _kind_problems(sections)
+    yield from _signal_problems(sections)
+    yield from _power_problems(sections)
+    yield from _process_problems(sections)
+
+
+def _port_problems(sections: Sections) -> Iterator[Problem]:
+    """A port that two lines name."""
+    line_of_port: dict[str, str] = {}
+    for name, line in sections.lines.items():
+        port = getattr(line, "port", None)
+        if port is None or getattr(line, "kind", None) is None:
+            continue
+        if line.kind in ("tcp", "modbus_tcp"):
+            port = f"{line.host}:{port}"
+        if port in line_of_port:
+            yield Problem(
+                where=sections.document.where(("lines", name, "port")),
+                what=f"line `{line_of_port[port]}` has the same port",
+                value=port,
+                allowed="one line per port",
+                next_step="hang both gauges on one line",
+            )
+        line_of_port[port] = name
+
+
+def _kind_problems(sections: Sections) -> Iterator[Problem]:
+    """A gauge whose line does not exist, or carries registers where the driver needs bytes or the other way round."""
+    lines, gauges = sections.document.data.get("lines"), sections.document.data.get("gauges")
+    if not isinstance(lines, dict) or not isinstance(gauges, dict):
+        return
+    for name, options in gauges.items():
+        line_name = options.get("line") if isinstance(options, dict) else None
+        if not isinstance(line_name, str):
+            continue
+        location: Location = ("gauges", name, "line")
+        if line_name not in lines:
+            yield Problem(
+                where=sections.document.where(location),
+                what="no such line",
+                value=line_name,
+                allowed=", ".join(map(str, lines)),
+                next_step="write the name of a line under `lines:`",
+            )
+            continue
+        kind = getattr(sections.lines.get(line_name), "kind", None)
+        if kind is None or name not in sections.drivers:
+            continue
+        carries: Literal["bytes", "registers"] = "registers" if kind.startswith("modbus") else "bytes"
+        if carries != sections.drivers[name].line_kind:
+            yield Problem(
+                where=sections.document.where(location),
+                what=f"driver {options['driver']} needs a line that carries {sections.drivers[name].line_kind}",
+                value=f"{line_name} (kind {kind})",
+                allowed="kind modbus_rtu, modbus_ascii or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
+            )
+
+
+def _signal_problems(sections: Sections) -> Iterator[Problem]:
+    """A gauge that is asked by what its line does not have."""
+    for name, options in sections.gauges.items():
+        line = sections.lines.get(options.line)
+        over_tcp = getattr(line, "kind", None) == "tcp" or str(getattr(line, "port", "")).startswith("socket://")
+        if over_tcp and (signals := sections.drivers[name](options).serial_signals):
+            yield Problem(
+                where=sections.document.where(("gauges", name, "line")),
+                what=f"is asked by {' and '.join(signals)}, which a TCP connection does not have",
+                value=options.line,
+                allowed="a serial port, or rfc2217://host:port",
+                next_step="let the device server speak RFC 2217, or use a port of this computer",
+            )
+
+
+def _power_problems(sections: Sections) -> Iterator[Problem]:
+    """A line whose DTR or RTS is not as a gauge on it needs it for its power."""
+    needed: dict[tuple[str, str], tuple[str, bool]] = {}
+    for name, options in sections.gauges.items():
+        line = sections.lines.get(options.line)
+        for pin, high in sections.drivers[name](options).line_needs.items():
+            by, wanted = needed.setdefault((options.line, pin), (name, high))
+            set_to = getattr(line, pin, None)
+            against = ""
+            if set_to not in (None, high):
+                against = f"`{pin}: {str(set_to).lower()}` of line `{options.line}`"
+            elif pin == "rts" and getattr(line, "rs485", None) is not None:
+                against = f"`rs485` of line `{options.line}`"
+            elif wanted != high:
+                against = f"gauge `{by}` on line `{options.line}`"
+            if against:
+                yield Problem(
+                    where=sections.document.where(("gauges", name)),
+                    what=f"is powered from {pin.upper()}, which {against} sets otherwise",
+                    allowed=f"{pin}: {str(high).lower()}",
+                    next_step="remove the line's key, or give the gauge a line of its own",
+                )
+
+
+def _process_problems(sections: Sections) -> Iterator[Problem]:
+    """A line that is to have a process of its own and does not exist, or is named twice."""
+    lines = sections.document.data.get("lines")
+    if not isinstance(lines, dict):
+        return
+    named: set[str] = set()
+    for i, name in enumerate(getattr(sections.acquisition, "own_process", None) or ()):
+        if name is None:
+            continue
+        where = sections.document.where(("acquisition", "own_process", i))
+        if name not in lines:
+            yield Problem(
+                where=where,
+                what="no such line",
+                value=name,
+                allowed=", ".join(map(str, lines)),
+                next_step="write the name of a line under `lines:`",
+            )
+        elif name in named:
+            yield Problem(where=where, what="named twice", value=name, allowed="each line once", next_step="remove it")
+        named.add(name)
