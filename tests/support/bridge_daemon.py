@@ -7,6 +7,9 @@ import socket
 from pathlib import Path
 from typing import Any
 
+# Long enough for LinuxCNC to start.
+PATIENCE_S = 60.0
+
 
 class BridgeDaemon:
     """Greets whoever connects, and sends what the test says."""
@@ -15,6 +18,7 @@ class BridgeDaemon:
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(str(path))
         self._listener.listen()
+        self._listener.settimeout(PATIENCE_S)
         self._connection: socket.socket | None = None
 
     def greet(self) -> None:

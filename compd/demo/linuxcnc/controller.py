@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pwd
 import shutil
 import signal
 import socket
@@ -42,9 +43,14 @@ def missing() -> str:
     ):
         if shutil.which(program) is None:
             return f"{program} is not there: apt-get install {package} (Debian 12 or newer)"
-    if os.geteuid() == 0 and shutil.which("runuser") is None:
-        return "runuser is not there, and LinuxCNC does not run as root: apt-get install util-linux"
     return ""
+
+
+def _ordinary_user() -> dict[str, Any]:
+    """For subprocess: ORDINARY_USER, where this is root."""
+    if os.geteuid() != 0:
+        return {}
+    return {"user": ORDINARY_USER, "group": pwd.getpwnam(ORDINARY_USER).pw_gid, "extra_groups": []}
 
 
 class LinuxCnc:
@@ -80,13 +86,14 @@ class LinuxCnc:
         self._write_files()
         with (self.directory / "output.log").open("wb") as log:
             self._process = subprocess.Popen(
-                [*self._as_ordinary_user(), "linuxcnc", "-r", "machine.ini"],
+                ["linuxcnc", "-r", "machine.ini"],
                 cwd=self.directory,
                 env={**os.environ, "HOME": str(self.directory)},
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
+                **_ordinary_user(),
             )
         try:
             self._panel = self._connect()
@@ -226,9 +233,6 @@ class LinuxCnc:
         if os.geteuid() == 0:
             shutil.chown(path, ORDINARY_USER)
 
-    def _as_ordinary_user(self) -> list[str]:
-        return ["runuser", "-u", ORDINARY_USER, "--"] if os.geteuid() == 0 else []
-
     def _connect(self) -> socket.socket:
         path, end_s = self.directory / "panel.sock", time.monotonic() + START_S
         assert self._process is not None
@@ -251,7 +255,7 @@ class LinuxCnc:
         except subprocess.TimeoutExpired:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
-            subprocess.run([*self._as_ordinary_user(), "halrun", "-U"], check=False, capture_output=True)
+            subprocess.run(["halrun", "-U"], check=False, capture_output=True, **_ordinary_user())
             LOCK.unlink(missing_ok=True)
 
     def _problem(self, what: str) -> DaemonError:

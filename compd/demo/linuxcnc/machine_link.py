@@ -36,7 +36,7 @@ FOLLOWED, LOGGED, LOOKED = 5, 10, 50
 CLOCK_GAIN = 0.01
 # Beyond this difference, s, the count has had a gap.
 CLOCK_GAP_S = 0.25
-END_S = 2.0
+END_S = 1.0
 # Of probe-contact in probe.hal.
 HYSTERESIS_MM = 0.002
 
@@ -133,7 +133,8 @@ class Link:
         # open as long as the process lives, and whole lines at once: others read it meanwhile
         self._log: IO[str] = Path("motion.log").open("w", buffering=1)  # noqa: SIM115
         self._clock = SampleClock()
-        self._sampler = subprocess.Popen(["halsampler", "-t"], stdout=subprocess.PIPE)
+        # one that is left alone does not heed SIGTERM, and keeps its shared memory from the next LinuxCNC
+        self._sampler = subprocess.Popen(["setpriv", "--pdeathsig", "KILL", "halsampler", "-t"], stdout=subprocess.PIPE)
         self._rest = b""
         self._before: list[float] | None = None
         self._largest_mm = self._step_mm = 0.0
