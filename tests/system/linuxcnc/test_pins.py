@@ -17,7 +17,7 @@ from tests.support.bridge_daemon import BridgeDaemon
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
 
 PERIOD_S, VALID_S = 0.01, 0.1
 # What the daemon asks for with the base of config/hexapod.yaml up by 10 um at machine zero.

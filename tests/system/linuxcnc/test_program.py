@@ -44,7 +44,6 @@ def run(machine: LinuxCnc, program: Path) -> TipErrors:
     return tip_errors(Mechanism(load(HEXAPOD).geometry), read_motion_log(machine.motion_log, start_s, end_s))
 
 
-@pytest.mark.sample
 @pytest.mark.timeout(400)
 def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: LinuxCnc) -> None:
     """Half an hour of warming up passes first, with corrections; then the program runs without them, and with them."""
