@@ -9,7 +9,7 @@ from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
 
 UP_MM, LONGER_MM = 0.010, 0.00914
 
