@@ -27,6 +27,9 @@ POLL_S = 0.05
 PRESSES, PRESSED_S = 3, 1.0
 # Longer than anything the panel waits for by itself.
 ANSWER_S = 30.0
+LINKS = 6
+# Corrections have arrived within so much of what is asked for, which changes all the time; and that takes at most, s.
+ARRIVED_MM, ARRIVED_S = 2e-4, 10.0
 # There can be one LinuxCNC on a computer.
 LOCK = Path("/tmp/linuxcnc.lock")
 _HERE = Path(__file__).parent
@@ -160,9 +163,19 @@ class LinuxCnc:
         self.set_signal("compd-required", "0")
 
     def with_corrections(self) -> None:
-        """Let the machine move only while the bridge is armed, and arm it."""
+        """Let the machine move only while the bridge is armed, arm it, and wait until the corrections have arrived."""
         self.set_signal("compd-required", "1")
         self.arm()
+        asked = [f"compd.link.{link}.offset" for link in range(LINKS)]
+        applied = [f"limit3.{link}.out" for link in range(LINKS)]
+        end_s = time.monotonic() + ARRIVED_S
+        while True:
+            values = self.values([*asked, *applied])
+            if all(abs(values[a] - values[b]) < ARRIVED_MM for a, b in zip(asked, applied, strict=True)):
+                return
+            if time.monotonic() > end_s:
+                raise self._problem(f"limit3 does not follow the bridge: {values}")
+            time.sleep(POLL_S)
 
     def set_signal(self, name: str, value: str) -> None:
         self.do("set_signal", name=name, value=value)

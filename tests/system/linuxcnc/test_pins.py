@@ -3,57 +3,21 @@
 from __future__ import annotations
 
 import math
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.demo.linuxcnc.controller import LinuxCnc, missing
-from tests.support.bridge_daemon import BridgeDaemon
+from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
 
-PERIOD_S, VALID_S = 0.01, 0.1
 # What the daemon asks for with the base of config/hexapod.yaml up by 10 um at machine zero.
 UP_10_UM_MM = 0.00914
 JOINTS = range(6)
-
-
-class Sender:
-    """Setpoints, a hundred a second, to one bridge."""
-
-    def __init__(self, path: Path) -> None:
-        self.correction_mm: list[float] | None = [0.0] * 6
-        self._daemon = BridgeDaemon(path)
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="setpoints", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        self._end.set()
-        self._thread.join()
-        self._daemon.close()
-
-    def _run(self) -> None:
-        self._daemon.greet()
-        clock, seq = MonotonicClock(), 0
-        while not clock.wait(self._end, PERIOD_S):
-            seq, now_s = seq + 1, time.monotonic()
-            message: dict[str, Any] = {"class": "SETPOINT", "seq": seq, "time_s": now_s, "valid_until": now_s + VALID_S}
-            if self.correction_mm is None:
-                message |= {"valid": False, "state": "stop", "valid_until": now_s}
-            else:
-                message |= {"valid": True, "state": "ok", "correction_mm": self.correction_mm}
-            try:
-                self._daemon.send_message(message)
-            except OSError:
-                return  # LinuxCNC has ended
 
 
 @pytest.fixture(scope="module")
@@ -63,21 +27,21 @@ def directory() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def sender(directory: Path) -> Iterator[Sender]:
-    sender = Sender(directory / "compd.sock")
+def sender(directory: Path) -> Iterator[SetpointSender]:
+    sender = SetpointSender(directory / "compd.sock")
     yield sender
     sender.close()
 
 
 @pytest.fixture(scope="module")
-def controller(directory: Path, sender: Sender) -> Iterator[LinuxCnc]:
+def controller(directory: Path, sender: SetpointSender) -> Iterator[LinuxCnc]:
     with LinuxCnc(directory / "controller", directory, hal_files=()) as controller:
         controller.switch_on()
         yield controller
 
 
 @pytest.fixture
-def armed(controller: LinuxCnc, sender: Sender) -> LinuxCnc:
+def armed(controller: LinuxCnc, sender: SetpointSender) -> LinuxCnc:
     sender.correction_mm = [0.0] * 6
     controller.wait_for("compd.connected", True)
     controller.with_corrections()
@@ -96,7 +60,7 @@ def settled_mm(controller: LinuxCnc, mm: float) -> None:
 
 
 def test_the_correction_is_added_to_the_command_and_the_controller_sees_no_following_error(
-    armed: LinuxCnc, sender: Sender
+    armed: LinuxCnc, sender: SetpointSender
 ) -> None:
     sender.correction_mm = [UP_10_UM_MM] * 6
     settled_mm(armed, UP_10_UM_MM)
@@ -105,7 +69,7 @@ def test_the_correction_is_added_to_the_command_and_the_controller_sees_no_follo
     assert armed.value("joint.0.pos-cmd") == pytest.approx(547.032723, abs=1e-5)
 
 
-def test_what_is_beyond_the_limit_or_no_number_is_not_added(armed: LinuxCnc, sender: Sender) -> None:
+def test_what_is_beyond_the_limit_or_no_number_is_not_added(armed: LinuxCnc, sender: SetpointSender) -> None:
     sender.correction_mm = [0.05] * 6
     settled_mm(armed, 0.05)
     for wrong, reason in ((5.0, 8), (math.nan, 6), (math.inf, 6)):
@@ -118,7 +82,9 @@ def test_what_is_beyond_the_limit_or_no_number_is_not_added(armed: LinuxCnc, sen
         armed.arm()
 
 
-def test_without_setpoints_the_feed_is_inhibited_unless_a_person_wants_none(armed: LinuxCnc, sender: Sender) -> None:
+def test_without_setpoints_the_feed_is_inhibited_unless_a_person_wants_none(
+    armed: LinuxCnc, sender: SetpointSender
+) -> None:
     assert not armed.value("motion.feed-inhibit")
     sender.correction_mm = None
     armed.wait_for("motion.feed-inhibit", True)
@@ -130,7 +96,7 @@ def test_without_setpoints_the_feed_is_inhibited_unless_a_person_wants_none(arme
     armed.set_signal("compd-clear", "0")
 
 
-def test_suspend_holds_what_is_added(armed: LinuxCnc, sender: Sender) -> None:
+def test_suspend_holds_what_is_added(armed: LinuxCnc, sender: SetpointSender) -> None:
     sender.correction_mm = [0.02] * 6
     settled_mm(armed, 0.02)
     armed.set_signal("compd-suspend", "1")

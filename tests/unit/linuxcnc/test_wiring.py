@@ -117,3 +117,17 @@ def test_each_link_is_wired_to_itself() -> None:
             f"setp limit3.{joint}.maxv [COMPD]SLEW",
         ):
             assert line in text
+
+
+def test_the_feed_needs_the_watchdog_and_a_bridge_that_is_armed() -> None:
+    """The watchdog alone stays content when its enable-in goes FALSE."""
+    text = (LINUXCNC / "compd.hal").read_text()
+    for line in (
+        "net compd-armed compd.armed => watchdog.enable-in compd-good.in0",
+        "net compd-watched watchdog.ok-out => compd-good.in1",
+        "net compd-ok compd-good.out => compd-not-ok.in",
+        "net compd-not-ok compd-not-ok.out => compd-inhibit.in0",
+        "net compd-required => compd-inhibit.in1",
+        "net compd-inhibit compd-inhibit.out => motion.feed-inhibit",
+    ):
+        assert line in text
