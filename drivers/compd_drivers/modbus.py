@@ -1,4 +1,4 @@
-"""Generic Modbus gauge: a register map in the configuration; Modbus RTU, TCP and RTU over TCP.
+"""Generic Modbus gauge: a register map in the configuration; Modbus RTU, ASCII and TCP.
 
 Source of the protocol: Modbus Application Protocol V1.1b3, functions 1 to 6 and 16 (M). No comparator with a complete
 public register map was found, so the map is yours, out of your module's manual; for example (M: manual, C: code)
