@@ -180,12 +180,15 @@ class ByteLine(Protocol):
         """
         ...
 
-    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+    def next_line(
+        self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
+    ) -> tuple[bytes, float]:
         """The next whole line of a device that sends unasked, at its full rate, without `terminator`.
 
         Also returns its `time_s`: when the line before it began, which is read too where nothing is known of it. More
         than `limit` bytes raise MISMATCH. `timeout_s` is for the first byte, and must be longer than the device's
-        period. Where lines come faster than they are asked for, the newest counts.
+        period; `gap_timeout_s` is for each that follows. Where lines come faster than they are asked for, the newest
+        counts.
         """
         ...
 

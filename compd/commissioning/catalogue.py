@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
+
+from pydantic import BaseModel
 
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
@@ -66,15 +69,25 @@ def catalogue() -> list[CatalogueEntry]:
 def driver_description(name: str) -> DriverDescription:
     """Text and options of the driver `name`. Raises PluginError where there is none."""
     driver = load(GAUGES, name, name)
-    options = tuple(
-        DriverOption(
-            field.alias or key,
-            "" if field.is_required() else repr(field.get_default(call_default_factory=True)),
-            field.description or "",
-        )
-        for key, field in driver.Options.model_fields.items()
-    )
-    return DriverDescription(driver_text(driver), options)
+    return DriverDescription(driver_text(driver), tuple(_options(driver.Options)))
+
+
+def _options(model: type[BaseModel], within: str = "") -> Iterator[DriverOption]:
+    """The keys of a model, each section's own keys behind it: `channels`, `channels.type` ..."""
+    for key, field in model.model_fields.items():
+        name = f"{within}{field.alias or key}"
+        default = "" if field.is_required() else repr(field.get_default(call_default_factory=True))
+        yield DriverOption(name, default, field.description or "")
+        for section in _sections(field.annotation):
+            yield from _options(section, f"{name}.")
+
+
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The models that a key's value may be made of: itself, the items of a list, what may also be left out."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _sections(argument)
 
 
 def driver_text(driver: type[Gauge[Any]]) -> str:

@@ -294,7 +294,9 @@ class _RepeatedReply:
         self._waiting = self._reply
         return 0.0
 
-    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+    def next_line(
+        self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
+    ) -> tuple[bytes, float]:
         """A device that speaks unasked says it again and again."""
         if not self._waiting:
             self._waiting = self._reply

@@ -144,9 +144,9 @@ class SerialMaster(ABC):
                 self._extensible.add(block)
                 self._suspected.pop(block, None)
                 return RegisterReply(reply.registers[:count], reply.time_s)
+        suspected = self._suspected.pop(block, None)  # for good, where this fails as well: that says nothing of the map
         reply = self._values(unit, function, address, count)
-        # a reply that came after all was late: the slave has the register
-        if self._suspected.pop(block, None) == self.unexpected_bytes:
+        if suspected == self.unexpected_bytes:  # else a reply came after all: it was late, the slave has the register
             self._not_extensible.add(block)
         return reply
 

@@ -113,7 +113,9 @@ class StreamLine:
                 raise LineFault(Quality.MISMATCH, f"more comes than can be read: {shown(data)}")
         return self._clock.monotonic()
 
-    def next_line(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> tuple[bytes, float]:
+    def next_line(
+        self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
+    ) -> tuple[bytes, float]:
         """The next line of a device that sends unasked, without `terminator`, and its `time_s`: see `ByteLine`.
 
         Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
@@ -125,9 +127,9 @@ class StreamLine:
                 time_s = math.nan
         if math.isnan(time_s):
             time_s = self.listen()
-            self._line_until(terminator, limit, timeout_s)  # what is left of the line under way
+            self._line_until(terminator, limit, timeout_s, gap_timeout_s)  # what is left of the line under way
         self._next_line_s = math.nan
-        line, ended_s = self._line_until(terminator, limit, timeout_s)
+        line, ended_s = self._line_until(terminator, limit, timeout_s, gap_timeout_s)
         looked_s = self._clock.monotonic()
         self._look(0.0)
         if not self._received:  # the line after it has not begun by now
@@ -211,13 +213,16 @@ class StreamLine:
             self._store(data)
         return bool(data)
 
-    def _line_until(self, terminator: bytes, limit: int, timeout_s: float | None) -> tuple[bytes, float]:
+    def _line_until(
+        self, terminator: bytes, limit: int, timeout_s: float | None, gap_timeout_s: float | None
+    ) -> tuple[bytes, float]:
         """A line without `terminator`, and a time (s) before which its last byte had not come. Raises LineFault."""
         wait_s = self._timeout_s if timeout_s is None else timeout_s
+        gap_s = self._timeout_s if gap_timeout_s is None else gap_timeout_s
         while (end := self._received.find(terminator)) < 0:
             if len(self._received) >= limit:
                 raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._received))}")
-            if not self._look(self._timeout_s if self._received else wait_s):
+            if not self._look(gap_s if self._received else wait_s):
                 if not self._received:
                     raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
                 raise LineFault(Quality.INCOMPLETE, f"only {shown(bytes(self._received))}")

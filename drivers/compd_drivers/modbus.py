@@ -1,4 +1,4 @@
-"""Generic Modbus gauge: a register map in the configuration; Modbus RTU, TCP and RTU over TCP.
+"""Generic Modbus gauge: a register map in the configuration; Modbus RTU, ASCII and TCP.
 
 Source of the protocol: Modbus Application Protocol V1.1b3, functions 1 to 6 and 16 (M). No comparator with a complete
 public register map was found, so the map is yours, out of your module's manual; for example (M: manual, C: code)
@@ -12,7 +12,8 @@ public register map was found, so the map is yours, out of your module's manual;
 A number may be part of its registers: a Beckhoff IP5209 (M) has its status in the low byte of the first register, and
 the 24 bits of its counter in the other three bytes
     {name: position, function: 3, address: 0, type: uint24, word_order: low_first, unit: mm, scale: 0.001,
-     status: {address: 0, mask: 0x0C}}
+     status: {address: 0, mask: MASK}}
+and its manual says which bits of the status mean an error: they are the mask.
 `write_first` switches the unit or starts the device, `write_before_poll` latches; `identity` makes sure that it is this
 device. What is written is confirmed by the device, or the poll has failed.
 

@@ -26,7 +26,8 @@ class RegisterNumber(DescriptionSection):
     """Where in the registers a number's bits are."""
 
     type: NumberType = Field(
-        description="how the number is stored; bcd: decimal digits of four bits; bit: 0 or 1, by function 1 or 2"
+        description="how the number is stored: int or uint with 8, 16, 24, 32 or 64 bits; float32, float64; bcd8, "
+        "bcd16, bcd24, bcd32: decimal digits of four bits each; bit: 0 or 1, by function 1 or 2"
     )
     word_order: Literal["high_first", "low_first"] = Field(
         default="high_first", description="of a number in several registers"

@@ -193,13 +193,14 @@ class SerialAscii(Gauge[ByteLine]):
 
     def _unasked(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
         """The next reply of a device that speaks unasked, and its time (s)."""
-        terminator, wait_s = self._description.terminator, self._protocol.reply_timeout_s
+        terminator, protocol = self._description.terminator, self._protocol
+        waits_s = protocol.reply_timeout_s, protocol.gap_timeout_s
         try:
-            reply, time_s = line.next_line(terminator, self._limit, wait_s)
+            reply, time_s = line.next_line(terminator, self._limit, *waits_s)
             for _ in range(form.literal.count(terminator)):
                 if self._error(reply) is not None:
                     break
-                reply += terminator + line.next_line(terminator, self._limit, wait_s)[0]
+                reply += terminator + line.next_line(terminator, self._limit, *waits_s)[0]
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT:
                 raise

@@ -62,6 +62,15 @@ def test_list_names_every_driver() -> None:
     assert all(name[:12] in output for name in names(GAUGES))
 
 
+def test_show_has_every_key_of_a_description_down_to_the_last() -> None:
+    code, output = run_gauge("show", "modbus")
+    assert code == 0
+    for key in ("channels", "channels.type", "channels.status.mask", "identity.equals", "write_first.settle_s"):
+        assert f" {key} " in output
+    _, output = run_gauge("show", "serial_ascii")
+    assert all(f" {key} " in output for key in ("requests.out", "requests.in", "channels.range", "errors.quality"))
+
+
 def test_read_shows_the_bytes_and_the_value(scale: str) -> None:
     code, output = run_gauge("read", "heidenhain_nd28x", "--port", scale, "--baud", "115200", "--format", "8N1")
     assert code == 0

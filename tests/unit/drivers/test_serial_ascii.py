@@ -541,6 +541,17 @@ def test_of_a_talker_that_is_seldom_asked_the_newest_line_counts() -> None:
         clock.now_s += 0.5
 
 
+def test_a_talker_that_stops_within_a_line_has_its_own_patience() -> None:
+    clock = InstantClock()
+    script = [b"", b"+00001.0\r\n", b"+00002", b""]
+    line = StreamLine(ScriptedPort(clock, script), 0.3, 0.002, clock)
+    device = gauge(**UNASKED, gap_timeout_s=2.0)
+    began_s = clock.now_s
+    with pytest.raises(LineFault, match="incomplete"):
+        device.read(line)
+    assert clock.now_s - began_s >= 2.0
+
+
 def test_a_talker_that_is_slower_than_the_timeout_is_told_so() -> None:
     clock = InstantClock()
     line = StreamLine(TalkingPort(clock, 1.0), 0.3, 0.002, clock)

@@ -155,6 +155,19 @@ def test_a_slave_that_has_the_register_is_asked_for_it_again_after_a_silence() -
     assert [struct.unpack(">BBHH", request[:-2])[3] for request in port.written].count(4) == 3
 
 
+def test_a_slave_that_was_off_at_the_first_longer_request_is_asked_for_it_again() -> None:
+    slave = counting_slave()
+    off = [False]
+    line, port = master(lambda request: b"" if off[0] else slave(request))
+    polled(line, 1)
+    off[0] = True
+    assert polled(line, 2) == ["timeout"] * 2, "the longer request, and the plain one"
+    off[0] = False
+    port.written.clear()
+    assert set(polled(line, 4)) == {"ok"}
+    assert [struct.unpack(">BBHH", request[:-2])[3] for request in port.written].count(4) == 2
+
+
 def test_a_first_longer_reply_that_is_late_says_nothing_about_the_map() -> None:
     slave = counting_slave()
     clock = InstantClock()
