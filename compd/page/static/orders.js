@@ -70,8 +70,8 @@ export class Orders {
     this.say("…");
     const told = await post(`orders/${name}`, { id: this.page.id, subject });
     if (told.value === "zero_differs") {
-      this.say(told.reason);
       const { command } = await (await fetch("orders/zero?subject=replace")).json();
+      this.say(told.reason);
       const replace = element("button", { type: "button", onclick: () => this.give("zero", "replace") }, "It is the zero position: take it");
       return this.tell(element("p", {}, told.reason), new CommandLine(command).row, replace);
     }
