@@ -63,11 +63,12 @@ def stands_inhibited(machine: CorrectedLinuxCnc, fault_s: float, within_s: float
 
 def arms_only_when_asked(machine: CorrectedLinuxCnc, reason: int) -> None:
     """What was wrong is mended: nothing arms by itself in a second, with the button still down; then a person does."""
+    machine.controller.wait_for("compd.armed", False)  # a bridge that was stopped disarms with its next step
     assert machine.controller.values(["compd.arm", "compd.armed"]) == {"compd.arm": True, "compd.armed": False}
     assert not any(sample.watched for sample in machine.for_s(1.0))
     assert machine.controller.value("compd.reason") == reason
     machine.controller.arm()
-    assert not machine.controller.value("motion.feed-inhibit")
+    machine.controller.wait_for("motion.feed-inhibit", False)  # with the next servo period
 
 
 def test_a_bridge_that_is_stopped(moving: CorrectedLinuxCnc) -> None:
