@@ -9,7 +9,7 @@ STAMP  := $(VENV)/.installed
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
-	@echo "make demo-linuxcnc  LinuxCNC corrected, a hidden effect probed, diagnosed, adopted (experimental; Debian's linuxcnc-uspace)"
+	@echo "make demo-linuxcnc  LinuxCNC corrected, a hidden effect probed, diagnosed, adopted (ten minutes; Debian's linuxcnc-uspace)"
 	@echo "make live    the same machine live in the browser, until Ctrl-C"
 	@echo "make test    the tests; a hidden cause is found on wires among them (10 to 15 min)"
 	@echo "make sample  some of the longer ones: the page in a real browser, drivers that misbehave, worked examples (7 min)"

@@ -102,28 +102,30 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
 
 def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
     from rich.console import Console
-    from rich.table import Table
 
     from compd.configuration import load
     from compd.configuration.shipped import shipped_configuration
     from compd.demo.linuxcnc.demonstration import SHIPPED_PROGRAM, SPEEDUP, run_linuxcnc_demo
+    from compd.demo.linuxcnc.page import summarise, verdict, write_linuxcnc_page
+    from compd.report.page import check_page_path
 
+    page = Path("out/linuxcnc/program.html")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    check_page_path(page)
     console = Console(highlight=False)
-    out = Path("out/linuxcnc")
-    out.mkdir(parents=True, exist_ok=True)
     console.print(
         f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {SPEEDUP:g} times faster than "
-        f"real. {effect.partition('=')[0]} is hidden in the machine. About eight minutes."
+        f"real. {effect.partition('=')[0]} is hidden in the machine. About ten minutes."
     )
     demo = run_linuxcnc_demo(
-        load(shipped_configuration("hexapod.yaml")), out, seed, [effect], console.print, program or SHIPPED_PROGRAM
+        load(shipped_configuration("hexapod.yaml")),
+        page.parent,
+        seed,
+        [effect],
+        console.print,
+        program or SHIPPED_PROGRAM,
     )
-    table = Table(
-        "",
-        *("looks", "rms, um", "largest, um") * 2,
-        title="distance of the true tip from where the program wants it: at rest, and on the move",
-    )
-    for label, errors in demo.errors.items():
-        table.add_row(*errors.row(label))
-    console.print(table)
-    console.print(f"{demo.rows} rows probed: {demo.verdict}, {', '.join(demo.found) or 'no effect found'}.")
+    console.print(summarise(demo))
+    console.print(verdict(demo))
+    write_linuxcnc_page(page, demo)
+    console.print(f"The same as a picture: {page}")

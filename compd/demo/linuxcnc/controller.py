@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -37,16 +37,26 @@ _SCRIPTS = ("machine_link.py", "operator_panel.py")
 SIMULATED_MACHINE = ("machine.hal", "probe.hal")
 
 
-def missing() -> str:
-    """What LinuxCNC on a simulated machine lacks on this computer; "" where nothing does."""
+def obstacle() -> str:
+    """Why LinuxCNC cannot be started on this computer, and what to do; "" where it can."""
     for program, package in (
         ("linuxcnc", "linuxcnc-uspace"),
         ("halcmd", "linuxcnc-uspace"),
         ("/usr/bin/python3", "python3"),
     ):
         if shutil.which(program) is None:
-            return f"{program} is not there: apt-get install {package} (Debian 12 or newer)"
+            return f"{program} is not installed: apt-get install {package} (Debian 12 or newer)"
+    if LOCK.exists():
+        return f"it runs already, or was killed: end it; where none runs, `halrun -U` and remove {LOCK}"
     return ""
+
+
+def edited(text: str, changes: Iterable[tuple[str, str]]) -> str:
+    """A shipped file with passages exchanged, each of which is in it once."""
+    for before, after in changes:
+        assert text.count(before) == 1, before
+        text = text.replace(before, after)
+    return text
 
 
 def _ordinary_user() -> dict[str, Any]:
@@ -76,16 +86,8 @@ class LinuxCnc:
         self.errors: list[str] = []
 
     def __enter__(self) -> Self:
-        if lacking := missing():
-            raise DaemonError(Problem(where="LinuxCNC", what="cannot run", value=lacking, next_step="install it"))
-        if LOCK.exists():
-            raise DaemonError(
-                Problem(
-                    where=str(LOCK),
-                    what="LinuxCNC runs already on this computer, or was killed",
-                    next_step="end it; where none runs, `halrun -U` and remove this file",
-                )
-            )
+        if reason := obstacle():
+            raise DaemonError(Problem(where="LinuxCNC", what="cannot be started", next_step=reason))
         self._write_files()
         with (self.directory / "output.log").open("wb") as log:
             self._process = subprocess.Popen(
@@ -222,17 +224,15 @@ class LinuxCnc:
         for name in (*_SCRIPTS, *self._hal_files):
             shutil.copy(_HERE / name, self.directory)
         (self.directory / "operator_panel.py").chmod(0o755)
-        text = (self.directory / "hexapod.ini").read_text()
-        for before, after in (
-            ("DISPLAY = axis", "DISPLAY = ./operator_panel.py"),
-            ("SOCKET = /run/compd/hexapod.sock", f"SOCKET = {self._simulation / 'compd.sock'}"),
+        hal_files = "\n".join(f"HALFILE = {name}" for name in ("loopback_drives.hal", *self._hal_files))
+        text = edited(
+            (self.directory / "hexapod.ini").read_text(),
             (
-                "HALFILE = loopback_drives.hal",
-                "\n".join(f"HALFILE = {name}" for name in ("loopback_drives.hal", *self._hal_files)),
+                ("DISPLAY = axis", "DISPLAY = ./operator_panel.py"),
+                ("SOCKET = /run/compd/hexapod.sock", f"SOCKET = {self._simulation / 'compd.sock'}"),
+                ("HALFILE = loopback_drives.hal", hal_files),
             ),
-        ):
-            assert text.count(before) == 1, before
-            text = text.replace(before, after)
+        )
         text += f"\n[SIMULATION]\nLINK = ./machine_link.py\nDIRECTORY = {self._simulation}\n"
         (self.directory / "machine.ini").write_text(text)
         if os.geteuid() == 0:

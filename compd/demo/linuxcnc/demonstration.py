@@ -42,17 +42,21 @@ NOISE_RATIO = 2.0
 # The correction of another model is reached at `limits.slew_mm_per_s`: 0.2 mm in 0.4 s.
 ADOPTED_S = 10.0
 
-OFF, ON, ADOPTED = "corrections off", "corrections on", "with the effect adopted"
+OFF, ON, ADOPTED = "corrections off", "corrections on", "the effect adopted"
 
 
 @dataclass
 class LinuxCncDemo:
-    """What came of it. errors : of the program, by how it was run. found : effects of the diagnosis, in order."""
+    """What came of it.
+
+    errors : of the program, by how it was run. rows : that were probed. diagnosis : of these, in a sentence.
+    adopted : the effects of it that are worth their place in the model, in order.
+    """
 
     errors: dict[str, TipErrors] = field(default_factory=dict)
     rows: int = 0
-    verdict: str = ""
-    found: list[str] = field(default_factory=list)
+    diagnosis: str = ""
+    adopted: list[str] = field(default_factory=list)
 
 
 def run_linuxcnc_demo(
@@ -97,13 +101,13 @@ def run_linuxcnc_demo(
             tell("The program, with corrections ...")
             demo.errors[ON] = session.run_program()
             tell(f"compd diagnose {recording}")
-            demo.verdict, demo.found = diagnose(recording, configuration.path)
-            tell(f"{demo.verdict}: {', '.join(demo.found) or 'no effect'}")
-            if demo.found:
+            demo.diagnosis, demo.adopted = diagnose(recording, configuration.path)
+            tell(demo.diagnosis)
+            if demo.adopted:
                 model = out / "probed.model.yaml"
-                add_effects(demo.found, recording, configuration.path, model)
+                add_effects(demo.adopted, recording, configuration.path, model)
                 session.adopt(model)
-                tell("The model is adopted. The program again ...")
+                tell(f"{', '.join(demo.adopted)} adopted. The program again ...")
                 demo.errors[ADOPTED] = session.run_program()
     return demo
 
@@ -162,14 +166,14 @@ class _Session:
 
 
 def diagnose(recording: Path, machine: Path) -> tuple[str, list[str]]:
-    """`compd diagnose` on a recording: its verdict, and the effects that it found, as many as are worth their place."""
+    """`compd diagnose` on a recording: what it says, and those of the effects it names that are worth their place."""
     result = json.loads(_compd("diagnose", str(recording), "--machine", str(machine), "--json"))
-    found = []
+    effects = []
     for step in result["steps"]:
-        found.append(step["effect"])
+        effects.append(step["effect"])
         if step["heldout_rms_um"] <= NOISE_RATIO * result["noise_floor_um"]:
             break
-    return result["verdict"], found
+    return result["said"], effects
 
 
 def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: Path) -> None:

@@ -30,8 +30,8 @@ import hal
 
 PERIOD_S = 0.001  # of the servo thread: [EMCMOT] SERVO_PERIOD
 LINKS = 6
-# One sample in so many goes to the simulation, is logged, and is looked at for the true tip.
-FOLLOWED, LOGGED, LOOKED = 5, 10, 50
+# One sample in so many goes to the simulation, is logged, and is logged with the true tip.
+FOLLOWED, LOGGED, WITH_TIP = 5, 10, 50
 # Share of the difference between a sample's time by count and by arrival that is believed: samples come in bursts.
 CLOCK_GAIN = 0.01
 # Beyond this difference, s, the count has had a gap.
@@ -181,7 +181,7 @@ class Link:
         self._step_mm = max(self._step_mm, *steps_mm)
 
     def _write(self, sample: Sample) -> None:
-        tip_mm = self._simulation.tip_mm(sample.drive_mm) if sample.number % LOOKED == 0 else None
+        tip_mm = self._simulation.tip_mm(sample.drive_mm) if sample.number % WITH_TIP == 0 else None
         if tip_mm is not None and self._probe is not None:
             self._probe.aim(sample.believed_mm, tip_mm)
         row = [

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import FloatArray, rms
+from compd.arrays import BoolArray, FloatArray, rms
 from compd.simulation.truth.mechanism import Mechanism
 from compd.units import UM_PER_MM
 
@@ -33,20 +33,30 @@ class MotionSample(NamedTuple):
 
 
 class TipErrors(NamedTuple):
-    """Distances of the true tip from where the program wanted it, um. at_rest, moving : one per look."""
+    """Distance of the true tip from where the program wanted it, along a program.
 
-    at_rest_um: FloatArray
-    moving_um: FloatArray
+    time_s : (N,) since the program began. error_um : (N,). at_rest : (N,) whether the commands stood still.
+    """
 
-    def row(self, label: str) -> list[str]:
-        """For a table: number of looks, rms and largest, at rest and on the move."""
-        cells = [label]
-        for errors_um in self:
-            cells += [
-                str(len(errors_um)),
-                *([f"{rms(errors_um):.2f}", f"{errors_um.max():.2f}"] if len(errors_um) else "--"),
-            ]
-        return cells
+    time_s: FloatArray
+    error_um: FloatArray
+    at_rest: BoolArray
+
+    @property
+    def at_rest_um(self) -> FloatArray:
+        return self.error_um[self.at_rest]
+
+    @property
+    def moving_um(self) -> FloatArray:
+        return self.error_um[~self.at_rest]
+
+    def summary(self) -> list[str]:
+        """rms and largest in um, at rest and on the move; "-" where the program has none of these."""
+        return [
+            f"{value(errors_um):.2f}" if len(errors_um) else "-"
+            for errors_um in (self.at_rest_um, self.moving_um)
+            for value in (rms, np.max)
+        ]
 
 
 def read_motion_log(path: Path, start_s: float = -np.inf, end_s: float = np.inf) -> list[MotionSample]:
@@ -75,18 +85,19 @@ def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> li
 
 
 def tip_errors(mechanism: Mechanism, samples: Sequence[MotionSample]) -> TipErrors:
-    """Of every sample with a look at the true tip."""
-    rest = _at_rest(samples)
-    looked = [(number, sample, sample.tip_mm) for number, sample in enumerate(samples) if sample.tip_mm is not None]
-    wanted_mm = wanted_tips_mm(mechanism, (sample.nominal_mm for _, sample, _ in looked))
-    distance_um = np.array(
-        [np.linalg.norm(tip_mm - wanted) * UM_PER_MM for (_, _, tip_mm), wanted in zip(looked, wanted_mm, strict=True)]
+    """Of every sample that has the true tip."""
+    with_tip = [number for number, sample in enumerate(samples) if sample.tip_mm is not None]
+    wanted_mm = wanted_tips_mm(mechanism, (samples[number].nominal_mm for number in with_tip))
+    true_mm = np.array([samples[number].tip_mm for number in with_tip]).reshape(-1, 3)
+    time_s = np.array([samples[number].time_s for number in with_tip])
+    return TipErrors(
+        time_s - samples[0].time_s if samples else time_s,
+        np.linalg.norm(true_mm - np.reshape(wanted_mm, (-1, 3)), axis=1) * UM_PER_MM,
+        _at_rest(samples)[with_tip],
     )
-    at_rest = rest[[number for number, _, _ in looked]]
-    return TipErrors(distance_um[at_rest], distance_um[~at_rest])
 
 
-def _at_rest(samples: Sequence[MotionSample]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _at_rest(samples: Sequence[MotionSample]) -> BoolArray:
     """(N,) whether the commands have been the same for REST_S."""
     rest = np.zeros(len(samples), dtype=bool)
     since_s = np.inf

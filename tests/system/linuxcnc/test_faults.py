@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from compd.demo.linuxcnc.controller import missing
+from compd.demo.linuxcnc.controller import obstacle
 from tests.injection.faults import Shows
 from tests.support.corrected_linuxcnc import ROUNDING_MM, CorrectedLinuxCnc, check_corrections, moved_mm
 from tests.support.simulated import run_directory
@@ -26,8 +26,9 @@ STANDS_MM = 1e-5
 
 pytestmark = [
     pytest.mark.long,
+    pytest.mark.sample,
     pytest.mark.timeout(300),
-    pytest.mark.skipif(bool(missing()), reason=missing()),
+    pytest.mark.skipif(bool(obstacle()), reason=obstacle()),
 ]
 
 

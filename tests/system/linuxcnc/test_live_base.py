@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from compd.demo.linuxcnc.controller import LinuxCnc, missing
+from compd.demo.linuxcnc.controller import LinuxCnc, edited, obstacle
 from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 UP_MM, LONGER_MM = 0.010, 0.00914
 
@@ -25,9 +25,7 @@ class WithLiveBase(LinuxCnc):
             ("machine.ini", "HALFILE = compd.hal\n", "HALFILE = compd.hal\nHALFILE = compd_live_base.hal\n"),
         ):
             path = self.directory / name
-            text = path.read_text()
-            assert text.count(before) == 1
-            path.write_text(text.replace(before, after))
+            path.write_text(edited(path.read_text(), [(before, after)]))
 
 
 def drives_mm(controller: LinuxCnc) -> list[float]:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from compd.demo.linuxcnc.controller import LinuxCnc, missing
+from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
 from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(180), pytest.mark.skipif(bool(missing()), reason=missing())]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 # What the daemon asks for with the base of config/hexapod.yaml up by 10 um at machine zero.
 UP_10_UM_MM = 0.00914
@@ -76,7 +76,7 @@ def test_what_is_beyond_the_limit_or_no_number_is_not_added(armed: LinuxCnc, sen
         sender.correction_mm = [wrong] * 6
         armed.wait_for("compd.armed", False)
         assert armed.value("compd.reason") == reason
-        assert armed.value("motion.feed-inhibit")
+        armed.wait_for("motion.feed-inhibit", True)
         assert added_mm(armed) == pytest.approx([0.05] * 6, abs=1e-7)
         sender.correction_mm = [0.05] * 6
         armed.arm()
@@ -85,7 +85,7 @@ def test_what_is_beyond_the_limit_or_no_number_is_not_added(armed: LinuxCnc, sen
 def test_without_setpoints_the_feed_is_inhibited_unless_a_person_wants_none(
     armed: LinuxCnc, sender: SetpointSender
 ) -> None:
-    assert not armed.value("motion.feed-inhibit")
+    armed.wait_for("motion.feed-inhibit", False)
     sender.correction_mm = None
     armed.wait_for("motion.feed-inhibit", True)
     assert armed.value("compd.reason") == 3

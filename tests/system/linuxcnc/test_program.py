@@ -12,7 +12,7 @@ import pytest
 
 from compd.arrays import rms
 from compd.configuration import load
-from compd.demo.linuxcnc.controller import LinuxCnc, missing
+from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
 from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON, SHIPPED_PROGRAM, run_linuxcnc_demo
 from compd.demo.linuxcnc.motion_log import TipErrors, read_motion_log, tip_errors
 from compd.demo.live import take_zero
@@ -20,10 +20,7 @@ from compd.demo.simulated_daemon import simulated_daemon
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.simulated import HEXAPOD
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(bool(missing()), reason=missing()),
-]
+pytestmark = [pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 SPEEDUP = 60.0
 LONGEST_S = 120.0
@@ -44,6 +41,8 @@ def run(machine: LinuxCnc, program: Path) -> TipErrors:
     return tip_errors(Mechanism(load(HEXAPOD).geometry), read_motion_log(machine.motion_log, start_s, end_s))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.timeout(400)
 def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: LinuxCnc) -> None:
     """Half an hour of warming up passes first, with corrections; then the program runs without them, and with them."""
@@ -58,18 +57,19 @@ def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: Li
     machine.set_signal("compd-clear", "0")
     machine.with_corrections()
     corrected = run(machine, program)
-    print("looks, rms and largest in um, at rest and on the move")
-    print(*without.row("without"))
-    print(*corrected.row("with"))
+    print("rms and largest in um, at rest and on the move")
+    print("without", *without.summary())
+    print("with", *corrected.summary())
     assert rms(without.at_rest_um) >= 10 * rms(corrected.at_rest_um)
     assert rms(without.moving_um) >= 5 * rms(corrected.moving_um)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(1200)
 def test_what_is_left_is_probed_diagnosed_and_adopted(tmp_path: Path) -> None:
     demo = run_linuxcnc_demo(load(HEXAPOD), tmp_path, 3, ["link_expansion=8"], print)
     for label, errors in demo.errors.items():
-        print(*errors.row(label))
-    assert "link_expansion" in demo.found
+        print(label, *errors.summary())
+    assert "link_expansion" in demo.adopted
     assert rms(demo.errors[ON].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)
     assert rms(demo.errors[OFF].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)

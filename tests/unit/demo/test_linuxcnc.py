@@ -50,8 +50,21 @@ def test_tip_errors_at_rest_and_on_the_move(tmp_path: Path) -> None:
     errors = tip_errors(Mechanism(hexapod()), samples)
     assert len(errors.at_rest_um) == pytest.approx(32, abs=1)
     assert len(errors.moving_um) == pytest.approx(48, abs=1)
-    np.testing.assert_allclose(np.concatenate(errors), UP_MM * 1e3, atol=1e-6)
-    assert errors.row("label")[2] == "4.00"
+    np.testing.assert_allclose(errors.error_um, UP_MM * 1e3, atol=1e-6)
+    assert errors.time_s[[0, -1]] == pytest.approx([0.0, 395 * PERIOD_S], abs=1e-6)
+    assert errors.summary() == ["4.00"] * 4
+
+
+def test_a_program_without_rests_has_no_error_at_rest(tmp_path: Path) -> None:
+    write_log(tmp_path / "motion.log")
+    samples = read_motion_log(tmp_path / "motion.log", end_s=1001.9)
+    assert tip_errors(Mechanism(hexapod()), samples).summary() == ["-", "-", "4.00", "4.00"]
+
+
+def test_a_log_without_samples_has_no_error(tmp_path: Path) -> None:
+    (tmp_path / "motion.log").write_text("")
+    samples = read_motion_log(tmp_path / "motion.log")
+    assert tip_errors(Mechanism(hexapod()), samples).summary() == ["-"] * 4
 
 
 def test_the_wanted_tip_is_that_of_the_kinematics_as_drawn() -> None:
