@@ -77,6 +77,6 @@ def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     for report in terminalreporter.getreports(_TRIED_AGAIN):
-        told = "; ".join(text for name, text in report.sections if name == _TRIED_AGAIN)
+        tries = "; ".join(text for name, text in report.sections if name == _TRIED_AGAIN)
         last_line = report.longreprtext.strip().splitlines()[-1:]
-        terminalreporter.write_line(f"tried again: {report.nodeid}: {told} {last_line}")
+        terminalreporter.write_line(f"tried again: {report.nodeid}: {tries} {last_line}")

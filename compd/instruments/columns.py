@@ -45,7 +45,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     complete: BoolArray = np.asarray(np.isfinite(values).all(axis=1))
     if time is not None:
         complete = complete & np.isfinite(time.time_s)
-        taken["time"] = f"{taken['time']}, {time.told}" if "time" in taken else time.told
+        taken["time"] = f"{taken['time']}, {time.assumed}" if "time" in taken else time.assumed
     if not complete.any():
         problems.add(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")
         problems.check()
@@ -64,7 +64,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         time_s=None if time is None else time.time_s[complete],
         time_std_s=0.0 if time is None else time.std_s,
         name=names,
-        taken={**table.told, **taken},
+        taken={**table.assumed, **taken},
         left_out=left_out,
     )
 
@@ -232,8 +232,8 @@ def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportP
         if not options.rate_hz > 0 or not np.isfinite(options.rate_hz):
             problems.add(0, "is no rate", f"--rate-hz {options.rate_hz}", "more than 0 Hz")
             return None
-        told = f"from the number of the row, {options.rate_hz:g} rows a second by --rate-hz"
-        return StampedTime(np.arange(len(table.line)) / options.rate_hz, 0.0, told)
+        assumed = f"from the number of the row, {options.rate_hz:g} rows a second by --rate-hz"
+        return StampedTime(np.arange(len(table.line)) / options.rate_hz, 0.0, assumed)
     if options.rate_hz is not None:
         problems.add(table.header_line, "has a time", column_text(table, column), "no --rate-hz", "leave it out")
         return None
@@ -273,7 +273,7 @@ def _time_of_numbers(
     values = numbers(cells, line, what, problems)
     unit = roles.unit.get("time", "")
     factor = unit_factor(unit, "s") if unit else None
-    told = unit or "s, as it has decimals and no unit"
+    assumed = unit or "s, as it has decimals and no unit"
     filled = values[~np.isnan(values)]
     if unit and factor is None:
         problems.add(table.header_line, "is no unit of time", unit, "s, ms, us, min, h", "give --columns with time[s]")
@@ -291,7 +291,7 @@ def _time_of_numbers(
     repeated = bool(np.any(np.diff(filled) == 0.0))
     joined = "".join(cells) if repeated else "e"
     if "e" in joined or "E" in joined:
-        return StampedTime(time_s, 0.0, told)
+        return StampedTime(time_s, 0.0, assumed)
     decimals = max(len(cell.partition(".")[2]) for cell in cells)
     time_s, std_s, spread = spread_within(time_s, ratio * 10.0**-decimals)
-    return StampedTime(time_s, std_s, f"{told}; {spread}" if spread else told)
+    return StampedTime(time_s, std_s, f"{assumed}; {spread}" if spread else assumed)

@@ -60,13 +60,13 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
     problems.check()
     for k in number_columns if mark == "," or options.decimal else ():
         columns[k] = with_points(columns[k], mark)
-    told = {"encoding": text.encoding, "delimiter": NAMES[delimiter]}
-    told["decimal mark"] = f"{'comma' if mark == ',' else 'point'}, {why}"
-    told["header"] = f"line {header.line}" if header.names else "none"
+    assumed = {"encoding": text.encoding, "delimiter": NAMES[delimiter]}
+    assumed["decimal mark"] = f"{'comma' if mark == ',' else 'point'}, {why}"
+    assumed["header"] = f"line {header.line}" if header.names else "none"
     if header.above:
-        told["not read"] = f"{header.above} line{'s' * (header.above != 1)} above the table"
+        assumed["not read"] = f"{header.above} line{'s' * (header.above != 1)} above the table"
     if found.comments:
-        told["comments"] = f"{len(found.comments)} line{'s' * (len(found.comments) != 1)}"
+        assumed["comments"] = f"{len(found.comments)} line{'s' * (len(found.comments) != 1)}"
     return RawTable(
         path=text.path,
         shape=shape or ("blanks" if delimiter in (BLANKS, WIDE_BLANKS) else "csv"),
@@ -76,7 +76,7 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
         header_line=header.line,
         unit=_unit_in_comments(found, problems),
         decimal=mark,
-        told=told,
+        assumed=assumed,
         left_out=left_out,
     )
 

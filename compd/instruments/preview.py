@@ -33,7 +33,7 @@ class ExportPreview:
     line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
     header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
         nothing; empty where no columns could be told.
-    told : what was found, in words. groups, sheets : that there are to choose from.
+    assumed : what was found, in words. groups, sheets : that there are to choose from.
     """
 
     export: InstrumentExport | None
@@ -42,7 +42,7 @@ class ExportPreview:
     rows: Sequence[Sequence[str]] = ()
     header: Sequence[str] = ()
     roles: Sequence[str] = ()
-    told: Mapping[str, str] = field(default_factory=dict)
+    assumed: Mapping[str, str] = field(default_factory=dict)
     groups: Sequence[str] = ()
     sheets: Sequence[str] = ()
     problems: Sequence[Problem] = ()
@@ -72,7 +72,7 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
         rows=_cut(zip(*(cells[:SHOWN_ROWS] for cells in columns), strict=True)),
         header=[name[:_CELL_WIDTH] for name in (table.header or ())[:_MOST_COLUMNS]],
         roles=[role_of.get(k, "-") for k in range(len(columns))],
-        told=table.told if export is None else export.taken,
+        assumed=table.assumed if export is None else export.taken,
         groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MOST_GROUPS],
         sheets=_sheets(path) if table.shape == "xlsx" else (),
         problems=problems,
@@ -91,7 +91,7 @@ def _of_samples(export: InstrumentExport) -> ExportPreview:
         line=export.line[:SHOWN_ROWS].tolist(),
         rows=first_rows,
         header=[f"{role} [{'s' if role == 'time' else 'mm'}]" for role in chain(times, export.axes)],
-        told=export.taken,
+        assumed=export.taken,
     )
 
 

@@ -21,7 +21,7 @@ class RawTable:
     header : (C,) names of the columns; None where the file has none. header_line : its line; 0 without one.
     unit : of the lengths, where the file says it beside the columns' names ("mm", "m", "inch" ...); "" if not.
     decimal : "." or ",", as it was in the file.
-    told : in words for a person, what was found: "delimiter" -> "semicolon", "decimal mark" -> "comma", ...
+    assumed : in words for a person, what was found: "delimiter" -> "semicolon", "decimal mark" -> "comma", ...
     roles : roles that the shape itself settles, by column; empty for any other column.
     left_out : reason -> rows that are not there.
     """
@@ -34,6 +34,6 @@ class RawTable:
     header_line: int = 0
     unit: str = ""
     decimal: str = "."
-    told: Mapping[str, str] = field(default_factory=dict)
+    assumed: Mapping[str, str] = field(default_factory=dict)
     roles: Sequence[str] = ()
     left_out: Mapping[str, int] = field(default_factory=dict)

@@ -38,13 +38,15 @@ def is_spatial_analyzer(text: TextFile) -> bool:
 def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
     """The table of such an export; without comments too (`number, x, y, z`). Raises RecordingError."""
     problems = ExportProblems(text.path)
-    told: dict[str, str] = {}
+    assumed: dict[str, str] = {}
     unit = ""
     for i in [i for i, line in enumerate(map(str.lstrip, text.lines)) if line[:2] == "//"]:
         number, line = i + 1, text.lines[i]
         frame, axes = _FRAME.search(line), _AXES.search(line)
-        if frame and told.setdefault("frame", frame[1]) != frame[1]:
-            problems.add(number, f"another frame begins here, after {told['frame']}", frame[1], "one frame in a file")
+        if frame and assumed.setdefault("frame", frame[1]) != frame[1]:
+            problems.add(
+                number, f"another frame begins here, after {assumed['frame']}", frame[1], "one frame in a file"
+            )
         if axes:
             own = unit_named(axes[3] or "")
             if axes[1].lower() != "cartesian" or [name.strip().lower() for name in axes[2].split(",")] != [
@@ -60,9 +62,9 @@ def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
             unit = own
     problems.check()
     table = read_delimited(text, options, "sa")
-    told = {**table.told, **told}
+    assumed = {**table.assumed, **assumed}
     roles = () if table.header else _roles(table)
-    return replace(table, unit=unit or table.unit, told=told, roles=roles)
+    return replace(table, unit=unit or table.unit, assumed=assumed, roles=roles)
 
 
 def _roles(table: RawTable) -> tuple[str, ...]:

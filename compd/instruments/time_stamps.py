@@ -39,12 +39,12 @@ class StampedTime:
     Attributes
     ----------
     time_s : (N,); nan where a cell is empty. std_s : standard uncertainty of one, for its coarse resolution.
-    told : in words, what was found.
+    assumed : in words, what was found.
     """
 
     time_s: FloatArray
     std_s: float
-    told: str
+    assumed: str
 
 
 def is_stamp(cell: str) -> bool:
@@ -74,7 +74,7 @@ def read_stamps(
     parsed = _Parsed(cells, line, what, problems)
     if parsed.failed:
         return StampedTime(np.full(len(cells), np.nan), np.nan, "")
-    told = []
+    assumed = []
     time_s = parsed.second_s
     if parsed.dates:
         order, why = _order(parsed, dates, problems)
@@ -86,17 +86,17 @@ def read_stamps(
         time_s = time_s + np.where(parsed.date >= 0, days[parsed.date] - first, np.nan) * DAY_S
         # of one date that reads as several days, none is named
         begin = "midnight" if why == _ONE_DATE else f"{date.fromordinal(first)} 00:00"
-        told += [f"dates {_order_text(order)}, {why}" if why != _ONE_DATE else why, f"seconds from {begin}"]
+        assumed += [f"dates {_order_text(order)}, {why}" if why != _ONE_DATE else why, f"seconds from {begin}"]
     else:
         time_s, midnights = _past_midnight(time_s)
-        told.append("time of day" + (f", past midnight {midnights} times" if midnights else ""))
+        assumed.append("time of day" + (f", past midnight {midnights} times" if midnights else ""))
     if parsed.zones:
-        told.append("in UTC")
+        assumed.append("in UTC")
     resolution_s = 10.0**-parsed.decimals
     time_s, std_s, spread = spread_within(time_s, resolution_s, whole=parsed.decimals == 0)
     if spread:
-        told.append(spread)
-    return StampedTime(time_s, std_s, "; ".join(told))
+        assumed.append(spread)
+    return StampedTime(time_s, std_s, "; ".join(assumed))
 
 
 def spread_within(time_s: FloatArray, resolution_s: float, whole: bool = False) -> tuple[FloatArray, float, str]:
@@ -125,8 +125,8 @@ def spread_within(time_s: FloatArray, resolution_s: float, whole: bool = False) 
     std_s = float(resolution_s / np.sqrt(12.0))
     words = "whole seconds" if resolution_s == 1.0 else f"stamps of {resolution_s:g} s"
     rows = f"up to {most} rows in each, spread within" if most > 1 else "one row in each"
-    told = f"{words}, {rows}: +- {std_s:.2g} s"
-    return spread_s, std_s, told
+    assumed = f"{words}, {rows}: +- {std_s:.2g} s"
+    return spread_s, std_s, assumed
 
 
 class _Parsed:

@@ -128,14 +128,14 @@ def _raw_table(path: Path, table: SheetTable, reader: SheetReader, sheet: str) -
     filled = sorted({column for row in table.rows for column, kind in enumerate(row.kinds) if kind})
     named = [column for column, name in enumerate(table.header or ()) if name]
     columns = sorted({*filled, *named})
-    told = {"sheet": sheet, **table.told}
+    assumed = {"sheet": sheet, **table.assumed}
     if columns:
-        told["columns"] = f"{cell_name(columns[0])} to {cell_name(columns[-1])}"
+        assumed["columns"] = f"{cell_name(columns[0])} to {cell_name(columns[-1])}"
     if reader.dates:
-        told["dates"] = "cells with a date or a time of day, to the millisecond"
+        assumed["dates"] = "cells with a date or a time of day, to the millisecond"
     values = sum(any(kind in VALUES for kind in row.kinds) for row in table.rows)
     if values < len(table.rows):
-        told["rows without a number"] = str(len(table.rows) - values)
+        assumed["rows without a number"] = str(len(table.rows) - values)
     header = table.header
     return RawTable(
         path=path,
@@ -144,7 +144,7 @@ def _raw_table(path: Path, table: SheetTable, reader: SheetReader, sheet: str) -
         line=np.array([row.number for row in table.rows]),
         header=None if header is None else tuple((header[k] if k < len(header) else "") for k in columns),
         header_line=table.header_row,
-        told=told,
+        assumed=assumed,
         left_out=table.left_out,
     )
 

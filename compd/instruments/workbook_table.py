@@ -23,13 +23,13 @@ class SheetTable:
     ----------
     rows : below the header, one or more.
     header : names of the columns from A on; None without one. header_row : its number; 0 without one.
-    told : in words, what was found. left_out : reason -> rows.
+    assumed : in words, what was found. left_out : reason -> rows.
     """
 
     rows: Sequence[Row]
     header: tuple[str, ...] | None
     header_row: int
-    told: Mapping[str, str] = field(default_factory=dict)
+    assumed: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -52,12 +52,12 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
     longest = max(range(len(heads)), key=lambda k: ends[k] - heads[k])
     names = _names(rows[heads[longest]])
     first = next(k for k in heads if _names(rows[k]) == names)
-    header, header_row, begin, told = names, rows[first].number, first, {}
+    header, header_row, begin, assumed = names, rows[first].number, first, {}
     if _are_units(names) and first - 1 in heads and not _are_units(_names(rows[first - 1])):
         begin = first - 1
         upper = _names(rows[begin])
         header, header_row = _with_units(upper, names), rows[begin].number
-        told["units"] = f"row {rows[first].number}, below the names"
+        assumed["units"] = f"row {rows[first].number}, below the names"
         again: list[tuple[str, ...]] = [upper, names]
     else:
         again = [names]
@@ -74,7 +74,7 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
         )
     below = [row for k, row in enumerate(rows) if k > first and k not in repeated]
     left_out = {AGAIN: len(repeated)} if repeated else {}
-    return SheetTable(below, header, header_row, {**_above(rows[:begin]), **told}, left_out)
+    return SheetTable(below, header, header_row, {**_above(rows[:begin]), **assumed}, left_out)
 
 
 def _columns_of_numbers(rows: Sequence[Row]) -> set[int]:

@@ -75,9 +75,9 @@ def unit_hint(place: FloatArray, point: FloatArray) -> str:
     """A remark where the instrument's steps are so many times the machine's as one unit is of another."""
     steps = [float(np.median(np.abs(separation_mm(values[:-1], values[1:])))) for values in (place, point)]
     ratio = steps[1] / max(steps[0], 1e-9)
-    for factor, told in ((25.4, "mm read as inches"), (1 / 25.4, "inches read as mm"), (1000.0, "mm read as m")):
+    for factor, mistake in ((25.4, "mm read as inches"), (1 / 25.4, "inches read as mm"), (1000.0, "mm read as m")):
         if abs(ratio / factor - 1.0) < 0.1:
-            return f"; its steps are {ratio:.3g} times the machine's: {told}?"
+            return f"; its steps are {ratio:.3g} times the machine's: {mistake}?"
     if abs(ratio * 1000.0 - 1.0) < 0.1:
         return f"; its steps are {ratio:.3g} times the machine's: m read as mm?"
     return ""

@@ -46,12 +46,12 @@ def name_problems(
             and dwells[dwell[other]].point == dwells[nearest].point
             and dwells[check.nearest[list(check.wrong).index(other)]].point == own
         ]
-        told = f"; it is where {there} is" if there else "; it is at no dwell's place"
-        told += f": {name} and {swapped[0]} are swapped" if swapped else ""
+        elsewhere = f"; it is where {there} is" if there else "; it is at no dwell's place"
+        elsewhere += f": {name} and {swapped[0]} are swapped" if swapped else ""
         problems.append(
             Problem(
                 where=f"{export.path}:{export.line[point]}",
-                what=f"{name} is {off_mm:.3g} mm from where point {own} was{told}",
+                what=f"{name} is {off_mm:.3g} mm from where point {own} was{elsewhere}",
                 next_step="mend the names in the export, or delete the line",
             )
         )

@@ -130,8 +130,8 @@ class Server:
         name = request.path_params["name"]
         if name not in self._orders:
             return refused("there is no such order", 404)
-        told = self._orders.consequence(name, request.query_params.get("subject", ""))
-        return JSONResponse(asdict(told))
+        consequence = self._orders.consequence(name, request.query_params.get("subject", ""))
+        return JSONResponse(asdict(consequence))
 
     async def _order(self, request: Request) -> Response:
         name, keys = request.path_params["name"], await keys_of(request)

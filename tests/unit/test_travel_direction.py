@@ -36,12 +36,12 @@ def by_daemon(scale_mm: FloatArray) -> FloatArray:
     """As the daemon writes it into READINGS, cycle by cycle."""
     wires = [Wire(f"scale_{link}", f"scale {link}", link, 1, 1.0) for link in range(scale_mm.shape[1])]
     directions = Directions(wires)
-    told = []
+    directions_seen = []
     for row in scale_mm.tolist():
         readings = tuple(good(value, 0.0) for value in row)
         directions.update(SimpleNamespace(inputs=SimpleNamespace(snapshot=SimpleNamespace(readings=readings))))
-        told.append(directions.now)
-    return np.array(told, dtype=float)
+        directions_seen.append(directions.now)
+    return np.array(directions_seen, dtype=float)
 
 
 @given(WALKS)

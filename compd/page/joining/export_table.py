@@ -44,7 +44,7 @@ class ExportReader:
             return preview
 
 
-def told(preview: ExportPreview) -> dict[str, Any]:
+def table_contents(preview: ExportPreview) -> dict[str, Any]:
     """What the browser shows of it. `by`: what puts the rows together without a choice; "" where that is not clear."""
     export = preview.export
     by, not_clear = "", ""
@@ -58,7 +58,7 @@ def told(preview: ExportPreview) -> dict[str, Any]:
         "rows": [list(row) for row in preview.rows],
         "header": list(preview.header),
         "roles": list(preview.roles),
-        "told": dict(preview.told),
+        "assumed": dict(preview.assumed),
         "groups": list(preview.groups),
         "sheets": list(preview.sheets),
         "problems": [str(problem) for problem in preview.problems],

@@ -17,7 +17,7 @@ from compd.instruments.export import InstrumentExport
 from compd.joining.join import match_export
 from compd.joining.summary import summary_lines
 from compd.page.joining.choices import Choices, read_choices
-from compd.page.joining.export_table import ExportReader, told
+from compd.page.joining.export_table import ExportReader, table_contents
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.trial import tried
 from compd.page.recording_machine import machine_of
@@ -101,7 +101,10 @@ class JoinRoutes:
 
         def answered() -> dict[str, Any]:
             join = self._join(keys)
-            return {**told(self._reader.read(join.export, join.choices.read)), "command": join.command(self._directory)}
+            return {
+                **table_contents(self._reader.read(join.export, join.choices.read)),
+                "command": join.command(self._directory),
+            }
 
         return await _answered(answered)
 

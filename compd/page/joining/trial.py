@@ -49,15 +49,15 @@ def _time(gauges: Path, export: InstrumentExport, offset: ClockOffset | None) ->
         curve = agreement_curve(recording.time_s, recording.scale_mm, track)
     except RecordingError:
         return None
-    told: dict[str, Any] = {
+    answer: dict[str, Any] = {
         "offset_s": _numbers(curve.offset_s),
         "agreement": _numbers(curve.agreement),
         "window_s": curve.window_s,
     }
     if offset is not None:
-        told["peak"] = [offset.offset_s, offset.agreement]
-        told["next_best"] = None if offset.runner_up is None else list(offset.runner_up)
-    return told
+        answer["peak"] = [offset.offset_s, offset.agreement]
+        answer["next_best"] = None if offset.runner_up is None else list(offset.runner_up)
+    return answer
 
 
 def _rest(joined: RestJoin) -> dict[str, Any]:

@@ -27,18 +27,18 @@ function write(id, text) {
 }
 
 export function showBanner(page, behind_s) {
-  const told = describe(page, behind_s);
-  const key = told.state + told.tone;
+  const summary = describe(page, behind_s);
+  const key = summary.state + summary.tone;
   if (key !== shown) {
     shown = key;
-    document.body.dataset.state = told.state;
-    document.body.dataset.tone = told.tone;
+    document.body.dataset.state = summary.state;
+    document.body.dataset.tone = summary.tone;
   }
-  write("sign", told.sign);
-  write("state", told.name);
-  write("reason", told.reason);
-  if (at("reason").title !== told.reason) at("reason").title = told.reason;
-  const setpoint = told.tone === "gone" ? null : page.live.setpoint;
+  write("sign", summary.sign);
+  write("state", summary.name);
+  write("reason", summary.reason);
+  if (at("reason").title !== summary.reason) at("reason").title = summary.reason;
+  const setpoint = summary.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
   write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");

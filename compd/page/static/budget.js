@@ -56,12 +56,12 @@ export class Budget {
       if (colour) sample.style.background = colour;
       return element("span", {}, sample, text);
     };
-    const told = causes.map((cause, k) => patch("", cause.replaceAll("_", " "), causeColour(k)));
+    const entries = causes.map((cause, k) => patch("", cause.replaceAll("_", " "), causeColour(k)));
     if (causes.length) {
-      told.push(patch("sum", "sum"));
-      told.push(u_tip_um ? patch("whisker", "uncertainty, 95 %") : element("span", {}, "uncertainty not known: a gauge declares no noise_um"));
+      entries.push(patch("sum", "sum"));
+      entries.push(u_tip_um ? patch("whisker", "uncertainty, 95 %") : element("span", {}, "uncertainty not known: a gauge declares no noise_um"));
     }
-    if (shadow) told.push(patch("shadow", why ? `shadow model, not applied: ${why}` : "shadow model, not applied"));
-    this.legend.replaceChildren(...told);
+    if (shadow) entries.push(patch("shadow", why ? `shadow model, not applied: ${why}` : "shadow model, not applied"));
+    this.legend.replaceChildren(...entries);
   }
 }

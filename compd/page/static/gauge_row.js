@@ -48,20 +48,20 @@ export class GaugeRow {
     );
   }
 
-  // told : of a live event. faults : {total, recent} of this gauge, where they are known.
-  show(told, faults) {
+  // reading : of a live event. faults : {total, recent} of this gauge, where they are known.
+  show(reading, faults) {
     const digits = this.wire.kind === "quantity" ? 2 : 4;
-    this.share = told.fault ? Infinity : (told.age_s ?? Infinity) / this.wire.stale_after_s;
-    this.bad = Boolean(told.fault);
+    this.share = reading.fault ? Infinity : (reading.age_s ?? Infinity) / this.wire.stale_after_s;
+    this.bad = Boolean(reading.fault);
     this.row.className = this.bad ? "bad" : "";
     this.age.classList.toggle("old", this.bad);
     this.bar.style.width = `${100 * Math.min(1, this.share)}%`;
-    const waits = told.fault === "distrusted";
+    const waits = reading.fault === "distrusted";
     if (waits && !this.button.isConnected) this.quality.prepend(this.button);
     if (!waits) this.button.remove();
-    const quality = told.fault ? `✕ ${told.fault.replaceAll("_", " ")}${told.detail ? `: ${told.detail}` : ""}` : "✓ ok";
-    write(this.cells.value, told.value === undefined ? "–" : `${this.wire.kind === "quantity" ? told.value.toFixed(digits) : signed(told.value, digits)} ${this.unit}`);
-    write(this.cells.age, told.age_s === undefined ? "" : ago(told.age_s));
+    const quality = reading.fault ? `✕ ${reading.fault.replaceAll("_", " ")}${reading.detail ? `: ${reading.detail}` : ""}` : "✓ ok";
+    write(this.cells.value, reading.value === undefined ? "–" : `${this.wire.kind === "quantity" ? reading.value.toFixed(digits) : signed(reading.value, digits)} ${this.unit}`);
+    write(this.cells.age, reading.age_s === undefined ? "" : ago(reading.age_s));
     write(this.cells.quality, quality);
     this.row.title = quality;
     write(this.cells.total, faults ? String(faults.total ?? 0) : "–");

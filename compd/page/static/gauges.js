@@ -40,7 +40,7 @@ export class Gauges {
     this.open = !this.open;
     this.button.textContent = this.open ? "fold" : "show all";
     this.written_ms = -WRITE_EVERY_MS;
-    if (this.told) this.show(this.told, this.minute);
+    if (this.event) this.show(this.event, this.minute);
   }
 
   // Faults of each gauge, of the slow event.
@@ -58,21 +58,21 @@ export class Gauges {
 
   // An event; with `minute` one that has been, of which faults are not counted.
   show(event, minute) {
-    [this.told, this.minute] = [event, minute];
-    const told = event.gauges;
-    if (!told) {
+    [this.event, this.minute] = [event, minute];
+    const readings = event.gauges;
+    if (!readings) {
       this.summary.textContent = "not known";
       this.table.hidden = true;
       return;
     }
     if (!minute && performance.now() - this.written_ms < WRITE_EVERY_MS) return;
     this.written_ms = performance.now();
-    const bad = told.filter((gauge) => gauge.fault).length;
-    const oldest_s = Math.max(...told.filter((gauge) => !gauge.fault).map((gauge) => gauge.age_s), 0);
-    this.summary.textContent = bad ? `${bad} of ${told.length} not good` : `${told.length} good, oldest ${ago(oldest_s)}`;
+    const bad = readings.filter((gauge) => gauge.fault).length;
+    const oldest_s = Math.max(...readings.filter((gauge) => !gauge.fault).map((gauge) => gauge.age_s), 0);
+    this.summary.textContent = bad ? `${bad} of ${readings.length} not good` : `${readings.length} good, oldest ${ago(oldest_s)}`;
     this.table.hidden = !this.open && !bad;
     if (this.table.hidden) return;
-    this.rows.forEach((row, k) => row.show(told[k], minute || !this.faults ? null : this.faultsOf(row)));
+    this.rows.forEach((row, k) => row.show(readings[k], minute || !this.faults ? null : this.faultsOf(row)));
     const shown = this.sorted();
     const { times_s, values } = minute?.traces ?? { times_s: this.traces.times, values: this.traces.values };
     const place = (row) => this.rows.indexOf(row);

@@ -30,12 +30,12 @@ const past = new Past((event) => page.frozen && showPast(event, event?.unix_s ??
 // In the place of a setpoint that is not there: the numbers before it are not shown on.
 const NOTHING = { setpoint: { valid: false }, scene: null, budget: null, gauges: null };
 
-function begin(told) {
-  page.machine = told;
-  if (!told) return;
-  document.title = `${told.machine} · compd`;
-  at("machine-name").textContent = told.machine;
-  for (const part of parts) part.begin(told);
+function begin(description) {
+  page.machine = description;
+  if (!description) return;
+  document.title = `${description.machine} · compd`;
+  at("machine-name").textContent = description.machine;
+  for (const part of parts) part.begin(description);
   hour.begin();
 }
 
@@ -58,19 +58,19 @@ function showPast(event, at_s) {
   tellMoment(event, at_s);
 }
 
-function take(told, late_s) {
+function take(message, late_s) {
   page.unpainted = true;
   if (late_s && late_s >= LATE_S) return;
-  links.note(told);
-  hour.note(told);
-  gauges.note(told);
+  links.note(message);
+  hour.note(message);
+  gauges.note(message);
 }
 
-function takeSlow(told) {
-  drawer.show(told);
-  if (page.frozen || !told.status) return;
-  showTiming(at("timing"), told.status);
-  gauges.count(told.faults);
+function takeSlow(message) {
+  drawer.show(message);
+  if (page.frozen || !message.status) return;
+  showTiming(at("timing"), message.status);
+  gauges.count(message.faults);
 }
 
 // Stand still at `at_s`, of which `event` is known already, or is asked for; or go on.

@@ -25,12 +25,12 @@ export class ModelList {
   }
 
   async list() {
-    const told = await (await fetch("models")).json();
-    this.rows = told.models.map(({ name, changed, runs }) => {
+    const listing = await (await fetch("models")).json();
+    this.rows = listing.models.map(({ name, changed, runs }) => {
       const button = element("button", { type: "button", onclick: () => this.choose(name) }, name);
       return { name, button, row: element("tr", {}, element("td", {}, button), element("td", {}, changed ? dateText(new Date(changed)) : "not there any more"), element("td", {}, runs ? `● ${runs}` : "")) };
     });
-    const beside = told.directory ? `*model.yaml in ${told.directory}` : "start the page with the configuration, or --models, to have a list";
+    const beside = listing.directory ? `*model.yaml in ${listing.directory}` : "start the page with the configuration, or --models, to have a list";
     this.where.textContent = this.rows.length ? beside : `no model files: ${beside}`;
     this.body.replaceChildren(...this.rows.map(({ row }) => row));
     this.mark();

@@ -22,9 +22,9 @@ export class Orders {
 
   async armOrNot() {
     const armed = this.armed;
-    const told = await post("arm", { id: this.page.id, arm: !armed });
-    if (!told.ok) return this.say(told.reason);
-    this.page.armed_until = performance.now() / 1000 + told.armed_s;
+    const answer = await post("arm", { id: this.page.id, arm: !armed });
+    if (!answer.ok) return this.say(answer.reason);
+    this.page.armed_until = performance.now() / 1000 + answer.armed_s;
     this.say(armed ? "Not armed any more." : "");
     this.show();
   }
@@ -42,15 +42,15 @@ export class Orders {
 
   async inform(name, subject) {
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
-    const told = await response.json();
+    const consequence = await response.json();
     const { impossible } = this;
-    if (impossible?.name === name && impossible.subject === subject && impossible.text === told.text) return;
-    this.impossible = told.possible ? null : { name, subject, text: told.text };
+    if (impossible?.name === name && impossible.subject === subject && impossible.text === consequence.text) return;
+    this.impossible = consequence.possible ? null : { name, subject, text: consequence.text };
     const title = nameOf(name, subject);
-    // what is told is what is given: the file that a name stands for now, not later
-    const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, told.subject || subject) }, title);
-    give.disabled = !told.possible;
-    this.tell(element("b", {}, title), element("p", {}, told.text), new CommandLine(told.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
+    // what is shown is what is given: the file that a name stands for now, not later
+    const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, consequence.subject || subject) }, title);
+    give.disabled = !consequence.possible;
+    this.tell(element("b", {}, title), element("p", {}, consequence.text), new CommandLine(consequence.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
   }
 
   tell(...parts) {
@@ -68,15 +68,15 @@ export class Orders {
   async give(name, subject) {
     if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser may look only.");
     this.say("…");
-    const told = await post(`orders/${name}`, { id: this.page.id, subject });
-    if (told.value === "zero_differs") {
+    const answer = await post(`orders/${name}`, { id: this.page.id, subject });
+    if (answer.value === "zero_differs") {
       const { command } = await (await fetch("orders/zero?subject=replace")).json();
-      this.say(told.reason);
+      this.say(answer.reason);
       const replace = element("button", { type: "button", onclick: () => this.give("zero", "replace") }, "It is the zero position: take it");
-      return this.tell(element("p", {}, told.reason), new CommandLine(command).row, replace);
+      return this.tell(element("p", {}, answer.reason), new CommandLine(command).row, replace);
     }
     this.leave();
-    this.say(told.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${told.reason}`);
+    this.say(answer.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${answer.reason}`);
   }
 
   say(text) {

@@ -5,7 +5,7 @@ import { post } from "./post.js";
 
 export class Recordings {
   constructor(page, say) {
-    Object.assign(this, { page, say, told: null, recording: null });
+    Object.assign(this, { page, say, listing: null, recording: null });
     const button = (text, onclick, id) => element("button", { type: "button", onclick, id }, text);
     this.name = element("input", { type: "text", placeholder: "name of a recording", "aria-label": "Name of the recording" });
     this.name.addEventListener("input", () => this.tellCommands());
@@ -33,16 +33,16 @@ export class Recordings {
   }
 
   async begin(burst_s) {
-    const told = await post("recordings", { name: this.name.value.trim(), burst_s });
-    this.say(told.ok ? "" : told.reason);
+    const answer = await post("recordings", { name: this.name.value.trim(), burst_s });
+    this.say(answer.ok ? "" : answer.reason);
     this.list();
   }
 
   async list() {
-    this.told = await (await fetch("recordings")).json();
-    this.where.textContent = `in ${this.told.directory}`;
+    this.listing = await (await fetch("recordings")).json();
+    this.where.textContent = `in ${this.listing.directory}`;
     this.tellCommands();
-    this.body.replaceChildren(...this.told.parts.flatMap((part) => this.rows(part)));
+    this.body.replaceChildren(...this.listing.parts.flatMap((part) => this.rows(part)));
   }
 
   rows(part) {
@@ -55,8 +55,8 @@ export class Recordings {
   tellCommands() {
     const name = this.name.value.trim();
     const named = (command) => (/^[\w-]+$/.test(name) ? command.replace("/NAME ", `/${name} `) : command);
-    this.command.write(named(this.told?.command ?? ""));
-    this.burstCommand.write(named(this.told?.burst_command ?? ""));
+    this.command.write(named(this.listing?.command ?? ""));
+    this.burstCommand.write(named(this.listing?.burst_command ?? ""));
   }
 
   // The slow event.

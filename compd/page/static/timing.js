@@ -4,7 +4,7 @@ import { dateText, element } from "./format.js";
 export function showTiming(list, status) {
   const loop = status.loop;
   const us = (value) => (value === undefined ? "–" : `${value.toFixed(0)} µs`);
-  const granted = Object.entries(status.realtime).map(([name, told]) => `${told.granted ? "✓" : "✕"} ${name.replaceAll("_", " ")}`);
+  const granted = Object.entries(status.realtime).map(([name, setting]) => `${setting.granted ? "✓" : "✕"} ${name.replaceAll("_", " ")}`);
   const rows = [
     ["rate", `${loop.rate_hz} Hz`],
     ["late, median", us(loop.lateness_median_us)],

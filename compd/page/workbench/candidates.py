@@ -64,14 +64,14 @@ class Candidates:
 
     def summary(self) -> dict[str, Any]:
         """Every effect, ranked; and the error that the model has on rows that were left out, as plain data."""
-        told: dict[str, Any] = nan_to_null(
+        summary: dict[str, Any] = nan_to_null(
             {
                 "effects": self.ranked(),
                 "left_out_rms": self._rms(self.losses.baseline),
                 "rows": int(self.problem.rows.sum()),
             }
         )
-        return told
+        return summary
 
     def _rms(self, loss: float) -> float:
         """The error per coordinate at a loss, um."""
@@ -83,8 +83,8 @@ class Candidates:
         steps : what a diagnosis has named.
         """
         results = candidate_results(self.problem, self.losses, steps, {})
-        told: list[dict[str, Any]] = nan_to_null([self._result(result) for result in results])
-        return told
+        ranking: list[dict[str, Any]] = nan_to_null([self._result(result) for result in results])
+        return ranking
 
     def _result(self, result: CandidateResult) -> dict[str, Any]:
         effect = self.library.get(result.effect)
@@ -103,7 +103,7 @@ class Candidates:
         Raises KeyError where there is no such effect.
         """
         effect, links = self.library[name], self._comparison.aligned.rows.links
-        told: dict[str, Any] = nan_to_null(
+        card: dict[str, Any] = nan_to_null(
             {
                 "effect": effect.id,
                 "physics": effect.physics,
@@ -133,7 +133,7 @@ class Candidates:
                 "why_not": self.problem.pool.untestable.get(name, ""),
             }
         )
-        return told
+        return card
 
     def trial(self, name: str, variant: int) -> Trial:
         """The effect at one choice of its constants, by its place in `card`.

@@ -116,13 +116,13 @@ class DiagnosisJob:
     def _listen(self) -> None:
         try:
             while True:
-                kind, told = self._messages.recv()
+                kind, content = self._messages.recv()
                 if kind == "step":
-                    self.steps.append((told, self._clock.monotonic() - self._start_s))
+                    self.steps.append((content, self._clock.monotonic() - self._start_s))
                 elif kind == "page":
-                    self._page = told
+                    self._page = content
                 elif self.state == "running":
-                    self.text, self.result, self.evidence = told
+                    self.text, self.result, self.evidence = content
                     self._seconds = self._clock.monotonic() - self._start_s
                     self.state = kind
         except (EOFError, OSError):

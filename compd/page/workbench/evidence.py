@@ -33,7 +33,7 @@ def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
     A table is `head`, `rows` and `caption`; None where there is nothing to tell.
     """
     fall = error_fall(diagnosis)
-    told: dict[str, Any] = nan_to_null(
+    plain: dict[str, Any] = nan_to_null(
         {
             "verdict": diagnosis.verdict,
             "lines": summary_lines(diagnosis),
@@ -48,7 +48,7 @@ def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
             "next": _table(next_table(diagnosis)),
         }
     )
-    return told
+    return plain
 
 
 def _effect(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> dict[str, Any]:

@@ -52,8 +52,8 @@ class Checked(NamedTuple):
 
     def as_json(self) -> dict[str, Any]:
         """As plain data."""
-        told = [problem._asdict() for problem in self.problems]
-        return {"right": self.effect is not None, "problems": told, "missing": list(self.missing)}
+        problems = [problem._asdict() for problem in self.problems]
+        return {"right": self.effect is not None, "problems": problems, "missing": list(self.missing)}
 
 
 def check(declaration: Mapping[str, Any], rows: Observations, present: Sequence[str] = ()) -> Checked:

@@ -76,7 +76,7 @@ def _is_met(need: str, rows: Observations) -> bool:
 
 
 async def _form(request: Request, workbench: Workbench) -> Response:
-    def told() -> dict[str, Any]:
+    def form() -> dict[str, Any]:
         own = workbench.sources.own
         return {
             **offered(workbench.opened.aligned.rows),
@@ -85,7 +85,7 @@ async def _form(request: Request, workbench: Workbench) -> Response:
             "problems": [str(problem) for problem in own.problems],
         }
 
-    return answer(await workbench.ask(told))
+    return answer(await workbench.ask(form))
 
 
 async def _check(request: Request, workbench: Workbench) -> Response:
@@ -106,7 +106,7 @@ async def _check(request: Request, workbench: Workbench) -> Response:
 
 
 async def _save(request: Request, workbench: Workbench) -> Response:
-    """Keep an effect, or with `delete` take one out; the summary is told."""
+    """Keep an effect, or with `delete` take one out; the answer is the summary."""
     keys = await keys_of(request)
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)

@@ -50,7 +50,7 @@ async def _trial(request: Request, workbench: Workbench) -> Response:
 
 
 async def _step(request: Request, workbench: Workbench) -> Response:
-    """`dry_run`: what it would do. Else it is done, and the summary is told."""
+    """`dry_run`: what it would do. Else it is done, and the answer is the summary."""
     keys: Any = await keys_of(request)
     kind, effect, revision = str(keys.get("kind")), str(keys.get("effect", "")), keys.get("revision")
     if keys.get("dry_run"):

@@ -51,10 +51,10 @@ def undone(opened: OpenedRecording) -> OpenedRecording:
     return replace(opened, model=read_model_file(path, model.machine, model.links))
 
 
-def step_told(before: OpenedRecording, after: OpenedRecording) -> dict[str, Any]:
+def step_summary(before: OpenedRecording, after: OpenedRecording) -> dict[str, Any]:
     """The errors before and after a step, and every number's old and new value, as plain data."""
     old = {(number.effect, number.parameter): number.value for number in before.model.numbers()}
-    told: dict[str, Any] = nan_to_null(
+    summary: dict[str, Any] = nan_to_null(
         {
             "rms": [before.comparison.rms_um, after.comparison.rms_um],
             "floor_ratio": [before.comparison.floor_ratio, after.comparison.floor_ratio],
@@ -64,7 +64,7 @@ def step_told(before: OpenedRecording, after: OpenedRecording) -> dict[str, Any]
             "gone": [f"{effect}.{name}" for effect, name in old if effect not in _ids(after.model)],
         }
     )
-    return told
+    return summary
 
 
 def _ids(model: ModelFile) -> set[str]:

@@ -61,7 +61,7 @@ class OpenedRecording:
     def summary(self) -> dict[str, Any]:
         """The numbers of the comparison, the model's numbers and its ledger, as plain data."""
         comparison = self.comparison
-        told = {
+        summary = {
             "recording": self.path.stem,
             "machine": self.aligned.recording.machine,
             "labels": self.aligned.labels,
@@ -94,7 +94,7 @@ class OpenedRecording:
                 for step in self.model.steps
             ],
         }
-        plain: dict[str, Any] = nan_to_null(told)
+        plain: dict[str, Any] = nan_to_null(summary)
         return plain
 
     def rows(self, *, every: bool = False) -> bytes:

@@ -35,13 +35,13 @@ async def _form(request: Request, workbench: Workbench) -> Response:
     """`rivals`: ids with commas, of which the limits of a machine of an external model depend."""
     names = [name for name in request.query_params.get("rivals", "").split(",") if name]
 
-    def told() -> dict[str, Any]:
+    def form() -> dict[str, Any]:
         library = workbench.candidates.library
         effects = [entry["effect"] for entry in workbench.candidates.ranked() if entry["status"] != "not_testable"]
         chosen = [library[name] for name in names if name in effects]
         return {"effects": effects, "limits": limits_of(workbench.opened.aligned, chosen)}
 
-    return answer(await workbench.ask(told))
+    return answer(await workbench.ask(form))
 
 
 def limits_of(aligned: AlignedRecording, effects: list[Effect]) -> dict[str, Any]:
@@ -62,7 +62,7 @@ async def _plan(request: Request, workbench: Workbench) -> Response:
     """It changes nothing, so that everybody may."""
     keys = await keys_of(request)
 
-    def told() -> dict[str, Any]:
+    def planned() -> dict[str, Any]:
         try:
             asked = read_request(keys, workbench.candidates.library)
             plan = plan_measurement(
@@ -81,12 +81,12 @@ async def _plan(request: Request, workbench: Workbench) -> Response:
         except CompdError as error:
             problems = [{"field": field_of(problem), "text": words(problem)} for problem in error.problems]
             return {"problems": problems}
-        return _told(plan, workbench, asked)
+        return _plan_contents(plan, workbench, asked)
 
-    return answer(await workbench.ask(told))
+    return answer(await workbench.ask(planned))
 
 
-def _told(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> dict[str, Any]:
+def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> dict[str, Any]:
     """The plan as plain data; its files can be had under `key`."""
     columns = list(plan.rows[0]) if plan.rows else []
     key = hashlib.sha256(repr((plan.rivals, plan.rows)).encode()).hexdigest()[:16]

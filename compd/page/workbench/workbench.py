@@ -22,7 +22,7 @@ from compd.page.workbench.diagnoses import Diagnoses
 from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workbench.drafts import Drafts
 from compd.page.workbench.effect_sources import EffectSources
-from compd.page.workbench.model_changes import proposed, step_told, undone, write
+from compd.page.workbench.model_changes import proposed, step_summary, undone, write
 from compd.page.workbench.opened_recording import OpenedRecording, open_for_page
 from compd.page.workbench.own_effects import NAME, OwnEffects
 from compd.page.workbench.trial import Trial
@@ -144,7 +144,9 @@ class Workbench:
         summary = self.candidates.summary()
         return {
             **summary,
-            "effects": [{**told, "own": told["effect"] in self.sources.own.effects} for told in summary["effects"]],
+            "effects": [
+                {**effect, "own": effect["effect"] in self.sources.own.effects} for effect in summary["effects"]
+            ],
         }
 
     def card(self, name: str) -> dict[str, Any]:
@@ -167,7 +169,7 @@ class Workbench:
         """What a step would do; nothing is written. Raises CompdError where it cannot be made."""
         after = proposed(self.opened, kind, effect, {**self.candidates.library, **self.drafts.effects})
         self._proposal = (kind, effect, after)
-        return step_told(self.opened, after)
+        return step_summary(self.opened, after)
 
     def make(self, kind: str, effect: str, revision: int) -> dict[str, Any]:
         """Make the step that was proposed, and write the model file; its summary.

@@ -63,12 +63,12 @@ def test_stages_then_the_verdict_then_the_evidence_and_its_buttons(open_tab, tmp
     assert tab.locator(".summary-lines dt").count() <= 11
     assert tab.locator(".stages .now").count() == 0
     first = tab.locator("#diagnosis-outcome details").first
-    told = first.inner_text()
-    assert "ppm/K" in told
-    assert "±" in told
-    assert "plausible" in told
-    assert "rows left out" in told
-    assert "1 time in" in told
+    text = first.inner_text()
+    assert "ppm/K" in text
+    assert "±" in text
+    assert "plausible" in text
+    assert "rows left out" in text
+    assert "1 time in" in text
     assert tab.locator(".effect .said", has_text="named, number").count() == 2
     tab.locator("[data-try=link_elasticity]").click()
     until(tab, "bench.trial && document.querySelector('#card h2').textContent === 'link elasticity'")

@@ -43,8 +43,8 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     until(tab, "document.getElementById('role').classList.contains('armed')")
     tab.locator(".choose button", has_text="two.model.yaml").click()
     assert tab.locator(".choose button[aria-pressed=true]").inner_text() == "two.model.yaml"
-    told = confirmed(tab, "shadow", "run as a shadow")
-    assert told == f"compd shadow {tmp_path}/two.model.yaml --daemon {live.socket}"
+    command = confirmed(tab, "shadow", "run as a shadow")
+    assert command == f"compd shadow {tmp_path}/two.model.yaml --daemon {live.socket}"
     until(tab, "document.querySelectorAll('#budget .bar .shadow').length === 3")
     until(tab, "document.querySelector('.choose').innerText.includes('● shadow')")
 
@@ -54,8 +54,8 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     assert tab.locator("#confirm").is_disabled(), "the shadow's numbers are not this model's"
 
     tab.locator(".choose button", has_text="one.model.yaml").click()  # and nothing is chosen: the shadow's
-    told = confirmed(tab, "adopt", "adopt the shadow\\'s model")
-    assert told == f"compd adopt {tmp_path}/two.model.yaml --daemon {live.socket}"
+    command = confirmed(tab, "adopt", "adopt the shadow\\'s model")
+    assert command == f"compd adopt {tmp_path}/two.model.yaml --daemon {live.socket}"
     until(tab, "Math.abs(Math.abs(compd.live.setpoint.sources_mm?.link_zero?.[0]) - 0.02) < 1e-6")
     until(tab, "compd.slow.status.model.applied.effects[0] === 'link_zero'")
     confirmed(tab, "no-shadow", "end the shadow")

@@ -167,8 +167,8 @@ def test_events_that_the_system_kept_while_the_page_stood_still_are_never_shown_
               const age = new Age();
               source.addEventListener('hello', () => age.begin());
               source.addEventListener('live', (event) => {
-                const told = JSON.parse(event.data);
-                records.push([performance.now() / 1000, told.made, age.arrived(told.made), age.behind_s]);
+                const message = JSON.parse(event.data);
+                records.push([performance.now() / 1000, message.made, age.arrived(message.made), age.behind_s]);
               });
               await new Promise((resolve) => setTimeout(resolve, 1500));
               const until = performance.now() + 1000 * stood_s;

@@ -208,11 +208,11 @@ def test_a_recording_has_no_file_from_outside_and_the_list_leaves_links_out(live
     assert answer.status == 200
     assert "whole.csv" in answer.text
     assert "whole.yaml" not in answer.text
-    told = request(live.address, "GET", "/recordings", own(live, cookie))
-    assert told.status == 200
-    assert '"whole"' in told.text
-    assert '"linked"' not in told.text
-    assert '"nowhere"' not in told.text
+    answer = request(live.address, "GET", "/recordings", own(live, cookie))
+    assert answer.status == 200
+    assert '"whole"' in answer.text
+    assert '"linked"' not in answer.text
+    assert '"nowhere"' not in answer.text
 
 
 @pytest.mark.parametrize("target", ["/arm", "/orders/zero", "/orders/accept", "/recordings"])
@@ -265,9 +265,9 @@ def test_another_address_without_tokens_does_not_start():
     words = [sys.executable, "-m", "compd", "page", "/no/socket", "--listen", "0.0.0.0", "--port", "0"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 2
-    told = " ".join(ended.stderr.split())
-    assert "--tokens" in told
-    assert "TLS" in told
+    message = " ".join(ended.stderr.split())
+    assert "--tokens" in message
+    assert "TLS" in message
     assert "open http" not in ended.stdout
 
 

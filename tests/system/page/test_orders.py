@@ -99,10 +99,10 @@ def asked(tab, order, numbers=""):
         with tab.expect_response(lambda answer: f"/orders/{order}" in answer.url):
             tab.locator(f"#order-{order}").click()
         tab.wait_for_selector("#confirm")
-        told = tab.locator(".consequence").inner_text()
-        if re.search(numbers, told):
-            return told
-    raise AssertionError(told)
+        text = tab.locator(".consequence").inner_text()
+        if re.search(numbers, text):
+            return text
+    raise AssertionError(text)
 
 
 def arm(tab):
@@ -148,9 +148,9 @@ def choose(tab, file):
 
 def test_zero(tab, live, daemon):
     before = daemon.status()["zero"]["taken_at"]
-    told = asked(tab, "zero")
-    assert "21 gauges" in told
-    assert f"The zero of {before} is kept" in told
+    text = asked(tab, "zero")
+    assert "21 gauges" in text
+    assert f"The zero of {before} is kept" in text
     assert f"compd zero {live.socket}" in tab.locator(".consequence code").inner_text()
     refuses_unless_armed(tab, "zero")
     assert daemon.status()["zero"]["taken_at"] == before
@@ -189,14 +189,14 @@ def test_accept(tab, live, daemon, back_afterwards, by):
     live.machine.ask("FAULT", line="scale_2", fault=None)
     until(tab, "compd.slow.status?.gauges.some((gauge) => gauge.quality === 'distrusted')")
     if by == "order":
-        told = asked(tab, "accept")
+        text = asked(tab, "accept")
     else:
         tab.locator("#gauge-table tr.bad button").first.click()
         tab.wait_for_selector("#confirm")
-        told = tab.locator(".consequence").inner_text()
-    assert re.search(r"scale 2.*0\.3\d* mm", told), told
+        text = tab.locator(".consequence").inner_text()
+    assert re.search(r"scale 2.*0\.3\d* mm", text), text
     subject = "all" if by == "order" else "scale_2.position"
-    assert f"compd accept {subject} --daemon {live.socket}" in told
+    assert f"compd accept {subject} --daemon {live.socket}" in text
     refuses_unless_armed(tab, "accept", subject)
     assert distrusted(daemon) == ["scale_2.position"]
     arm(tab)
@@ -217,9 +217,9 @@ def test_shadow(tab, live, daemon, model):
     assert "shadow" not in daemon.model()
     arm(tab)
     assert given(tab, "shadow") == "Done: run as a shadow."
-    told = daemon.model()
-    assert told["shadow"]["effects"] == ["link_expansion"]
-    assert told["applied"]["effects"] == []
+    model = daemon.model()
+    assert model["shadow"]["effects"] == ["link_expansion"]
+    assert model["applied"]["effects"] == []
     until(tab, "document.querySelector('.strip small').textContent.includes('shadow')")
 
 
@@ -256,8 +256,8 @@ def test_only_the_model_whose_change_was_told_is_adopted(tab, live, daemon, mode
 def test_no_model(tab, live, daemon, model):
     daemon.model(str(model))
     until(tab, "compd.live.setpoint?.sources_mm?.link_expansion")
-    told = asked(tab, "no-model", r"changes by [+-]\d+\.\d µm at link [123]")
-    assert f"compd adopt --none --daemon {live.socket}" in told
+    text = asked(tab, "no-model", r"changes by [+-]\d+\.\d µm at link [123]")
+    assert f"compd adopt --none --daemon {live.socket}" in text
     refuses_unless_armed(tab, "no-model")
     assert daemon.model()["applied"]["effects"] == ["link_expansion"]
     arm(tab)

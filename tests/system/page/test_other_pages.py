@@ -20,11 +20,11 @@ def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(c
         until(tab, "document.getElementById('role').textContent === 'view only'")
         tab.keyboard.press("o")
         until(tab, "document.getElementById('arm').disabled")
-        told = tab.evaluate(
+        answer = tab.evaluate(
             "Promise.all([['arm', {id: compd.id}], ['orders/zero', {id: compd.id}], ['recordings', {name: 'a'}]].map("
             "([path, keys]) => fetch(path, {method: 'POST', body: JSON.stringify(keys)}).then((r) => r.status)))"
         )
-        assert told == [403, 403, 403]
+        assert answer == [403, 403, 403]
         tab.keyboard.press("Escape")
         with connect(page.socket) as daemon:
             processes = daemon.status()["processes"]

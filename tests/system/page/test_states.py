@@ -45,16 +45,16 @@ CONTRASTS = """() => {
   const plain = numbers(style.backgroundColor).slice(0, 3);
   const hatching = style.backgroundImage.match(/rgba?\\([^)]*\\)/g) ?? [];
   const stripes = hatching.map((colour) => over(numbers(colour), plain));
-  const told = {};
+  const contrasts = {};
   for (const part of banner.querySelectorAll('*')) {
     const own = [...part.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
     if (!own || !part.getClientRects().length) continue;
     const above = numbers(getComputedStyle(part).backgroundColor);
     const grounds = [plain, ...stripes].map((ground) => over(above, ground));
     const ink = numbers(getComputedStyle(part).color).slice(0, 3);
-    told[part.id || part.tagName] = Math.min(...grounds.map((ground) => ratio(ink, ground)));
+    contrasts[part.id || part.tagName] = Math.min(...grounds.map((ground) => ratio(ink, ground)));
   }
-  return told;
+  return contrasts;
 }"""
 # What is wider than its place, or reaches over the banner's or the window's edge.
 CUT_OFF = """() => {

@@ -94,9 +94,9 @@ def test_unknown_traffic_has_no_rate_and_says_so() -> None:
 
 def test_a_line_whose_replies_do_not_say_whose_they_are_is_listened_to_after_each_round() -> None:
     nine = {f"g{i}": [(3, 10)] for i in range(9)}
-    told, not_told = (budget_of_line("x", rtu(9600), nine, tells_whose=tells) for tells in (True, False))
-    exchange_s = told.usual_s / 9
-    assert not_told.usual_s == pytest.approx(told.usual_s + 1.25 * exchange_s + 2e-3)
+    known, unknown = (budget_of_line("x", rtu(9600), nine, tells_whose=tells) for tells in (True, False))
+    exchange_s = known.usual_s / 9
+    assert unknown.usual_s == pytest.approx(known.usual_s + 1.25 * exchange_s + 2e-3)
 
 
 def warning_text(budget: LineBudget, stale_after_s: float) -> str:

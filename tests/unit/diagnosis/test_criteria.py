@@ -49,7 +49,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
     return record_external(path, columns, {"x": error_um}, model_mm={"x": position})
 
 
-def told(stage: AlignedRecording, **changed: float) -> dict[str, Any]:
+def criteria(stage: AlignedRecording, **changed: float) -> dict[str, Any]:
     """What a diagnosis with a changed threshold says."""
     diagnosis = diagnose(stage, (), None, [PLAY], criteria=replace(Criteria(), **changed))
     return {
@@ -62,7 +62,7 @@ def told(stage: AlignedRecording, **changed: float) -> dict[str, Any]:
 
 
 def test_the_customary_thresholds_find_play_room_and_one_gross_row(stage: AlignedRecording) -> None:
-    result = told(stage)
+    result = criteria(stage)
     assert (result["verdict"], result["steps"]) == ("partial", ["play"])
     assert result["follows"][0] == "temperature_room_degC"
     assert result["gross"] == (79,)
@@ -84,7 +84,7 @@ def test_the_customary_thresholds_find_play_room_and_one_gross_row(stage: Aligne
 def test_a_changed_threshold_changes_what_is_said(
     stage: AlignedRecording, changed: dict[str, float], said: dict[str, Any]
 ) -> None:
-    result = told(stage, **changed)
+    result = criteria(stage, **changed)
     assert {key: result[key] for key in said} == said
 
 

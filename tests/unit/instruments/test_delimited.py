@@ -77,9 +77,9 @@ def test_marks_of_thousands_are_read_once_a_person_says_which_mark_is_decimal(tm
     ],
 )
 def test_odd_rows_are_refused_with_their_line(tmp_path: Path, content: str, wanted: list[str]) -> None:
-    told = refused(tmp_path, content)
+    message = refused(tmp_path, content)
     for part in wanted:
-        assert part in told
+        assert part in message
 
 
 def test_the_same_header_again_is_skipped_and_counted(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def test_a_question_leaves_the_table_and_what_is_known_of_it(tmp_path: Path) -> 
     assert "no unit of x" in str(preview.problems[0])
     assert list(preview.roles) == ["time", "x", "y", "z"]
     assert preview.rows[1][3] == "6.5"
-    assert preview.told["delimiter"] == "comma"
+    assert preview.assumed["delimiter"] == "comma"
 
 
 def test_lines_that_are_no_table_are_shown_as_they_are(tmp_path: Path) -> None:

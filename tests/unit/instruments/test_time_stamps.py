@@ -19,7 +19,7 @@ def stamped(*stamps: str, delimiter: str = ";") -> str:
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "told"),
+    ("first", "second", "assumed"),
     [
         ("2025-02-12T16:56:08.25", "2025-02-13T16:56:08.50", "year-month-day"),
         ("2025-02-12 16:56:08,25", "2025-02-13 16:56:08,50", "year-month-day"),
@@ -33,12 +33,12 @@ def stamped(*stamps: str, delimiter: str = ";") -> str:
         ("31/12/2025 16:56:08.25", "01/01/2026 16:56:08.5", "day-month-year"),
     ],
 )
-def test_two_days_in_every_dress(tmp_path: Path, first: str, second: str, told: str) -> None:
+def test_two_days_in_every_dress(tmp_path: Path, first: str, second: str, assumed: str) -> None:
     export = read(tmp_path, stamped(first, second))
     assert export.time_s is not None
     np.testing.assert_allclose(export.time_s, [AT_S, AT_S + 86400.25], atol=1e-6)
     assert export.time_std_s == 0.0
-    assert told in export.taken["time"]
+    assert assumed in export.taken["time"]
 
 
 def test_the_order_of_day_and_month_is_asked_where_it_matters(tmp_path: Path) -> None:

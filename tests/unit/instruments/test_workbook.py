@@ -67,20 +67,20 @@ def test_numbers_are_exact_and_lines_are_rows_of_the_sheet(tmp_path: Path) -> No
         ["-2", "0.30000000000000004", "4"],
     ]
     assert (table.decimal, table.unit) == (".", "")
-    assert table.told["sheet"] == "'One'"
+    assert table.assumed["sheet"] == "'One'"
 
 
 def test_titles_above_the_header_are_skipped_and_told(tmp_path: Path) -> None:
     above = (["Measured in hall 3"], ["operator", "A. Person"], ["temperature", 20.1, "degC"], [])
     table = read(book(tmp_path, (*above, *LIST)))
     assert (table.header_line, table.line.tolist()) == (5, [6, 7, 8])
-    assert table.told["above the list"] == "rows 1 to 3, not read: 'Measured in hall 3' ..."
+    assert table.assumed["above the list"] == "rows 1 to 3, not read: 'Measured in hall 3' ..."
 
 
 def test_a_row_of_units_belongs_to_the_names(tmp_path: Path) -> None:
     table = read(book(tmp_path, (("t", "X", "Y"), ("s", "[mm]", "\u00b5m"), (0.0, 1.0, 2.0), (1.0, 1.0, 2.0))))
     assert table.header == ("t [s]", "X [mm]", "Y [um]")
-    assert table.told["units"] == "row 2, below the names"
+    assert table.assumed["units"] == "row 2, below the names"
     assert table.line.tolist() == [3, 4]
 
 
@@ -120,7 +120,7 @@ def test_dates_become_iso_text(tmp_path: Path) -> None:
         "25:00:01.500",
         "0.5",
     ]
-    assert "dates" in table.told
+    assert "dates" in table.assumed
 
 
 def test_several_sheets_with_numbers_are_asked_for(tmp_path: Path) -> None:
@@ -129,10 +129,10 @@ def test_several_sheets_with_numbers_are_asked_for(tmp_path: Path) -> None:
     assert "2 sheets hold numbers\n    value: One, Three" in text
     assert "--sheet" in text
     assert read(path, sheet="Three").line.tolist() == [2, 3]
-    assert read(path, sheet="Three").told["sheet"] == "'Three', of 3"
+    assert read(path, sheet="Three").assumed["sheet"] == "'Three', of 3"
     assert "has no such sheet\n    value: Four\n    allowed: One, Two, Three" in refused(path, sheet="Four")
     assert "holds no number" in refused(path, sheet="Two")
-    assert read(book(tmp_path, LIST, (("only text",),))).told["sheet"] == "'One', of 2"
+    assert read(book(tmp_path, LIST, (("only text",),))).assumed["sheet"] == "'One', of 2"
     assert "no sheet holds a number" in refused(book(tmp_path, (("only text",),)))
 
 

@@ -199,9 +199,9 @@ def test_replies_with_an_address_need_no_silence_at_the_end_of_a_round() -> None
             (piece,) = super().answer(request, heard_s, timeout_s)
             return [piece._replace(data=request[:2] + piece.data)]
 
-    told, not_told = Run(Addressed(), addressed, 60.0), Run(Comparators(), NINE, 60.0)
-    assert told.wrong() == not_told.wrong() == []
-    assert 5 / 6 * told.good() < not_told.good() < told.good()
+    known, unknown = Run(Addressed(), addressed, 60.0), Run(Comparators(), NINE, 60.0)
+    assert known.wrong() == unknown.wrong() == []
+    assert 5 / 6 * known.good() < unknown.good() < known.good()
 
 
 @pytest.mark.parametrize("late_s", np.linspace(0.4, 3.0, 14).tolist())

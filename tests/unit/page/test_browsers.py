@@ -40,12 +40,12 @@ def test_everybody_sees_who_is_there_and_armed_and_nobody_another_ones_id(clock)
     anna, screen = browsers.connect("Anna", "10.0.0.1", "operate"), browsers.connect("screen", "10.0.0.2", "view")
     browsers.arm(anna.id)
     clock.now_s += 20.0
-    told = browsers.summary()
-    assert [(browser["name"], browser["armed_s"], browser["connected_s"]) for browser in told] == [
+    answer = browsers.summary()
+    assert [(browser["name"], browser["armed_s"], browser["connected_s"]) for browser in answer] == [
         ("Anna", 40.0, 20.0),
         ("screen", 0.0, 20.0),
     ]
-    assert anna.id not in str(told)
+    assert anna.id not in str(answer)
     browsers.disarm(anna.id)
     assert browsers.armed(anna.id) is None
     assert screen.id != anna.id

@@ -27,11 +27,11 @@ def test_then_of_the_last_hour():
     counts = FaultCounts()
     for second in range(3 * 3600):
         counts.note(float(second), status(scale_1=second // 10))
-    told = counts.summary()
-    assert told["hour"]
-    assert told["total"]["scale_1"] == 1079
-    assert 360 <= told["recent"]["scale_1"] <= 366
-    assert 3540.0 <= 3 * 3600 - told["since_s"] <= 3660.0
+    answer = counts.summary()
+    assert answer["hour"]
+    assert answer["total"]["scale_1"] == 1079
+    assert 360 <= answer["recent"]["scale_1"] <= 366
+    assert 3540.0 <= 3 * 3600 - answer["since_s"] <= 3660.0
 
 
 def test_a_daemon_that_has_started_anew_begins_at_nothing():

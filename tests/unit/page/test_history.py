@@ -68,9 +68,9 @@ def test_the_minute_of_a_gauge_before_a_moment():
     for k in range(20 * 100):
         traces.note(k / 20, [{"value": 400.0 + 1e-7 * (k // 20)}, {"fault": "timeout"}])
     traces.note(100.0, [])
-    told = traces.minute(80.0)
-    assert len(told["times_s"]) == 60
-    assert told["times_s"][-1] == 80.0
-    assert told["values"][0][-1] == 400.000008, "to a tenth of a nanometre"
-    assert told["values"][1] == [None] * 60
+    answer = traces.minute(80.0)
+    assert len(answer["times_s"]) == 60
+    assert answer["times_s"][-1] == 80.0
+    assert answer["values"][0][-1] == 400.000008, "to a tenth of a nanometre"
+    assert answer["values"][1] == [None] * 60
     assert traces.minute(1e6)["times_s"] == []

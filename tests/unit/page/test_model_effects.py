@@ -26,10 +26,12 @@ def noted(*budgets, models=WITH_SHADOW):
 
 
 def test_it_is_the_root_mean_square_of_each_axis():
-    told = noted(budget(1.0, [0.0, 0.0, 3.0], [1.5, 1.0, 4.0]), budget(2.0, [0.0, 0.0, 4.0], [4.5, 1.0, 5.0])).summary()
-    assert told["seconds"] == 1.0
-    assert told["applied_um"] == pytest.approx([0.0, 0.0, 12.5**0.5], abs=1e-4)
-    assert told["beyond_um"] == pytest.approx([4.5**0.5, 0.0, 0.0], abs=1e-4)
+    errors = noted(
+        budget(1.0, [0.0, 0.0, 3.0], [1.5, 1.0, 4.0]), budget(2.0, [0.0, 0.0, 4.0], [4.5, 1.0, 5.0])
+    ).summary()
+    assert errors["seconds"] == 1.0
+    assert errors["applied_um"] == pytest.approx([0.0, 0.0, 12.5**0.5], abs=1e-4)
+    assert errors["beyond_um"] == pytest.approx([4.5**0.5, 0.0, 0.0], abs=1e-4)
 
 
 def test_the_same_budget_counts_once_and_an_old_one_no_more():

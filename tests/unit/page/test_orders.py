@@ -31,12 +31,12 @@ def link():
 
 
 def test_zero_names_the_gauges_the_old_zero_and_what_becomes_of_the_correction(link):
-    told = Orders(link).consequence("zero", "")
-    assert told.possible
-    assert "21 gauges" in told.text
-    assert "02:06" in told.text
-    assert "up to 10.0 µm" in told.text
-    assert told.command == "compd zero /run/compd/compd.sock"
+    consequence = Orders(link).consequence("zero", "")
+    assert consequence.possible
+    assert "21 gauges" in consequence.text
+    assert "02:06" in consequence.text
+    assert "up to 10.0 µm" in consequence.text
+    assert consequence.command == "compd zero /run/compd/compd.sock"
 
 
 def test_accept_names_the_gauges_that_wait_and_why(link):
@@ -50,10 +50,10 @@ def test_accept_names_the_gauges_that_wait_and_why(link):
         },
         {"channel": "scale_2.position", "quality": "ok", "measures": "scale 2"},
     ]
-    told = Orders(link).consequence("accept", "all")
-    assert told.possible
-    assert "scale 1: came back 5.000 mm away" in told.text
-    assert "scale 2" not in told.text
+    consequence = Orders(link).consequence("accept", "all")
+    assert consequence.possible
+    assert "scale 1: came back 5.000 mm away" in consequence.text
+    assert "scale 2" not in consequence.text
     assert Orders(link).consequence("accept", "scale_1").possible
     assert not Orders(link).consequence("accept", "scale_2").possible
 
@@ -63,40 +63,40 @@ def test_a_model_is_adopted_when_its_shadow_has_told_the_change(link):
     link.models = {"applied": {"effects": []}, "shadow": {"effects": ["backlash"], "file": "/a.yaml"}}
     assert not Orders(link).consequence("adopt", "/a.yaml").possible, "it has no numbers yet"
     link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
-    told = Orders(link).consequence("adopt", "")
-    assert told.possible
-    assert told.subject == "/a.yaml", "without a name it is the shadow's, and never none"
-    assert told.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
-    assert "-10.0 µm at link 1" in told.text
-    assert "0.0 s" in told.text
+    consequence = Orders(link).consequence("adopt", "")
+    assert consequence.possible
+    assert consequence.subject == "/a.yaml", "without a name it is the shadow's, and never none"
+    assert consequence.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
+    assert "-10.0 µm at link 1" in consequence.text
+    assert "0.0 s" in consequence.text
 
 
 def test_no_model_is_adopted_but_the_one_whose_change_is_told(link):
     """The numbers are the shadow's: another file has others."""
     link.models = {"applied": {"effects": []}, "shadow": {"file": "/a.yaml"}}
     link.readings["setpoint"] = SETPOINT | {"shadow": {"correction_mm": [0.0, -0.002, 0.003]}}
-    told = Orders(link).consequence("adopt", "/b.yaml")
-    assert not told.possible
-    assert "/a.yaml runs as a shadow, not /b.yaml" in told.text
+    consequence = Orders(link).consequence("adopt", "/b.yaml")
+    assert not consequence.possible
+    assert "/a.yaml runs as a shadow, not /b.yaml" in consequence.text
 
 
 def test_without_effects_the_correction_loses_theirs(link):
-    told = Orders(link).consequence("no-model", "")
-    assert "-5.0 µm at link 1" in told.text
-    assert told.command == "compd adopt --none --daemon /run/compd/compd.sock"
+    consequence = Orders(link).consequence("no-model", "")
+    assert "-5.0 µm at link 1" in consequence.text
+    assert consequence.command == "compd adopt --none --daemon /run/compd/compd.sock"
     link.readings = {"setpoint": {"valid": False}}
-    told = Orders(link).consequence("no-model", "")
-    assert told.possible
-    assert "not known" in told.text
+    consequence = Orders(link).consequence("no-model", "")
+    assert consequence.possible
+    assert "not known" in consequence.text
 
 
 def test_a_model_file_is_chosen_by_its_name_or_named_by_its_absolute_path(link, tmp_path):
     (tmp_path / "a model's.model.yaml").touch()
     orders = Orders(link, ModelFiles(tmp_path))
-    told = orders.consequence("shadow", "a model's.model.yaml")
-    assert told.possible
-    assert told.subject == str(tmp_path / "a model's.model.yaml")
-    assert "'" in told.command, "quoted for the shell"
+    consequence = orders.consequence("shadow", "a model's.model.yaml")
+    assert consequence.possible
+    assert consequence.subject == str(tmp_path / "a model's.model.yaml")
+    assert "'" in consequence.command, "quoted for the shell"
     elsewhere = orders.consequence("shadow", "/elsewhere/b.yaml")
     assert (elsewhere.possible, elsewhere.subject) == (True, "/elsewhere/b.yaml"), "the daemon looks, the page does not"
 
@@ -119,6 +119,6 @@ def test_no_other_name_reaches_the_daemon(link, tmp_path, subject):
 def test_without_the_daemon_nothing_is_possible(link):
     link.connected, link.reason = False, "it closed the connection"
     for name in ("zero", "accept", "shadow", "adopt", "no-model"):
-        told = Orders(link).consequence(name, "all")
-        assert not told.possible
-        assert "closed" in told.text
+        consequence = Orders(link).consequence(name, "all")
+        assert not consequence.possible
+        assert "closed" in consequence.text

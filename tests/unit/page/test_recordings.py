@@ -13,9 +13,9 @@ def test_of_two_that_ask_at_once_one_records(tmp_path):
     recordings = Recordings(tmp_path, "/no/socket")
 
     async def both():
-        told = await asyncio.gather(recordings.start("a", None), recordings.start("b", None))
+        answer = await asyncio.gather(recordings.start("a", None), recordings.start("b", None))
         await recordings.stop()
-        return told
+        return answer
 
     assert asyncio.run(both()) == ["", "a is being recorded already"]
 

@@ -70,9 +70,9 @@ def test_orders_of_a_browser_that_is_not_there_or_not_armed_are_refused(open_pag
 
 
 def test_without_a_daemon_an_order_says_so(open_page):
-    told = open_page("view").get("/orders/zero").json()
-    assert not told["possible"]
-    assert "not there" in told["text"]
+    answer = open_page("view").get("/orders/zero").json()
+    assert not answer["possible"]
+    assert "not there" in answer["text"]
 
 
 @pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "x" * 65, "a b", "-option"])
@@ -110,18 +110,18 @@ def test_the_history_can_be_read_back():
     for k in range(300):
         history.note(100.0 + k / 10, setpoint, None)
     header, _, data = packed(history).partition(b"\n")
-    told = json.loads(header)
+    answer = json.loads(header)
     start = 0
-    for table in told["tables"]:
+    for table in answer["tables"]:
         times = np.frombuffer(data, "<f8", table["rows"], start)
         start += 8 * table["rows"]
-        count = table["rows"] * len(told["columns"])
+        count = table["rows"] * len(answer["columns"])
         rows = np.frombuffer(data, "<f4", count, start).reshape(table["rows"], -1)
         start += 4 * count
         assert times[0] == 100.0
         assert rows[-1, 1] == 1.0
     assert start == len(data)
-    assert [table["rows"] for table in told["tables"]] == [30, 300]
+    assert [table["rows"] for table in answer["tables"]] == [30, 300]
 
 
 def test_a_task_that_has_missed_a_cancellation_ends_too():

@@ -37,14 +37,14 @@ export class Reading {
     this.showTable(table);
     if (!table) return;
     const { shape, unit, angle_unit, decimal, dates, rate_hz, group, sheet } = this.fields;
-    const { told } = table;
-    const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(told.x ?? told.y ?? told.z ?? told.length ?? "");
+    const { assumed } = table;
+    const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
     shape.found(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
     unit.found(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
     angle_unit.found("as the file says");
-    decimal.found(told["decimal mark"] && !choices.decimal ? `as found: ${told["decimal mark"]}` : "as found");
-    const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(told.time ?? "");
+    decimal.found(assumed["decimal mark"] && !choices.decimal ? `as found: ${assumed["decimal mark"]}` : "as found");
+    const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(assumed.time ?? "");
     dates.found(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
     rate_hz.offer(!table.roles.includes("time"));
     group.offer(table.groups.length > 1 || choices.group != null);
@@ -55,7 +55,7 @@ export class Reading {
 
   showTaken(table) {
     const left = Object.entries(table?.left_out ?? {}).map(([reason, count]) => [`${count} rows not used`, reason]);
-    this.taken.replaceChildren(...[...Object.entries(table?.told ?? {}), ...left].flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
+    this.taken.replaceChildren(...[...Object.entries(table?.assumed ?? {}), ...left].flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
   }
 
   showTable(table) {

@@ -10,9 +10,9 @@ export class Wizard extends Session {
 
   // An order to the server with all that is chosen. Throws its reason.
   async ask(path) {
-    const told = await post(`join/${path}`, this.choices);
-    if (!told.ok) throw new Error(told.reason ?? "the page's server does not answer");
-    return told;
+    const answer = await post(`join/${path}`, this.choices);
+    if (!answer.ok) throw new Error(answer.reason ?? "the page's server does not answer");
+    return answer;
   }
 
   async list() {
@@ -29,9 +29,9 @@ export class Wizard extends Session {
     const asked = ++this.asked;
     this.show();
     if (!this.choices.export) return;
-    const told = await this.attempt(() => this.ask("table"));
+    const answer = await this.attempt(() => this.ask("table"));
     if (asked !== this.asked) return; // somebody has gone on choosing
-    Object.assign(this, told ? { table: told, command: told.command } : { command: "" });
+    Object.assign(this, answer ? { table: answer, command: answer.command } : { command: "" });
     this.show();
   }
 
@@ -48,10 +48,10 @@ export class Wizard extends Session {
   async bring(file) {
     if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB may be brought.`);
     const response = await fetch(`join/exports?${new URLSearchParams({ name: file.name })}`, { method: "POST", headers: { "Content-Type": "application/octet-stream" }, body: file });
-    const told = await response.json().catch(() => ({}));
-    if (!response.ok) throw new Error(told.reason ?? `${file.name} could not be brought`);
+    const answer = await response.json().catch(() => ({}));
+    if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be brought`);
     await this.list();
-    await this.choose(told.name);
+    await this.choose(answer.name);
   }
 
   // Another export begins with nothing said about its columns.

@@ -15,7 +15,7 @@ export class Writing {
     this.button.disabled = !sources?.may_write || !choices.name || !trial || Boolean(trial.reason);
     this.note.textContent = !sources || sources.may_write ? (trial && !trial.reason ? "Give a name, and write it." : "Try it first.") : "This browser may look only; the command line does the same.";
     if (this.written !== JSON.stringify(choices)) this.link.hidden = true;
-    else this.note.textContent = this.told;
+    else this.note.textContent = this.message;
   }
 
   write() {
@@ -25,7 +25,7 @@ export class Writing {
     return wizard.attempt(async () => {
       try {
         const { recording, path } = await wizard.ask("recording");
-        Object.assign(this, { written: chosen, told: `Written: ${path}` });
+        Object.assign(this, { written: chosen, message: `Written: ${path}` });
         this.link.href = `/workbench?recording=${recording}`;
         this.link.hidden = false;
       } finally {

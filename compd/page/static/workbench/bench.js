@@ -12,9 +12,9 @@ export class Bench extends Session {
   // JSON of the open recording. Throws the server's reason.
   async get(path) {
     const response = await fetch(`workbench/${this.key}/${path}`);
-    const told = await response.json();
-    if (!response.ok) throw new Error(told.reason);
-    return told;
+    const answer = await response.json();
+    if (!response.ok) throw new Error(answer.reason);
+    return answer;
   }
 
   arrays(path) {
@@ -23,9 +23,9 @@ export class Bench extends Session {
 
   // An order for the open recording. Throws the server's reason.
   async post(path, keys) {
-    const told = await post(`workbench/${this.key}/${path}`, keys);
-    if (!told.ok) throw new Error(told.reason);
-    return told;
+    const answer = await post(`workbench/${this.key}/${path}`, keys);
+    if (!answer.ok) throw new Error(answer.reason);
+    return answer;
   }
 
   // A change of the model or of the rows, which the server refuses where somebody else was quicker.
@@ -36,10 +36,10 @@ export class Bench extends Session {
   // libraries: names of files of effects that are tried, too
   async open(recording, model, libraries) {
     this.say("opening …");
-    const told = await post("workbench/open", { recording, model, libraries });
-    if (!told.ok) throw new Error(told.reason);
-    this.key = told.key;
-    await this.show(told);
+    const answer = await post("workbench/open", { recording, model, libraries });
+    if (!answer.ok) throw new Error(answer.reason);
+    this.key = answer.key;
+    await this.show(answer);
   }
 
   // Another state of what is open: every panel begins anew.

@@ -58,24 +58,24 @@ export class Card {
   // command: that adds the effect, as a command line
   show(command) {
     const { card } = this;
-    const told = card.variants[0];
+    const variant = card.variants[0];
     const button = (text, act, id) => element("button", { type: "button", id, onclick: act }, text);
     this.left_out = element("p", { class: "note", id: "left-out" });
     this.signature = new Signature();
     this.proposal = new Proposal();
-    this.sliders = told ? card.numbers.map((number, k) => new NumberSlider(number, { theta: told.theta[k], standard_error: told.standard_error[k] }, (theta) => this.set(k, theta))) : [];
+    this.sliders = variant ? card.numbers.map((number, k) => new NumberSlider(number, { theta: variant.theta[k], standard_error: variant.standard_error[k] }, (theta) => this.set(k, theta))) : [];
     const constants = card.constants.length && card.variants.length > 1 ? [new ConstantSlider(card, 0, (variant) => this.bench.attempt(() => this.turnTo(variant))).row] : [];
     this.place.replaceChildren(
       element("h2", {}, words(card.effect)),
       element("p", {}, card.physics),
       element("p", { class: "equation" }, card.equation),
       ...Object.entries(card.symbols).map(([symbol, meaning]) => element("p", { class: "note" }, `${symbol}: ${meaning}`)),
-      ...(told
+      ...(variant
         ? [...this.sliders.map(({ row }) => row), ...constants, this.left_out, element("div", { class: "row" }, button("Fit (0)", () => this.fit(), "fit"), button("Add (a) …", () => this.add(), "add")), new CommandLine(command).row]
         : [element("p", { class: "note" }, `Not testable on this recording: ${card.why_not}`)]),
       this.proposal.place,
       ...this.rivals(),
-      ...(told ? [this.signature.place] : []),
+      ...(variant ? [this.signature.place] : []),
       element("p", { class: "note" }, `Source: ${card.source}`),
     );
   }

@@ -53,9 +53,9 @@ export class Diagnosis {
     const turn = ++this.turn;
     clearTimeout(this.looking);
     try {
-      const told = await this.bench.get(`diagnosis?shown=${this.shown}`);
+      const job = await this.bench.get(`diagnosis?shown=${this.shown}`);
       if (turn !== this.turn) return;
-      this.show(told);
+      this.show(job);
     } catch {
       // the page's server is away, or has begun anew: what needs it says so
       if (turn !== this.turn) return;
@@ -63,19 +63,19 @@ export class Diagnosis {
     this.looking = setTimeout(() => this.look(), this.running ? LOOK_EVERY_MS : LOOK_AT_REST_MS);
   }
 
-  show(told) {
-    const { id, state, seconds, behind } = told;
+  show(job) {
+    const { id, state, seconds, behind } = job;
     this.running = state === "running";
     this.button.textContent = this.running ? `Cancel, ${seconds.toFixed(0)} s` : "Diagnose (d)";
     if (state === "none") return;
     if (this.running) this.clear();
-    this.tellStages(told);
+    this.tellStages(job);
     this.said.textContent = { cancelled: `cancelled after ${seconds.toFixed(1)} s`, failed: "it failed:", done: `done in ${seconds.toFixed(1)} s` }[state] ?? "";
     this.behind.textContent = behind && !this.running ? `Of the model before the last ${behind === 1 ? "step" : `${behind} steps`}: what is there now is not diagnosed yet.` : "";
-    if (told.evidence && !this.running && id !== this.shown) this.showOutcome(told);
+    if (job.evidence && !this.running && id !== this.shown) this.showOutcome(job);
     if (state === "done") {
       this.act.named?.(behind ? null : this.result);
-      this.tellPage(told.page);
+      this.tellPage(job.page);
     }
   }
 
@@ -105,7 +105,7 @@ export class Diagnosis {
   // page: true, false where it could not be drawn, null while it may still come
   tellPage(page) {
     const link = () => element("a", { href: `workbench/${this.bench.key}/diagnosis/page`, target: "_blank", rel: "noopener" }, "Open the page with pictures in a new tab");
-    const told = { true: link, false: () => "Its pictures could not be drawn; the command line with --html tells why.", null: () => "The page with pictures is being drawn …" }[page]();
-    if (this.page.firstChild?.textContent !== (told.textContent ?? told)) this.page.replaceChildren(told);
+    const content = { true: link, false: () => "Its pictures could not be drawn; the command line with --html tells why.", null: () => "The page with pictures is being drawn …" }[page]();
+    if (this.page.firstChild?.textContent !== (content.textContent ?? content)) this.page.replaceChildren(content);
   }
 }

@@ -13,9 +13,9 @@ export class Effects {
     this.draw();
     this.note.textContent = "what each effect would do …";
     this.unit = bench.summary.unit;
-    const told = await bench.get("effects");
-    this.effects = told.effects;
-    this.ranked(told);
+    const ranking = await bench.get("effects");
+    this.effects = ranking.effects;
+    this.ranked(ranking);
     this.draw();
   }
 
@@ -62,7 +62,7 @@ export class Effects {
   draw() {
     const shown = this.shown;
     this.note.textContent = `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
-    this.place.replaceChildren(...shown.map((told) => this.row(told)));
+    this.place.replaceChildren(...shown.map((effect) => this.row(effect)));
   }
 
   row({ effect, status, why, explained, left_out_rms, own, said = this.said[effect] }) {

@@ -8,8 +8,8 @@ const plain = (name) => name.replaceAll("_", " ");
 const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
 
 // act: what the buttons do, {choose(effect), add(effect), plan(effects), formula(formula)}; without one there is no button.
-export function evidence(told, act) {
-  const { effects, follows, formulas, constant, gross, tried, without_gain, untested, next } = told;
+export function evidence(diagnosis, act) {
+  const { effects, follows, formulas, constant, gross, tried, without_gain, untested, next } = diagnosis;
   const all = [
     ...effects.map((effect, k) => folded(`${k + 1}. ${plain(effect.effect)}`, effectParts(effect, act), true)),
     follows && folded("What the rest follows: descriptions, no causes; on rows left out", [table(follows), ...formulas.map((formula) => formulaPart(formula, act))], !effects.length),

@@ -7,7 +7,7 @@ const MOST_TOLD = 12;
 export class Exclusions {
   constructor(place, selection) {
     Object.assign(this, { place, selection });
-    this.reason = element("input", { type: "text", placeholder: "why, for example: the beam was cut", "aria-label": "Why these rows are left out", oninput: () => this.told() });
+    this.reason = element("input", { type: "text", placeholder: "why, for example: the beam was cut", "aria-label": "Why these rows are left out", oninput: () => this.writeCommand() });
     this.command = new CommandLine();
     this.chosen = element("div", { id: "chosen" });
     this.left_out = element("div", { id: "left-out-rows" });
@@ -35,10 +35,10 @@ export class Exclusions {
       element("div", { class: "row" }, this.reason, this.button, element("button", { type: "button", onclick: () => this.selection.set([]) }, "Choose none (Esc)")),
       this.command.row,
     );
-    this.told();
+    this.writeCommand();
   }
 
-  told() {
+  writeCommand() {
     this.button.disabled = !this.reason.value.trim();
     const quoted = `'${this.reason.value.trim().replaceAll("'", "'\\''")}'`;
     this.command.write(this.button.disabled ? "" : this.bench.summary.commands.exclude.replace("ROWS", rowsText(this.rows)).replace("REASON", () => quoted));

@@ -165,13 +165,13 @@ export class Formula {
       this.effects.write(null);
       return;
     }
-    const told = await this.bench.post("formula", { declaration: this.declaration });
+    const answer = await this.bench.post("formula", { declaration: this.declaration });
     if (asked !== this.asked) return; // an older answer than what stands there
-    if (this.takeNames(told.missing)) return this.check(trying);
-    this.show(told.problems);
-    this.right = told.right;
-    this.effects.write(told.draft ?? null);
-    if (trying && told.draft && told.draft.effect !== this.card.card?.asked) await this.choose(told.draft.effect);
+    if (this.takeNames(answer.missing)) return this.check(trying);
+    this.show(answer.problems);
+    this.right = answer.right;
+    this.effects.write(answer.draft ?? null);
+    if (trying && answer.draft && answer.draft.effect !== this.card.card?.asked) await this.choose(answer.draft.effect);
   }
 
   async choose(name) {
@@ -219,9 +219,9 @@ export class Formula {
     this.confirm.replaceChildren();
     if (!replace && this.offer.saved.some(({ id }) => id === declaration.id)) return this.ask(`${declaration.id} is in the file already.`, "Replace it", () => this.save(true));
     this.bench.attempt(async () => {
-      const told = await this.bench.post("own", { declaration, replace });
+      const answer = await this.bench.post("own", { declaration, replace });
       Object.assign(this, { loaded: declaration.id, saving: true });
-      await this.bench.show(told);
+      await this.bench.show(answer);
     });
   }
 

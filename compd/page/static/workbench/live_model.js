@@ -32,7 +32,7 @@ export class LiveModel {
     this.offered = element("div", {}, element("div", { class: "row" }, this.orders.arm, this.run, this.adopt, button("End the shadow", "live-no-shadow", () => ask("shadow", "")), button("Run without effects", "live-no-model", () => ask("no-model", ""))), this.why, this.orders.consequence, this.orders.said);
     this.bars = element("div", { id: "live-bars" });
     place.replaceChildren(element("h2", {}, "Machine ", element("small", {}, "the model on the machine that runs")), element("div", { class: "halves" }, element("div", {}, this.state, this.models, this.offered), this.bars));
-    listen(this.page, this.age, { machine: (told) => (this.page.machine = told), live: () => {}, slow: () => this.hear() });
+    listen(this.page, this.age, { machine: (machine) => (this.page.machine = machine), live: () => {}, slow: () => this.hear() });
     setInterval(() => this.show(), LOOK_EVERY_MS);
     this.show();
   }

@@ -20,7 +20,7 @@ const selection = new Selection();
 const strip = new Strip(at("errors"), at("verdict"));
 const picture = new Picture({ canvas: at("picture"), tabs: at("tabs"), against: at("against"), note: at("picture-note") }, selection);
 const card = new Card(at("card"), (rivals) => plan.planFor(rivals));
-const effects = new Effects(at("effects"), at("filter"), at("effects-note"), { choose: (effect) => card.choose(effect), ranked: (told) => strip.measured(told) });
+const effects = new Effects(at("effects"), at("filter"), at("effects-note"), { choose: (effect) => card.choose(effect), ranked: (ranking) => strip.measured(ranking) });
 const diagnosis = new Diagnosis(at("diagnosis"), {
   named: (result) => {
     effects.name(result);

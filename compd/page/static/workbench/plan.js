@@ -92,13 +92,13 @@ export class Plan {
   async offerLimits(anew = false) {
     const { bench } = this;
     if (!anew && !this.external) return;
-    const told = await bench.get(`plan?rivals=${encodeURIComponent(this.rivals.values.join())}`);
-    this.external = "columns" in told.limits;
+    const answer = await bench.get(`plan?rivals=${encodeURIComponent(this.rivals.values.join())}`);
+    this.external = "columns" in answer.limits;
     if (anew) {
-      this.rivals.offer(told.effects);
-      this.beside.offer(told.effects);
+      this.rivals.offer(answer.effects);
+      this.beside.offer(answer.effects);
     }
-    const { workspace, force, temperature, speed, columns = {} } = told.limits;
+    const { workspace, force, temperature, speed, columns = {} } = answer.limits;
     this.pairs = this.external ? new Map(Object.entries(columns).map(([name, pair]) => [`limit of ${name}`, new PairField(name, pair)])) : new Map([
       ...["x", "y", "z"].map((axis, k) => [axis, new PairField(`${axis}, mm,`, workspace[k])]),
       ["temperature", new PairField(`temperature, ${micro("degC")},`, temperature)],
@@ -123,11 +123,11 @@ export class Plan {
     this.button.textContent = "planning …";
     this.bench.attempt(async () => {
       const { key } = this.bench;
-      const told = await this.bench.post("plan", this.order);
+      const answer = await this.bench.post("plan", this.order);
       if (key !== this.bench.key) return; // another recording is open meanwhile
-      this.showProblems(told.problems ?? []);
-      this.result.hidden = Boolean(told.problems);
-      if (!told.problems) this.showPlan(told);
+      this.showProblems(answer.problems ?? []);
+      this.result.hidden = Boolean(answer.problems);
+      if (!answer.problems) this.showPlan(answer);
     }).finally(() => {
       this.button.disabled = false;
       this.button.textContent = "Plan";
@@ -147,7 +147,7 @@ export class Plan {
   }
 
   showPlan(plan) {
-    this.told = plan;
+    this.measurement = plan;
     const alike = plan.alike.map(([first, second]) => element("li", {}, `${first} and ${second} cannot be told apart within these limits`));
     this.words.replaceChildren(
       element("p", { class: "separation" }, element("b", {}, `${plan.before.toFixed(1)} → ${plan.separation.toFixed(1)}`), " times the noise, before and after"),
@@ -161,10 +161,10 @@ export class Plan {
   }
 
   showCommand() {
-    if (!this.told) return;
+    if (!this.measurement) return;
     const { shape } = this;
     const motion = shape === "gcode" ? ` --feed ${this.feed.value || "FEED"} --dwell ${this.dwell.value || "3"}` : "";
-    this.command.write(`${this.told.command}${shape === "plan" ? "" : ` --as ${shape}${motion}`} --out ${NAMES[shape]}`);
+    this.command.write(`${this.measurement.command}${shape === "plan" ? "" : ` --as ${shape}${motion}`} --out ${NAMES[shape]}`);
   }
 
   // The file, or under the feed why there is none.
@@ -174,9 +174,9 @@ export class Plan {
     this.bench.attempt(async () => {
       this.feed.show();
       const motion = shape === "gcode" ? `?${new URLSearchParams({ feed: this.feed.value, dwell: this.dwell.value })}` : "";
-      const response = await fetch(`workbench/${this.bench.key}/plan/${this.told.key}/${shape}${motion}`);
+      const response = await fetch(`workbench/${this.bench.key}/plan/${this.measurement.key}/${shape}${motion}`);
       if (!response.ok) return this.feed.show((await response.json()).reason);
-      const link = element("a", { href: URL.createObjectURL(await response.blob()), download: this.told.files[shape] });
+      const link = element("a", { href: URL.createObjectURL(await response.blob()), download: this.measurement.files[shape] });
       link.click();
       URL.revokeObjectURL(link.href);
     });

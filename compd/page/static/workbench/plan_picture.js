@@ -62,7 +62,7 @@ export class PlanPicture {
     });
     context.fillStyle = ink("--ink");
     for (const [key, numbers] of taken) context.fillText(numbers.length > 4 ? `${numbers.slice(0, 3).join(" ")} … ${numbers.at(-1)}` : numbers.join(" "), Number(key.split(",")[0]) + 6, Number(key.split(",")[1]) - 5);
-    const told = values ? `Blue is ${low}, red ${high} of ${this.by.value}. ` : "";
-    this.note.textContent = `${told}${arrows ? `Arrows: ${rivals[0].replaceAll("_", " ")} against its rival, at most ${largest.toPrecision(2)} µm. ` : ""}The line is the order. Drag to turn.`;
+    const colours = values ? `Blue is ${low}, red ${high} of ${this.by.value}. ` : "";
+    this.note.textContent = `${colours}${arrows ? `Arrows: ${rivals[0].replaceAll("_", " ")} against its rival, at most ${largest.toPrecision(2)} µm. ` : ""}The line is the order. Drag to turn.`;
   }
 }

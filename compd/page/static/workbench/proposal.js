@@ -16,14 +16,14 @@ export class Proposal {
   show(bench, step, verb) {
     bench.attempt(async () => {
       this.place.replaceChildren(element("p", { class: "note" }, `fitting on ${bench.summary.used} rows …`));
-      const told = await bench.post("step", { ...step, dry_run: true });
-      const rows = told.numbers.map((entry) => element("tr", { class: entry.plausible ? "" : "bad" }, element("td", {}, `${entry.effect.replaceAll("_", " ")} ${entry.parameter}`), element("td", { class: "number" }, number(entry.was)), element("td", { class: "number" }, `${number(entry.value)}${entry.standard_error === null ? "" : ` ± ${number(entry.standard_error, 2)}`}`), element("td", {}, micro(entry.unit))));
+      const outcome = await bench.post("step", { ...step, dry_run: true });
+      const rows = outcome.numbers.map((entry) => element("tr", { class: entry.plausible ? "" : "bad" }, element("td", {}, `${entry.effect.replaceAll("_", " ")} ${entry.parameter}`), element("td", { class: "number" }, number(entry.was)), element("td", { class: "number" }, `${number(entry.value)}${entry.standard_error === null ? "" : ` ± ${number(entry.standard_error, 2)}`}`), element("td", {}, micro(entry.unit))));
       const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, verb);
       this.place.replaceChildren(
         element("div", { class: "consequence" },
-          element("p", {}, element("b", {}, `${told.rms[0].toFixed(2)} → ${told.rms[1].toFixed(2)} ${micro(told.unit)}`), `, floor ratio ${told.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${told.verdict}`),
+          element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
           element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows)),
-          ...(told.gone.length ? [element("p", {}, `Gone: ${told.gone.join(", ")}`)] : []),
+          ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
           element("div", { class: "row" }, confirm, element("button", { type: "button", onclick: () => this.clear() }, "Leave it"))),
       );
       confirm.focus();

@@ -59,8 +59,8 @@ def test_the_machine_can_be_drawn_from_it(name):
 @pytest.mark.parametrize("name", LINKS)
 def test_the_shadow_at_the_tip_is_what_its_model_would_be_there_if_it_were_applied(name, tmp_path):
     live, _ = displaced(name)
-    told = {"name": live.configuration.machine, "links": LINKS[name], "link_zero": 20.0}
-    model = live.loader.read(file_with(tmp_path / "a.yaml", "link_zero", **told))
+    placeholders = {"name": live.configuration.machine, "links": LINKS[name], "link_zero": 20.0}
+    model = live.loader.read(file_with(tmp_path / "a.yaml", "link_zero", **placeholders))
     live.commands.models = Models(live.loader.without_effects, model)
     shadow_um = budget_of(live, live.settle())["shadow_tip_um"]
     live.commands.models = Models(model)

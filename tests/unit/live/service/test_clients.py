@@ -96,8 +96,8 @@ def test_a_tcp_client_that_neither_watches_nor_asks_nor_controls_is_dropped(serv
     service.pass_time(seats.IDLE_AFTER_S - 1)
     asking.ask({"class": "STATUS"})
     service.pass_time(2)
-    told = idle.read()
-    assert (told["class"], told["code"]) == ("ERROR", "idle")
+    answer = idle.read()
+    assert (answer["class"], answer["code"]) == ("ERROR", "idle")
     assert idle.file.read() == b""
     for client in (watching, asking, controller, local):
         assert client.ask({"class": "STATUS"}) == {"class": "STATUS"}

@@ -58,9 +58,9 @@ def test_anything_else_gets_nothing_for_a_while_and_is_then_closed(guarded, line
     client.send({"class": "AUTH", "token": TOKEN})  # a second try on the same connection counts for nothing
     guarded.unix().ask({"class": "STATUS"})
     guarded.pass_time(seats.WRONG_TOKEN_REST_S)
-    told = client.read()
-    assert (told["class"], told["code"]) == ("ERROR", "not_authorized")
-    assert TOKEN not in str(told)
+    answer = client.read()
+    assert (answer["class"], answer["code"]) == ("ERROR", "not_authorized")
+    assert TOKEN not in str(answer)
     assert client.file.read() == b""
     assert guarded.commands.target is None
 

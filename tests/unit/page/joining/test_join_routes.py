@@ -55,20 +55,20 @@ def files(directory):
 def test_recordings_without_a_reference_and_exports_are_listed(client, recordings):
     (recordings / "link.csv").symlink_to("/etc/passwd")
     (recordings / "exports" / "link.txt").symlink_to("/etc/passwd")
-    told = client.get("/join/sources").json()
-    assert {GAUGES, GAUGES_WITH_PLACES} <= set(told["gauges"])
-    assert set(told["exports"]) == {TRACK, GERMAN_TRACK, POINTS}
-    assert told["may_write"]
+    answer = client.get("/join/sources").json()
+    assert {GAUGES, GAUGES_WITH_PLACES} <= set(answer["gauges"])
+    assert set(answer["exports"]) == {TRACK, GERMAN_TRACK, POINTS}
+    assert answer["may_write"]
     assert client.get("/join").status_code == 200
 
 
 def test_columns_and_their_meaning_are_told(client):
-    told = client.post("/join/table", json={"export": GERMAN_TRACK}).json()
-    assert told["roles"] == ["time", "x", "y", "z"]
-    assert told["header"] == ["Zeit", "x [mm]", "y [mm]", "z [mm]"]
-    assert (len(told["rows"]), told["line"][0]) == (20, 2)
-    assert told["told"]["decimal mark"].startswith("comma")
-    assert (told["by"], told["problems"]) == ("time", [])
+    answer = client.post("/join/table", json={"export": GERMAN_TRACK}).json()
+    assert answer["roles"] == ["time", "x", "y", "z"]
+    assert answer["header"] == ["Zeit", "x [mm]", "y [mm]", "z [mm]"]
+    assert (len(answer["rows"]), answer["line"][0]) == (20, 2)
+    assert answer["assumed"]["decimal mark"].startswith("comma")
+    assert (answer["by"], answer["problems"]) == ("time", [])
     changed = client.post("/join/table", json={"export": GERMAN_TRACK, "columns": ["time", "y", "x", "-"]}).json()
     assert changed["roles"] == ["time", "y", "x", "-"]
     assert "--columns time,y,x,-" in changed["command"]
@@ -78,9 +78,9 @@ def test_what_cannot_be_read_is_shown_with_the_reason(client, recordings):
     (recordings / "exports" / "two-units.csv").write_text("x [mm],y [inch],z [mm]\n1.5,2.5,3.5\n4.5,5.5,6.5\n")
     (recordings / "exports" / "broken.csv").write_text("x,y,z\n1.5,2.5,3.5\n4.5\n7.5,8.5,9.5\n")
     (recordings / "exports" / "binary.bin").write_bytes(bytes(range(256)))
-    told = client.post("/join/table", json={"export": "two-units.csv"}).json()
-    assert told["roles"] == ["x", "y", "z"]
-    assert "units are mixed" in told["problems"][0]
+    answer = client.post("/join/table", json={"export": "two-units.csv"}).json()
+    assert answer["roles"] == ["x", "y", "z"]
+    assert "units are mixed" in answer["problems"][0]
     broken = client.post("/join/table", json={"export": "broken.csv"}).json()
     assert "has 1 cell where the others have 3" in broken["problems"][0]
     assert ["4.5"] in broken["rows"]
@@ -119,20 +119,20 @@ def test_what_is_written_is_what_the_command_line_writes(client, recordings, nam
 
 
 def test_a_trial_by_time_has_the_offset_in_a_curve(client):
-    told = client.post("/join/trial", json={"recording": GAUGES, "export": TRACK}).json()["time"]
-    assert told["peak"][0] == pytest.approx(137.25, abs=0.5)
-    assert told["next_best"][1] < 0.5 < told["peak"][1]
-    known = [value for value in told["agreement"] if value is not None]
-    assert max(known) == pytest.approx(told["peak"][1], abs=0.01)
-    best_s = told["offset_s"][told["agreement"].index(max(known))]
+    answer = client.post("/join/trial", json={"recording": GAUGES, "export": TRACK}).json()["time"]
+    assert answer["peak"][0] == pytest.approx(137.25, abs=0.5)
+    assert answer["next_best"][1] < 0.5 < answer["peak"][1]
+    known = [value for value in answer["agreement"] if value is not None]
+    assert max(known) == pytest.approx(answer["peak"][1], abs=0.01)
+    best_s = answer["offset_s"][answer["agreement"].index(max(known))]
     assert best_s == pytest.approx(137.25, abs=1.0)
 
 
 def test_a_trial_by_order_has_the_dwell_of_each_point(client):
-    told = client.post("/join/trial", json=BY_ORDER).json()["rest"]
-    assert len(told["line"]) == len(told["dwell_number"]) == len(told["residual_um"]) == 476
-    assert told["dwell_number"] == sorted(told["dwell_number"])
-    assert max(told["residual_um"]) < 20.0
+    answer = client.post("/join/trial", json=BY_ORDER).json()["rest"]
+    assert len(answer["line"]) == len(answer["dwell_number"]) == len(answer["residual_um"]) == 476
+    assert answer["dwell_number"] == sorted(answer["dwell_number"])
+    assert max(answer["residual_um"]) < 20.0
 
 
 def test_what_does_not_belong_together_is_refused_with_its_reason_and_no_file(client, recordings):
@@ -144,10 +144,10 @@ def test_what_does_not_belong_together_is_refused_with_its_reason_and_no_file(cl
 
 
 def test_the_page_s_own_machine_is_taken_and_told_where_it_is_the_recording_s(recordings):
-    for name, told in (("tripod-cmm.yaml", True), ("hexapod.yaml", False)):
+    for name, named in (("tripod-cmm.yaml", True), ("hexapod.yaml", False)):
         client = opened(recordings, machine=CONFIG / name)
         command = client.post("/join/table", json=BY_ORDER).json()["command"]
-        assert (f"--machine {CONFIG / name}" in command) == told
+        assert (f"--machine {CONFIG / name}" in command) == named
         assert client.post("/join/trial", json=BY_ORDER).json()["reason"] == ""
 
 

@@ -28,15 +28,15 @@ def path(tmp_path_factory):
 def test_its_steps_its_result_and_its_page(path):
     job = DiagnosisJob(path, None, None)
     job.join(PATIENCE_S)
-    told, outcome = job.summary(), job.outcome()
-    assert told["state"] == "done", outcome["text"]
-    assert [stage["text"] for stage in told["stages"]] == list(STAGES)
-    assert told["steps"][0]["text"] == STAGES[0]
-    assert {step["text"] for step in told["steps"]} <= set(STAGES)
-    assert [step["at_s"] for step in told["steps"]] == sorted(step["at_s"] for step in told["steps"])
+    answer, outcome = job.summary(), job.outcome()
+    assert answer["state"] == "done", outcome["text"]
+    assert [stage["text"] for stage in answer["stages"]] == list(STAGES)
+    assert answer["steps"][0]["text"] == STAGES[0]
+    assert {step["text"] for step in answer["steps"]} <= set(STAGES)
+    assert [step["at_s"] for step in answer["steps"]] == sorted(step["at_s"] for step in answer["steps"])
     assert outcome["result"]["verdict"] == outcome["evidence"]["verdict"] == "identified"
     assert "link_expansion" in outcome["text"]
-    assert told["page"] is True
+    assert answer["page"] is True
     page = job.page.decode()
     assert page.startswith("<!doctype html>")
     assert "link_expansion" in page

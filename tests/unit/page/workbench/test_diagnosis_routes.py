@@ -40,8 +40,8 @@ def opened(client):
 
 
 def begun(client, model=OPEN["model"]):
-    told = client.post("/workbench/open", json=OPEN | {"model": model}).json()
-    return client.post(f"/workbench/{told['key']}/diagnosis", json={}), told["revision"]
+    answer = client.post("/workbench/open", json=OPEN | {"model": model}).json()
+    return client.post(f"/workbench/{answer['key']}/diagnosis", json={}), answer["revision"]
 
 
 def test_before_the_first_there_is_none(client):
@@ -57,13 +57,13 @@ def test_every_browser_gets_the_newest_and_is_told_that_the_model_has_changed_si
     assert running["state"] == "running"
     assert client.post(f"{BASE}/diagnosis", json={}).json()["id"] == running["id"], "a second browser joins it"
     opened(client)["run/a.model.yaml"].diagnosis.join(PATIENCE_S)
-    told = client.get(f"{BASE}/diagnosis", params={"shown": "another"}).json()
-    assert (told["state"], told["behind"]) == ("done", 0)
-    assert told["evidence"]["effects"][0]["effect"] == "link_expansion"
-    assert "evidence" not in client.get(f"{BASE}/diagnosis", params={"shown": told["id"]}).json()
+    answer = client.get(f"{BASE}/diagnosis", params={"shown": "another"}).json()
+    assert (answer["state"], answer["behind"]) == ("done", 0)
+    assert answer["evidence"]["effects"][0]["effect"] == "link_expansion"
+    assert "evidence" not in client.get(f"{BASE}/diagnosis", params={"shown": answer["id"]}).json()
     step = {"kind": "add", "effect": "link_expansion", "revision": revision}
     assert client.post(f"{BASE}/step", json=step).status_code == 200
-    assert client.get(f"{BASE}/diagnosis", params={"shown": told["id"]}).json()["behind"] == 1
+    assert client.get(f"{BASE}/diagnosis", params={"shown": answer["id"]}).json()["behind"] == 1
 
 
 def test_its_page_runs_its_own_scripts_in_a_sandbox(client):

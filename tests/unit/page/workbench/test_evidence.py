@@ -16,17 +16,17 @@ from tests.support import diagnosis_situations as situations
 @pytest.mark.parametrize("situation", situations.SITUATIONS)
 def test_it_is_plain_data_that_says_what_the_report_says(situation):
     diagnosis = situation()
-    told = json.loads(json.dumps(evidence(diagnosis), allow_nan=False))
-    assert told["verdict"] == diagnosis.verdict
-    assert told["lines"] == summary_lines(diagnosis)
-    assert len(told["lines"]) <= MOST_LINES
-    for number, effect in enumerate(told["effects"]):
+    answer = json.loads(json.dumps(evidence(diagnosis), allow_nan=False))
+    assert answer["verdict"] == diagnosis.verdict
+    assert answer["lines"] == summary_lines(diagnosis)
+    assert len(answer["lines"]) <= MOST_LINES
+    for number, effect in enumerate(answer["effects"]):
         report = dict(step_rows(number, diagnosis, error_fall(diagnosis)))
         shared = {"error, rows left out", "explains", "by noise alone"}
         assert {name: text for name, text in effect["facts"] if name in shared} == {k: report[k] for k in shared}
         assert (effect["equation"], effect["separated_by"]) == (report["equation"], report["told apart by"])
         assert len(effect["numbers"]) >= len(diagnosis.steps[number].parameters)
-    assert "".join(formula["text"] for formula in told["formulas"]) == formula_list(diagnosis)
+    assert "".join(formula["text"] for formula in answer["formulas"]) == formula_list(diagnosis)
 
 
 def test_a_rival_comes_with_the_command_that_tells_it_apart():
@@ -56,10 +56,10 @@ def test_the_error_on_all_rows_stands_beside_that_on_rows_left_out():
 
 
 def test_a_description_comes_with_a_formula_to_try():
-    told = evidence(situations.described())
-    assert told["effects"] == []
-    assert told["follows"]["rows"]
-    (formula,) = told["formulas"]
+    answer = evidence(situations.described())
+    assert answer["effects"] == []
+    assert answer["follows"]["rows"]
+    (formula,) = answer["formulas"]
     assert formula["declaration"]["id"] == formula["id"]
     assert formula["id"] in formula["text"]
 

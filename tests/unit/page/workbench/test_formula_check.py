@@ -73,8 +73,8 @@ def test_a_problem_of_one_axis_is_at_that_axis(rows):
 
 
 def test_a_field_that_is_wrong_hides_no_mistake_in_the_formula(rows):
-    told = problems(rows, id="", formula="k * (humidity_pct", parameters={"k": {**K, "plausible": [None, None]}})
-    assert {problem.field for problem in told} == {"id", "formula", "parameters"}
+    mistakes = problems(rows, id="", formula="k * (humidity_pct", parameters={"k": {**K, "plausible": [None, None]}})
+    assert {problem.field for problem in mistakes} == {"id", "formula", "parameters"}
 
 
 def test_names_that_are_no_columns_become_parameters(rows):
@@ -109,9 +109,9 @@ def test_what_would_take_minutes_is_not_tried(rows):
     ],
 )
 def test_whatever_is_sent_has_an_answer_in_words(rows, changed):
-    told = problems(rows, **changed)
-    assert told
-    assert all(problem.text for problem in told)
+    mistakes = problems(rows, **changed)
+    assert mistakes
+    assert all(problem.text for problem in mistakes)
 
 
 def test_what_may_be_named_is_what_was_recorded(rows):

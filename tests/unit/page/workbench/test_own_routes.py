@@ -62,8 +62,8 @@ def test_who_may_only_look_may_try_and_writes_nothing(client_of, tmp_path):
 
 def test_who_may_operate_saves_and_deletes(client_of, tmp_path):
     client = client_of("operate")
-    told = post(client, "own", {"declaration": GOOD})
-    assert f"--effects {tmp_path / 'own.effects.yaml'}" in told.json()["commands"]["diagnose"]
+    answer = post(client, "own", {"declaration": GOOD})
+    assert f"--effects {tmp_path / 'own.effects.yaml'}" in answer.json()["commands"]["diagnose"]
     (own,) = (entry for entry in client.get(f"{BASE}/effects").json()["effects"] if entry["own"])
     assert own["effect"] == "swelling"
     assert client.get(f"{BASE}/effects/swelling").json()["named"] == f"{tmp_path / 'own.effects.yaml'}:swelling"
@@ -100,17 +100,17 @@ def test_a_plan_is_made_and_its_files_are_given(client_of):
     client = client_of("view")
     form = client.get(f"{BASE}/plan").json()
     assert len(form["limits"]["workspace"]) == 3
-    told = post(client, "plan", {"rivals": ["link_elasticity", "joint_contact"], "rows": 8}).json()
-    assert told["rows"]
-    assert len(told["difference_um"]) == len(told["place"]) == len(told["rows"])
-    file = client.get(f"{BASE}/plan/{told['key']}/plan")
+    answer = post(client, "plan", {"rivals": ["link_elasticity", "joint_contact"], "rows": 8}).json()
+    assert answer["rows"]
+    assert len(answer["difference_um"]) == len(answer["place"]) == len(answer["rows"])
+    file = client.get(f"{BASE}/plan/{answer['key']}/plan")
     assert file.headers["content-disposition"] == 'attachment; filename="run-plan.csv"'
-    assert len(file.text.splitlines()) == len(told["rows"]) + 1
-    assert client.get(f"{BASE}/plan/{told['key']}/gcode").status_code == 409
+    assert len(file.text.splitlines()) == len(answer["rows"]) + 1
+    assert client.get(f"{BASE}/plan/{answer['key']}/gcode").status_code == 409
     for query in ("feed=x", "feed=nan", "feed=0", "feed=inf", "feed=1200&dwell=-1"):
-        assert client.get(f"{BASE}/plan/{told['key']}/gcode?{query}").status_code == 409
-    assert client.get(f"{BASE}/plan/{told['key']}/gcode?feed=1200").status_code == 200
-    for path in ("nothing/plan", f"{told['key']}/exe"):
+        assert client.get(f"{BASE}/plan/{answer['key']}/gcode?{query}").status_code == 409
+    assert client.get(f"{BASE}/plan/{answer['key']}/gcode?feed=1200").status_code == 200
+    for path in ("nothing/plan", f"{answer['key']}/exe"):
         assert client.get(f"{BASE}/plan/{path}").status_code == 404
 
 
@@ -136,9 +136,9 @@ def test_on_a_machine_of_an_external_model_there_are_columns_and_their_limits(tm
     limits = client.get(f"{BASE}/plan", params={"rivals": "sag,turn"}).json()["limits"]["columns"]
     assert limits["elevation_deg"] == [20.0, pytest.approx(83.92, abs=0.01)]
     asked = {"rivals": ["sag", "turn"], "rows": 6, "limits": {"elevation_deg": [30, 60]}}
-    told = post(client, "plan", asked).json()
-    assert f"--effects {tmp_path / 'own.effects.yaml'}" in told["command"]
-    assert set(told["files"]) == {"plan", "csv"}
-    assert all(30 <= row[told["columns"].index("elevation_deg")] <= 60 for row in told["rows"])
+    answer = post(client, "plan", asked).json()
+    assert f"--effects {tmp_path / 'own.effects.yaml'}" in answer["command"]
+    assert set(answer["files"]) == {"plan", "csv"}
+    assert all(30 <= row[answer["columns"].index("elevation_deg")] <= 60 for row in answer["rows"])
     wrong = post(client, "plan", {**asked, "limits": {"elevation_deg": [60, 30]}}).json()["problems"]
     assert [problem["field"] for problem in wrong] == ["limit of elevation_deg"]

@@ -38,9 +38,9 @@ def unpacked(data):
 
 
 def test_numbers_are_those_of_compare(workbench, path):
-    told, comparison = workbench.summary(), compare(open_recording(path))
-    assert (told["rms"], told["floor"]) == (comparison.rms_um, comparison.floor.um)
-    assert (told["rows"], told["used"]) == (300, int(comparison.used.sum()))
+    answer, comparison = workbench.summary(), compare(open_recording(path))
+    assert (answer["rms"], answer["floor"]) == (comparison.rms_um, comparison.floor.um)
+    assert (answer["rows"], answer["used"]) == (300, int(comparison.used.sum()))
     _, rows = unpacked(workbench.opened.rows())
     assert np.allclose(rows["residual"], comparison.residual_um, atol=1e-4, equal_nan=True)
     assert rows["place_mm"].shape == (300, 3)
@@ -70,14 +70,14 @@ def test_the_error_of_a_trial_is_that_of_its_residual(workbench):
 
 def test_a_step_is_told_first_then_made_as_the_command_makes_it(workbench, path, tmp_path):
     model = tmp_path / "tripod.model.yaml"
-    told = workbench.propose("add", "link_expansion")
-    assert told["rms"][1] < 0.5 * told["rms"][0]
+    answer = workbench.propose("add", "link_expansion")
+    assert answer["rms"][1] < 0.5 * answer["rms"][0]
     assert not model.exists()
     made = workbench.make("add", "link_expansion", workbench.revision)
     by_command = add_effect(None, "link_expansion", path)
     assert [number["value"] for number in made["numbers"]] == [number.value for number in by_command.numbers()]
     assert read_stored(model).steps[0].rms_after_um == by_command.steps[0].rms_after_um
-    assert made["rms"] == told["rms"][1]
+    assert made["rms"] == answer["rms"][1]
     undone = workbench.undo(workbench.revision)
     assert undone["numbers"] == []
     assert [step["kind"] for step in undone["ledger"]] == ["add", "undo"]
