@@ -40,8 +40,8 @@ def write_linuxcnc_page(path: Path, demo: LinuxCncDemo) -> None:
     panels = [
         Panel(
             "The same program, each time as LinuxCNC ran it",
-            "Distance between the true tip and where the program wants it; the scale is logarithmic. On the move a correction "
-            "is as late as the gauges that it comes from.",
+            "Distance between the true tip and where the program wants it; the scale is logarithmic. On the move a "
+            "correction is as late as the gauges that it comes from.",
             _errors(demo),
         ),
         Panel("In numbers", "rms and largest, um.", PageTable(COLUMNS, _rows(demo))),
