@@ -28,6 +28,9 @@ SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
 SHORTEST_QUIET_ASCII_S = 1e-3
 # A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
 USUAL_TURNAROUND_S = 10e-3
+# An FTDI adapter hands over a packet that is not full when its latency timer has run out: 16 ms, if nobody shortens it
+# (FTDI AN232B-04, "Data Throughput, Latency and Handshaking").
+LATENCY_TIMER_S = 16e-3
 # Over Ethernet: a packet there and back through a device's firmware. No bits to count.
 TCP_EXCHANGE_S = 2e-3
 
@@ -62,10 +65,10 @@ def character_bits(form: str) -> int:
 
 
 def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = None) -> Pace:
-    """A serial line's pace. `turnaround_s`: as short as the silence that a device must keep, if None."""
+    """A serial line's pace. `turnaround_s`: never shorter than the silence that a device must keep; None for that."""
     character_s = character_bits(form) / baud
     quiet_s = max(QUIET_CHARACTERS * character_s, SHORTEST_QUIET_RTU_S if rtu else SHORTEST_QUIET_ASCII_S)
-    return Pace(character_s, quiet_s, quiet_s if turnaround_s is None else turnaround_s)
+    return Pace(character_s, quiet_s, max(quiet_s, turnaround_s or 0.0))
 
 
 def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
@@ -209,6 +212,17 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
                 value=f"poll_every_s {budget.line.poll_every_s:g}",
                 allowed=f"{budget.usual_s:.3g} s or more",
                 next_step="raise poll_every_s, or the baud rate",
+            )
+        )
+    if isinstance(budget.line, SerialPortSettings) and not budget.line.low_latency and "://" not in budget.line.port:
+        held_back_s = budget.usual_s + budget.exchanges * LATENCY_TIMER_S
+        problems.append(
+            Problem(
+                where=where,
+                what=f"an FTDI adapter holds each reply back for up to 16 ms: a round of {budget.usual_s * 1e3:.1f} ms "
+                f"takes up to {held_back_s * 1e3:.1f}",
+                value="low_latency: false",
+                next_step="leave `low_latency` out",
             )
         )
     if budget.gauges > 1 and budget.usual_s + budget.absent_s > stale_after_s:

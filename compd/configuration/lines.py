@@ -48,7 +48,9 @@ class SerialPortSettings(_LineSettings):
     )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
-    low_latency: bool = Field(default=False, description="ask the adapter not to batch bytes (FTDI batches for 16 ms)")
+    low_latency: bool = Field(
+        default=True, description="ask the adapter not to hold bytes back, where it can be asked (FTDI: up to 16 ms)"
+    )
     echo: bool = Field(default=False, description=_ECHO)
     dtr: bool | None = Field(
         default=None, description="DTR while the line is open: true is HIGH; left out: what its gauges need, else HIGH"

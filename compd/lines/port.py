@@ -10,6 +10,7 @@ import os
 import select
 import socket
 import termios
+from contextlib import suppress
 from typing import Protocol
 
 import serial
@@ -99,7 +100,8 @@ class SerialPort:
                 if parity != "N":
                     self._check_parity()
                 if low_latency:
-                    self._ask_low_latency(port)
+                    with suppress(ValueError):  # of an adapter, or a pty, that has no latency timer
+                        self._port.set_low_latency_mode(True)
                 if refused := control.check(self._port):
                     log.warning("DTR, RTS or RS-485 not granted", port=port, reason=refused)
             except PORT_FAULTS as error:
@@ -115,12 +117,6 @@ class SerialPort:
         attributes = termios.tcgetattr(fd)
         attributes[0] = (attributes[0] | termios.INPCK) & ~(termios.IGNPAR | termios.PARMRK)
         termios.tcsetattr(fd, termios.TCSANOW, attributes)
-
-    def _ask_low_latency(self, port: str) -> None:
-        try:
-            self._port.set_low_latency_mode(True)
-        except ValueError as error:  # raised for an adapter, or a pty, without this mode
-            log.info("low_latency not granted", port=port, reason=str(error))
 
     def read(self, timeout_s: float) -> bytes:
         try:

@@ -131,8 +131,6 @@ EVENTS: tuple[Event, ...] = (
           "the service manager starts the daemon again"),
     Event("process_killed", "a process had to be killed", "warning", ("process",), "at the end of the daemon"),
     Event("log_dropped", "log lines dropped", "warning", ("source", "count"), "a process prints too much"),
-    Event("low_latency_refused", "low_latency not granted", "info", ("port", "reason"),
-          "an adapter keeps bytes back for up to 16 ms"),
     Event("control_lines_refused", "DTR, RTS or RS-485 not granted", "warning", ("port", "reason"),
           "the port does not have what `dtr`, `rts` or `rs485` of its line sets"),
     Event("port_close_failed", "a lost port did not close cleanly", "info", ("reason",), "when a line is lost"),

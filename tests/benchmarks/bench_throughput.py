@@ -4,11 +4,14 @@
 
 A slave in a process of its own answers on a pty as slowly as the wire would: each character takes its time, and the
 slave keeps its silence (or takes 10 ms) before it answers. The ideal is
-`compd.commissioning.line_budget`'s, bits and silences alone.
+`compd.commissioning.line_budget`'s, bits and silences alone. The last rows are behind an FTDI adapter whose latency
+timer nobody has shortened, as with `low_latency: false`. The processor's time is this process's alone, of which each
+poll takes its part.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import subprocess
@@ -16,10 +19,10 @@ import sys
 import time
 import tty
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from compd.clock import MonotonicClock
-from compd.commissioning.line_budget import budget_of_line, serial_pace
+from compd.commissioning.line_budget import LATENCY_TIMER_S, budget_of_line, serial_pace
 from compd.configuration.lines import ModbusRtuLine
 from compd.gauge import Gauge
 from compd.lines import open_line
@@ -36,7 +39,25 @@ SPIN_S = 2e-4  # before a deadline: sleeping is not that exact
 FIFO_CHARACTERS = 16  # a UART hands over so many at a time
 
 
-def slave(fd: int, baud: int, turnaround_s: float) -> None:
+class Row(NamedTuple):
+    """What is measured. threaded : by the daemon's line thread. timer_s : latency timer of the adapter, 0 for none."""
+
+    kind: str
+    baud: int
+    turnaround_s: float | None
+    threaded: bool = False
+    timer_s: float = 0.0
+
+
+class Measured(NamedTuple):
+    """rounds_hz, ideal_hz : rounds per second. cpu_us : processor time of this process per poll."""
+
+    rounds_hz: float
+    ideal_hz: float
+    cpu_us: float
+
+
+def slave(fd: int, baud: int, turnaround_s: float, timer_s: float) -> None:
     """Answer every read request with counting registers, at the wire's pace, until killed."""
     character_s = serial_pace(baud, FORMAT, rtu=True).character_s
     print("listening", flush=True)
@@ -51,8 +72,13 @@ def slave(fd: int, baud: int, turnaround_s: float) -> None:
         for at in range(0, len(reply), FIFO_CHARACTERS):
             piece = reply[at : at + FIFO_CHARACTERS]
             now_s += len(piece) * character_s
-            _until(now_s)
-            os.write(fd, piece)
+            if not timer_s:
+                _until(now_s)
+                os.write(fd, piece)
+        if timer_s:
+            # fewer than the 62 bytes of a full packet: they wait for the timer, which runs freely
+            _until(timer_s * math.ceil(now_s / timer_s))
+            os.write(fd, reply)
 
 
 def _until(due_s: float) -> None:
@@ -83,14 +109,13 @@ def gauges(kind: str) -> dict[str, Gauge[Any]]:
     return {"block": make(1, channels)}
 
 
-def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) -> tuple[float, float]:
-    """Rounds per second, reached and ideal. `threaded`: through the daemon's own line thread."""
-    polled = gauges(kind)
-    line = ModbusRtuLine(kind="modbus_rtu", port="/dev/null", baud=baud, format=FORMAT, timeout_s=0.5)
-    pace = serial_pace(baud, FORMAT, rtu=True, turnaround_s=turnaround_s)
+def measure(row: Row) -> Measured:
+    polled = gauges(row.kind)
+    line = ModbusRtuLine(kind="modbus_rtu", port="/dev/null", baud=row.baud, format=FORMAT, timeout_s=0.5)
+    pace = serial_pace(row.baud, FORMAT, rtu=True, turnaround_s=row.turnaround_s)
     plan = budget_of_line("x", line, {name: gauge.traffic() for name, gauge in polled.items()})
     ideal_s = pace.round_s([exchange for gauge in polled.values() for exchange in gauge.traffic() or ()])
-    assert plan.bytes == {"int16": 31, "float32": 49, "units": 135}[kind]
+    assert plan.bytes == {"int16": 31, "float32": 49, "units": 135}[row.kind]
     master, far = os.openpty()
     tty.setraw(far)
     process = subprocess.Popen(
@@ -100,8 +125,9 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
             "tests.benchmarks.bench_throughput",
             "slave",
             str(master),
-            str(baud),
+            str(row.baud),
             str(pace.turnaround_s),
+            str(row.timer_s),
         ],
         pass_fds=[master],
         stdout=subprocess.PIPE,
@@ -110,26 +136,27 @@ def measure(kind: str, baud: int, turnaround_s: float | None, threaded: bool) ->
     process.stdout.readline()  # it is listening
     settings = line.model_copy(update={"port": os.ttyname(far)})
     try:
-        rate_hz = _through_thread(settings, polled) if threaded else _polled(settings, polled)
+        rounds_hz, cpu_s = _through_thread(settings, polled) if row.threaded else _polled(settings, polled)
     finally:
         process.kill()
         process.wait()
         process.stdout.close()
         os.close(master)
         os.close(far)
-    return rate_hz, 1 / ideal_s
+    return Measured(rounds_hz, 1 / ideal_s, cpu_s / len(polled) * 1e6)
 
 
-def _polled(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> float:
+def _polled(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> tuple[float, float]:
+    """Rounds per second, and processor time per round, s."""
     line = open_line(settings, MonotonicClock())
     try:
         for _ in range(3):
             _round(line, polled)
-        rounds, start_s = 0, time.monotonic()
+        rounds, start_s, cpu_s = 0, time.monotonic(), time.process_time()
         while (now_s := time.monotonic()) < start_s + SECONDS:
             _round(line, polled)
             rounds += 1
-        return rounds / (now_s - start_s)
+        return rounds / (now_s - start_s), (time.process_time() - cpu_s) / rounds
     finally:
         line.close()
 
@@ -140,7 +167,8 @@ def _round(line: Any, polled: dict[str, Gauge[Any]]) -> None:
             raise SystemExit("a reading was not ok: the computer is too busy to measure")
 
 
-def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> float:
+def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> tuple[float, float]:
+    """As `_polled`."""
     latest = Latest([f"{name}.{channel.name}" for name, gauge in polled.items() for channel in gauge.channels])
     acquisition = Acquisition(
         {"x": (settings, list(polled.items()))}, dict.fromkeys(polled, 1.0), latest, MonotonicClock()
@@ -148,38 +176,39 @@ def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> f
     acquisition.start()
     time.sleep(0.5)
     gauge = acquisition.lines["x"].gauges[-1]
-    before, start_s = gauge.ok, time.monotonic()
+    before, start_s, cpu_s = gauge.ok, time.monotonic(), time.process_time()
     time.sleep(SECONDS)
-    rate_hz = (gauge.ok - before) / (time.monotonic() - start_s)
+    rounds, duration_s, cpu_s = gauge.ok - before, time.monotonic() - start_s, time.process_time() - cpu_s
     acquisition.stop()
-    return rate_hz
+    return rounds / duration_s, cpu_s / rounds
 
 
 def main() -> None:
     sharpen_timers()  # as the daemon's line threads do
+    kinds = ("int16", "float32", "units")
     rows = [
-        (kind, baud, turnaround_s, False)
-        for kind in ("int16", "float32", "units")
-        for baud in (19200, 115200)
-        for turnaround_s in (None, 10e-3)
+        Row(kind, baud, turnaround_s) for kind in kinds for baud in (19200, 115200) for turnaround_s in (None, 10e-3)
     ]
-    rows += [(kind, 115200, None, True) for kind in ("int16", "float32", "units")]
+    rows += [Row(kind, 115200, None, threaded=True) for kind in kinds]
+    rows += [Row(kind, 115200, None, timer_s=LATENCY_TIMER_S) for kind in kinds]
     print(
         f"{'nine values as':16}{'baud':>8}{'turnaround':>12}{'asked by':>14}{'ideal Hz':>10}{'reached':>9}{'ratio':>7}"
+        f"{'CPU us/poll':>13}"
     )
-    for kind, baud, turnaround_s, threaded in rows:
-        reached_hz, ideal_hz = measure(kind, baud, turnaround_s, threaded)
-        ratio = reached_hz / ideal_hz
+    for row in rows:
+        result = measure(row)
+        ratio = result.rounds_hz / result.ideal_hz
+        note = "  held back by the adapter" if row.timer_s else "" if ratio >= WANTED else f"  below {WANTED}"
         print(
-            f"{kind:16}{baud:8}{'silence' if turnaround_s is None else '10 ms':>12}"
-            f"{'line thread' if threaded else 'driver':>14}{ideal_hz:10.1f}{reached_hz:9.1f}{ratio:7.2f}"
-            f"{'' if ratio >= WANTED else f'  below {WANTED}'}",
+            f"{row.kind:16}{row.baud:8}{'silence' if row.turnaround_s is None else '10 ms':>12}"
+            f"{'line thread' if row.threaded else 'driver':>14}{result.ideal_hz:10.1f}{result.rounds_hz:9.1f}"
+            f"{ratio:7.2f}{result.cpu_us:13.0f}{note}",
             flush=True,
         )
 
 
 if __name__ == "__main__":
-    if len(sys.argv) == 5 and sys.argv[1] == "slave":
-        slave(int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))
+    if len(sys.argv) == 6 and sys.argv[1] == "slave":
+        slave(int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), float(sys.argv[5]))
     else:
         main()

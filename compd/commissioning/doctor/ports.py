@@ -141,5 +141,5 @@ def _latency_findings(computer: Computer, subject: str, device: Path, low_latenc
         yield advice(
             subject,
             f"the adapter keeps bytes back for up to {timer_ms} ms (latency timer)",
-            f"{subject}: write `low_latency: true`",
+            f"{subject}: leave `low_latency` out",
         )

@@ -120,7 +120,7 @@ def test_a_name_that_depends_on_the_order_of_plugging(tmp_path: Path) -> None:
 
 def test_the_latency_timer_of_an_adapter(tmp_path: Path) -> None:
     findings = list(port_findings(Machine(tmp_path), line(low_latency=False), daemon_runs=False))
-    assert "16 ms (latency timer); line a: write `low_latency: true`" in only(findings, Verdict.ADVICE)
+    assert "16 ms (latency timer); line a: leave `low_latency` out" in only(findings, Verdict.ADVICE)
 
 
 def test_a_network_device_is_not_connected_to_while_the_daemon_runs(tmp_path: Path) -> None:

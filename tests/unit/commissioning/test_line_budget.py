@@ -84,6 +84,24 @@ def test_slower_by_wish() -> None:
     assert budget_of_line("x", rtu(115200, poll_every_s=0.1), {"a": INT16}).ideal_hz == pytest.approx(10)
 
 
+def test_no_slave_answers_before_the_silence_that_it_must_keep() -> None:
+    slow = budget_of_line("x", rtu(1200), {"a": INT16})
+    assert slow.usual_s == slow.ideal_s
+    assert (
+        budget_of_line("x", rtu(115200), {"a": INT16}).usual_s > budget_of_line("x", rtu(115200), {"a": INT16}).ideal_s
+    )
+
+
+def test_what_an_adapter_costs_that_holds_replies_back() -> None:
+    nine = {f"g{i}": [(8, 7)] for i in range(9)}
+    text = warning_text(budget_of_line("x", rtu(115200, low_latency=False), nine), 1.0)
+    usual_ms = budget_of_line("x", rtu(115200), nine).usual_s * 1e3
+    assert f"a round of {usual_ms:.1f} ms takes up to {usual_ms + 9 * 16:.1f}" in text
+    assert warning_text(budget_of_line("x", rtu(115200), nine), 1.0) == ""
+    by_network = rtu(115200, low_latency=False).model_copy(update={"port": "socket://server:4001"})
+    assert warning_text(budget_of_line("x", by_network, nine), 1.0) == ""
+
+
 def test_unknown_traffic_has_no_rate_and_says_so() -> None:
     budget = budget_of_line("x", rtu(9600), {"a": INT16, "mystery": None})
     assert not budget.known

@@ -313,7 +313,7 @@ MERGED = """
     scale_2:
       <<: *display
       port: /dev/serial/by-id/usb-scale-2
-    scale_3: {<<: [*display, {low_latency: true}], port: /dev/serial/by-id/usb-scale-3}
+    scale_3: {<<: [*display, {low_latency: false}], port: /dev/serial/by-id/usb-scale-3}
 """
 
 
@@ -328,7 +328,7 @@ def test_merge_keys_work_also_in_lists(tmp_path: Path) -> None:
     assert found.configuration is not None, found.problems
     lines = found.configuration.lines
     assert [getattr(lines[f"scale_{k}"], "baud", None) for k in (1, 2, 3)] == [38400] * 3
-    assert [getattr(lines[f"scale_{k}"], "low_latency", None) for k in (1, 2, 3)] == [False, False, True]
+    assert [getattr(lines[f"scale_{k}"], "low_latency", None) for k in (1, 2, 3)] == [True, True, False]
     assert getattr(lines["scale_3"], "port", "").endswith("usb-scale-3")
 
 
