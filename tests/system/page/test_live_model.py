@@ -34,17 +34,17 @@ def daemon(live):
 
 
 @contextmanager
-def workbench(chromium, live, directory, *options, **context_options):
+def workbench(chromium, live, directory, *options, recording="monday-1"):
     """A workbench whose page knows the live machine, with the recording open; no script may have failed."""
     options = ("--models", str(directory), *options)
     with page_process(live.socket, directory / "recordings", *options) as (address, _):
-        context = chromium.new_context(**{"viewport": {"width": 1366, "height": 900}, **context_options})
+        context = chromium.new_context(viewport={"width": 1366, "height": 900})
         tab, failures = context.new_page(), []
         tab.on("pageerror", lambda error: failures.append(str(error)))
         try:
             tab.goto(address)
             tab.goto(address.partition("?")[0] + "workbench")
-            open_recording(tab, "tripod.model.yaml")
+            open_recording(tab, "tripod.model.yaml", recording)
             yield tab
             assert failures == []
         finally:
@@ -168,8 +168,7 @@ def test_a_recording_of_another_machine_is_offered_nothing(chromium, live, daemo
         file.unlink()
     columns = gauges(100, 1, links=6, joints=12)
     record(directory / "recordings", columns, name="hexapod-1", machine="hexapod", configuration=hexapod)
-    (directory / "recordings" / "blank.csv").unlink()
-    with workbench(chromium, live, directory) as tab:
+    with workbench(chromium, live, directory, recording="hexapod-1") as tab:
         until(tab, "document.getElementById('live-models').textContent.startsWith('This recording is of hexapod')")
         assert not tab.locator("#live-shadow").is_visible()
         assert not tab.locator("#live-bars").is_visible()
