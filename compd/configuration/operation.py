@@ -84,6 +84,11 @@ class LoopSettings(Section):
         "invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
+    skew_s: Positive | None = Field(
+        default=None,
+        description="how far apart in time the lengths of one setpoint may be measured: beyond it the setpoint is "
+        "`refused`; left out: as far as `stale_after_s` allows",
+    )
     priority: Annotated[int, Field(ge=1, le=98)] = Field(
         default=40, description="real-time priority of the loop (SCHED_FIFO), where permitted"
     )

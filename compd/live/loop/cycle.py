@@ -27,6 +27,7 @@ from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
 from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
+from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_uncertainty import uncertainty_um, with_absent
@@ -45,6 +46,7 @@ class _Outcome(NamedTuple):
     """State and reason of a setpoint, with its values where they are valid.
 
     oldest_s : monotonic time of the oldest reading used. expires_s : from when the readings must not be used any more.
+    skew_s : between the oldest and the newest length that was used; nan where that is not known.
     """
 
     state: State
@@ -52,6 +54,7 @@ class _Outcome(NamedTuple):
     values: SetpointValues | None = None
     oldest_s: float = math.nan
     expires_s: float = math.nan
+    skew_s: float = math.nan
 
 
 def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tuple[Setpoint, CycleState]:
@@ -98,6 +101,7 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         models.applied.hash,
         inputs,
         state,
+        outcome.skew_s,
     )
     return setpoint, next_state
 
@@ -120,13 +124,17 @@ def _compute(
     comparators = usable.comparators
     if comparators is None:
         return _Outcome(usable.state, usable.reason), state
-    last_good = state.last_good if live is None else live
 
     scales = _scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
     if scales.state is not None and not scales.state.valid:
         reason = "; ".join(filter(None, (scales.reason, usable.reason)))
-        return _Outcome(scales.state, reason), state._replace(last_good=last_good)
+        return _Outcome(scales.state, reason), state if live is None else state._replace(last_good=live)
     scale_mm, oldest_s = scales.values, min(comparators.oldest_s, scales.oldest_s)
+    skew_s = skew_between(comparators.length_times_s, scales.oldest_s, scales.newest_s)
+    if live is not None and settings.loop.skew_s is not None and skew_s > settings.loop.skew_s:
+        used = wires.comparators.wires if target is not None else wires.length_wires
+        return _Outcome(State.REFUSED, skew_reason(used, snapshot, settings.loop.skew_s), skew_s=skew_s), state
+    last_good = state.last_good if live is None else live
 
     change_mm, joints = comparators.change_mm, wires.joints
     values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
@@ -184,7 +192,7 @@ def _compute(
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
     setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
-    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), next_state
+    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
 
 def _refusal(
@@ -218,13 +226,14 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
 
 
 class _Scales(NamedTuple):
-    """The scales of a cycle: values (n) in mm since machine zero, and the time of the oldest reading.
+    """The scales of a cycle: values (n) in mm since machine zero, and the times of the oldest and the newest reading.
 
     state, reason : where they make the setpoint invalid or worse than it were; None and "" otherwise.
     """
 
     values: FloatArray
     oldest_s: float
+    newest_s: float
     state: State | None = None
     reason: str = ""
 
@@ -235,17 +244,17 @@ def _scales(
     """The scales in CMM mode. In machine-tool mode they are not used, but they may be compared with the setpoints."""
     wires = settings.wires.scale
     if target is not None:
-        unread = _Scales(settings.unread_scales_mm, math.inf)
+        unread = _Scales(settings.unread_scales_mm, math.inf, -math.inf)
         if not (settings.scales_checked and (lost := wires.lost(snapshot))):
             return unread
         state = State.FAULT if lost.distrusted else State.DEGRADED
         return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, lost = wires.read(snapshot, zero_mm)
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm)
     if not lost:
-        return _Scales(values, oldest_s)
+        return _Scales(values, oldest_s, newest_s)
     # no policy replaces a scale: without it the tip is not known
     state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
-    return _Scales(values, oldest_s, state, f"the tip is not known: {lost}")
+    return _Scales(values, oldest_s, newest_s, state, f"the tip is not known: {lost}")
 
 
 def _uncertainty_is_due(
@@ -279,7 +288,8 @@ def _comparators(
         oldest_s = min(oldest_s, needed.oldest_s)
         quantities = applied.by_name(needed)
     if not lost:
-        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities)
+        length_times_s = lengths.oldest_s, lengths.newest_s
+        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s)
         return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
     if settings.loop.on_stale == "degrade":
         groups = (
@@ -292,13 +302,13 @@ def _comparators(
 
 
 def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray) -> GroupReadings:
-    values, oldest_s, lost = wires.read(snapshot, zero_mm)
-    return GroupReadings(values, lost, oldest_s)
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm)
+    return GroupReadings(values, lost, oldest_s, newest_s)
 
 
 def _quantity_group(applied: LiveModel, snapshot: Snapshot) -> GroupReadings:
     needed = applied.read(snapshot)
-    return GroupReadings(needed.values, needed.lost, needed.oldest_s)
+    return GroupReadings(needed.values, needed.lost, needed.oldest_s, needed.newest_s)
 
 
 def _tip_correction(

@@ -157,7 +157,7 @@ def _state_fields(state: CycleState) -> tuple[Any, ...]:
         state.correction_mm.tobytes(),
         None
         if last_good is None
-        else (last_good.change_mm.tobytes(), *last_good[1:3], dict(last_good.quantities), last_good.group_times_s),
+        else (last_good.change_mm.tobytes(), *last_good[1:3], dict(last_good.quantities), *last_good[4:]),
         state.scales_seen,
         None if state.shadow_memory == _NO_MEMORY else state.shadow_memory,
         state.adopting,

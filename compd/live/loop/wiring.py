@@ -25,12 +25,13 @@ class WiredValues(NamedTuple):
 
     values : (k), sign * (reading - zero) in the unit of each wire: mm since machine zero for lengths, the gauge's own
         for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
-    oldest_s : monotonic time of the oldest reading; inf without wires.
+    oldest_s, newest_s : monotonic times of the oldest and of the newest reading; inf and -inf without wires.
     lost : which readings cannot be used, and why.
     """
 
     values: FloatArray
     oldest_s: float
+    newest_s: float
     lost: Lost
 
 
@@ -65,12 +66,13 @@ class Wires:
         now_s, readings = snapshot
         used = [readings[slot] for slot, _ in self._slots]
         values = (np.array([reading[0] for reading in used]) - zero) * self._sign
-        oldest_s = min([reading[1] for reading in used], default=math.inf)
+        times_s = [reading[1] for reading in used]
+        oldest_s, newest_s = min(times_s, default=math.inf), max(times_s, default=-math.inf)
         lost = self.lost(snapshot)
         if lost:
             bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s) is not None]
             values[bad] = math.nan
-        return WiredValues(values, oldest_s, lost)
+        return WiredValues(values, oldest_s, newest_s, lost)
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which readings are not good or too old, and why."""

@@ -112,6 +112,11 @@ class SetpointKeys(SentMessage):
         default=None, description="hash of the model file that is applied; absent without effects"
     )
     age_s: float | None = Field(default=None, description="age of the oldest reading used, s")
+    skew_s: float | None = Field(
+        default=None,
+        description="how much later than the oldest the newest length that was used was measured, s; absent where none "
+        "was. `loop.skew_s` limits it",
+    )
     tip_M_mm: Vector | None = Field(
         default=None,
         description="the tip in {M}, the surface plate, mm; in mode cmm measured, in mode machine_tool the target, "
@@ -396,5 +401,10 @@ class StatusKeys(VersionKeys):
         "for each line of `acquisition.own_process`"
     )
     publisher: PublisherStatusKeys = Field(description="the clients")
+    skew_s: float | None = Field(
+        default=None,
+        description="how much later than the oldest the newest length that is good now was measured, s; absent where "
+        "none is",
+    )
     lines: dict[str, LineStatusKeys] = Field(description="every line, by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")

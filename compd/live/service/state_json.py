@@ -59,8 +59,8 @@ def to_plain(value: Any) -> Any:
             }
         case tuple() if hasattr(value, "_fields"):
             names = _CYCLE_STATE_FIELDS if isinstance(value, CycleState) else {name: name for name in value._fields}
-            if isinstance(value, ComparatorSet) and not value.group_times_s:
-                names = {name: name for name in names if name != "group_times_s"}
+            if isinstance(value, ComparatorSet):
+                names = {name: name for name in names if not name.endswith("_times_s") or getattr(value, name)}
             fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
         case tuple():
