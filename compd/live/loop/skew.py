@@ -33,9 +33,7 @@ def skew_of(readings: Iterable[Reading]) -> float:
 
 def skew_reason(wires: Sequence[Wire], snapshot: Snapshot, allowed_s: float) -> str:
     """Why a snapshot is refused whose lengths, of these wires, are more than `allowed_s` (s) apart."""
-    oldest, newest = (
-        pick(wires, key=lambda wire: snapshot.readings[wire.slot].time_s) for pick in (min, max)
-    )
+    oldest, newest = (pick(wires, key=lambda wire: snapshot.readings[wire.slot].time_s) for pick in (min, max))
     skew_s = snapshot.readings[newest.slot].time_s - snapshot.readings[oldest.slot].time_s
     return (
         f"the readings are {skew_s * 1e3:.0f} ms apart, allowed {allowed_s * 1e3:g} ms (`loop.skew_s`): the oldest is "
