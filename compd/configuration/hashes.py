@@ -42,6 +42,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "identity": None,
     "write_first": [],
     "write_before_poll": [],
+    "extrapolate": True,
     "skew_s": None,
     "round_trigger": None,
 }

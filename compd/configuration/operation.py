@@ -84,6 +84,11 @@ class LoopSettings(Section):
         "invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
+    extrapolate: bool = Field(
+        default=True,
+        description="carry every length on to the time of the cycle, by the speed that its own last readings show, "
+        "where that is more than they scatter; false: use each as it was read",
+    )
     skew_s: Positive | None = Field(
         default=None,
         description="how far apart in time the lengths of one setpoint may be measured: beyond it the setpoint is "

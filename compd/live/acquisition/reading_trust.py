@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.gauge import Quality, Reading, bad
+from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     Interval,
@@ -161,7 +162,7 @@ class ReadingTrust:
         self._memory.believe(self._i, sample.value, sample.time_s)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading
+        return reading._replace(motion=estimated_motion(self._history, self._tolerance_mm))
 
     def _refused(self, reading: Reading) -> Reading:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""

@@ -30,7 +30,7 @@ from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
-from compd.live.loop.tip_uncertainty import uncertainty_um, with_absent
+from compd.live.loop.tip_uncertainty import tip_uncertainty, with_absent, with_age
 from compd.live.loop.wiring import MachineWires, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -157,11 +157,13 @@ def _compute(
         return _Outcome(State.REFUSED, refusal), state
     correction_mm = limited.applied_mm
 
-    u_tip_um = state.u_tip_um
+    u_tip_um, tip_by_gauge = state.u_tip_um, state.tip_by_gauge
     if _uncertainty_is_due(tick, u_tip_um, usable, settings):
         noise = settings.noise if usable.absent_mm is None else with_absent(settings.noise, usable.absent_mm)
         setpoint_mm = compensation.scale_setpoint_mm
-        u_tip_um = None if noise is None else uncertainty_um(machine, noise, values, setpoint_mm, warm_start.effects)
+        u_tip_um = tip_by_gauge = None
+        if noise is not None:
+            u_tip_um, tip_by_gauge = tip_uncertainty(machine, noise, values, setpoint_mm, warm_start.effects)
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
@@ -184,6 +186,7 @@ def _compute(
         tip_correction_mm,
         zero_vectors,
         models,
+        tip_by_gauge,
     )
     if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
@@ -191,6 +194,8 @@ def _compute(
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
+    if u_tip_um is not None and tip_by_gauge is not None:
+        u_tip_um = with_age(u_tip_um, tip_by_gauge, _age_uncertainty_mm(snapshot, target, settings))
     setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
@@ -249,7 +254,7 @@ def _scales(
             return unread
         state = State.FAULT if lost.distrusted else State.DEGRADED
         return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm)
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
     if not lost:
         return _Scales(values, oldest_s, newest_s)
     # no policy replaces a scale: without it the tip is not known
@@ -266,6 +271,15 @@ def _uncertainty_is_due(
     return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
 
 
+def _age_uncertainty_mm(snapshot: Snapshot, target: Target | None, settings: CycleSettings) -> FloatArray:
+    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used."""
+    wires, extrapolate = settings.wires, settings.loop.extrapolate
+    age_mm = wires.length_age_uncertainty_mm(snapshot, extrapolate)
+    if target is not None:
+        age_mm[: len(wires.scale.wires)] = 0.0
+    return age_mm
+
+
 def _comparators(
     last_good: ComparatorSet | None,
     inputs: CycleInputs,
@@ -279,7 +293,8 @@ def _comparators(
     if inputs.ending:
         return None, held_comparators(last_good, inputs.ending, now_s, settings.loop)
     wires = settings.wires
-    lengths = wires.comparators.read(snapshot, zero_mm)
+    extrapolate = settings.loop.extrapolate
+    lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
     if applied.quantities:
@@ -293,16 +308,16 @@ def _comparators(
         return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
     if settings.loop.on_stale == "degrade":
         groups = (
-            _group(wires.joint, snapshot, zero_mm[: wires.joints]),
-            _group(wires.frame, snapshot, zero_mm[wires.joints :]),
+            _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
+            _group(wires.frame, snapshot, zero_mm[wires.joints :], extrapolate),
             _quantity_group(applied, snapshot),
         )
         return degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
     return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
 
 
-def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray) -> GroupReadings:
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm)
+def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, extrapolate)
     return GroupReadings(values, lost, oldest_s, newest_s)
 
 

@@ -145,11 +145,23 @@ class SetpointKeys(SentMessage):
         default=None,
         description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
         "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
-        "once a second; absent while any of them is not known",
+        "once a second, and from the age of each length and how surely its motion is known, in every cycle; absent "
+        "while any of them is not known",
     )
     shadow: ShadowKeys | None = Field(
         default=None, description="what the shadow model asks for in this cycle; absent without a shadow"
     )
+
+
+class MotionKeys(Keys):
+    """How what a length gauge measures moves, by its own last readings."""
+
+    speed_mm_per_s: float = Field(description="at the time of the reading; 0 where it does not move, or not steadily")
+    braking_mm_per_s2: float = Field(description="by how much the size of the speed falls; 0 where it does not brake")
+    u_mm_per_s: float | None = Field(
+        default=None, description="standard uncertainty of the speed; absent while it is not known"
+    )
+    horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
 
 
 class ReadingKeys(Keys):
@@ -159,6 +171,9 @@ class ReadingKeys(Keys):
     time_s: float = Field(description="when the gauge was asked, s on the daemon's monotonic clock")
     quality: Quality | None = Field(default=None, description="why there is no value; absent where there is one")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
+    motion: MotionKeys | None = Field(
+        default=None, description="of a length that is good: by it `loop.extrapolate` carries the value on"
+    )
 
 
 class ZeroFileKeys(Keys):
