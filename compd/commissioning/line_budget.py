@@ -242,8 +242,12 @@ def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) 
 def _measures_lengths(configuration: Configuration, line: str) -> bool:
     """Whether a length of the wiring is read on this line."""
     wiring = configuration.wiring
-    wired = {wire.gauge.split(".")[0] for wire in (*wiring.scale, *wiring.joint, *wiring.frame)}
-    return not wired.isdisjoint(_gauges_on(configuration, line))
+    channels = [
+        *(wire.gauge for wire in wiring.scale),
+        *(wire.gauge for wire in wiring.joint),
+        *(wire.gauge for wire in wiring.frame),
+    ]
+    return not {channel.split(".")[0] for channel in channels}.isdisjoint(_gauges_on(configuration, line))
 
 
 def _gauges_on(configuration: Configuration, line: str) -> list[str]:

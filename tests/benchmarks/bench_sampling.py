@@ -1,11 +1,11 @@
-"""The tip on the move, and when its gauges were read: `python -m tests.benchmarks.bench_sampling`.
+"""The tip on the move, and when its gauges were read: `python -m tests.benchmarks.bench_sampling [SECONDS]`.
 
-The simulated machine tours its workspace at 50 mm/s, with 250 mm/s2. Time is virtual: every request and reply takes what
-its bytes take at the line's baud rate, its silences and a turnaround as long, so that neither the computer nor its load
-is in the figures. Nine units of one register each share a line; the other lines are those of the shipped machine. The
-same readings go through the daemon's own cycle, once as they are and once carried on to the tick. The error is the
-distance of the tip from the simulated machine's true one; "at once" is what is left where every gauge is read at the
-tick.
+The simulated machine tours its workspace at 50 mm/s, with 250 mm/s2. Time is virtual: every request and reply takes
+what its bytes take at the line's baud rate, its silences and a turnaround as long; a device samples in the middle of
+its turnaround. So neither the computer nor its load is in the figures. Nine units of one register each share a line;
+the other lines are those of the shipped machine. The same readings go through the daemon's own cycle, once as they are
+and once carried on to the tick. The error is the distance of the tip from the simulated machine's true one; "at once"
+is what is left where every gauge is read at the tick.
 """
 
 from __future__ import annotations

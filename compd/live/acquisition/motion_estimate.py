@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from compd.gauge import ReadingMotion
 from compd.live.acquisition.possible_motion import Sample
@@ -54,7 +55,7 @@ def estimated_motion(history: Sequence[Sample], tolerance_mm: float) -> ReadingM
     now = slopes[0]
     if abs(history[last].value - history[start].value) <= tolerance_mm:
         return _rounded(0.0, 0.0, abs(now), horizon_s)
-    changes = [abs(later - earlier) for later, earlier in zip(slopes, slopes[1:], strict=False)]
+    changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
     u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s)
     before = slopes[1] if len(slopes) > 1 else 0.0
     if now * before <= 0.0:
@@ -101,4 +102,5 @@ def _slopes(history: Sequence[Sample], start: int, duration_s: float) -> list[fl
 
 
 def _rounded(speed: float, braking: float, u: float, horizon_s: float) -> ReadingMotion:
-    return ReadingMotion(*(round(value, _DECIMALS_MM) for value in (speed, braking, u)), round(horizon_s, _DECIMALS_S))
+    speed, braking, u = (round(value, _DECIMALS_MM) for value in (speed, braking, u))
+    return ReadingMotion(speed, braking, u, round(horizon_s, _DECIMALS_S))

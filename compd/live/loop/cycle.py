@@ -30,7 +30,7 @@ from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
-from compd.live.loop.tip_uncertainty import tip_uncertainty, with_absent, with_age
+from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty, with_absent, with_age
 from compd.live.loop.wiring import MachineWires, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -131,9 +131,8 @@ def _compute(
         return _Outcome(scales.state, reason), state if live is None else state._replace(last_good=live)
     scale_mm, oldest_s = scales.values, min(comparators.oldest_s, scales.oldest_s)
     skew_s = skew_between(comparators.length_times_s, scales.oldest_s, scales.newest_s)
-    if live is not None and settings.loop.skew_s is not None and skew_s > settings.loop.skew_s:
-        used = wires.comparators.wires if target is not None else wires.length_wires
-        return _Outcome(State.REFUSED, skew_reason(used, snapshot, settings.loop.skew_s), skew_s=skew_s), state
+    if usable.state is State.OK and skew_s > settings.largest_skew_s:  # what is held instead, `hold_s` limits
+        return _refused_skew(snapshot, skew_s, target, settings), state
     last_good = state.last_good if live is None else live
 
     change_mm, joints = comparators.change_mm, wires.joints
@@ -155,15 +154,11 @@ def _compute(
     if refusal:
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, refusal), state
-    correction_mm = limited.applied_mm
 
-    u_tip_um, tip_by_gauge = state.u_tip_um, state.tip_by_gauge
-    if _uncertainty_is_due(tick, u_tip_um, usable, settings):
+    u_tip = TipUncertainty(state.u_tip_um, state.tip_by_gauge)
+    if _uncertainty_is_due(tick, u_tip.by_noise_um, usable, settings):
         noise = settings.noise if usable.absent_mm is None else with_absent(settings.noise, usable.absent_mm)
-        setpoint_mm = compensation.scale_setpoint_mm
-        u_tip_um = tip_by_gauge = None
-        if noise is not None:
-            u_tip_um, tip_by_gauge = tip_uncertainty(machine, noise, values, setpoint_mm, warm_start.effects)
+        u_tip = tip_uncertainty(machine, noise, values, compensation.scale_setpoint_mm, warm_start.effects)
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
@@ -177,16 +172,16 @@ def _compute(
     next_state = CycleState(
         zero,
         warm_start,
-        correction_mm,
+        limited.applied_mm,
         last_good,
         scales_seen,
         shadow_memory,
         adopting,
-        u_tip_um,
+        u_tip.by_noise_um,
         tip_correction_mm,
         zero_vectors,
         models,
-        tip_by_gauge,
+        u_tip.tip_by_gauge,
     )
     if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
@@ -194,10 +189,14 @@ def _compute(
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
-    if u_tip_um is not None and tip_by_gauge is not None:
-        u_tip_um = with_age(u_tip_um, tip_by_gauge, _age_uncertainty_mm(snapshot, target, settings))
-    setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
+    u_tip_um = with_age(*u_tip, lambda: _age_uncertainty_mm(snapshot, target, settings))
+    setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
+
+
+def _refused_skew(snapshot: Snapshot, skew_s: float, target: Target | None, settings: CycleSettings) -> _Outcome:
+    wires = settings.wires.length_wires if target is None else settings.wires.comparators.wires
+    return _Outcome(State.REFUSED, skew_reason(wires, snapshot, settings.largest_skew_s), skew_s=skew_s)
 
 
 def _refusal(

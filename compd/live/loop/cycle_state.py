@@ -49,7 +49,8 @@ class CycleState(NamedTuple):
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
     adopting : whether the correction is still slewing towards that of a newly adopted model.
-    u_tip_um : (3), standard uncertainty of the tip without the age of its readings; None where it has not been computed.
+    u_tip_um : (3), standard uncertainty of the tip without the age of its readings; None where that has not been
+        computed.
     tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
         setpoint was invalid or in the other mode.
     zero_vectors : the readings of `zero`; None where they have yet to be read from it.
@@ -121,6 +122,11 @@ class CycleSettings:
     def period_s(self) -> float:
         """Seconds from tick to tick."""
         return 1.0 / self.loop.rate_hz
+
+    @cached_property
+    def largest_skew_s(self) -> float:
+        """How far apart in time the lengths of a setpoint may be, s; inf without a limit."""
+        return math.inf if self.loop.skew_s is None else self.loop.skew_s
 
     @cached_property
     def uncertainty_every(self) -> int:

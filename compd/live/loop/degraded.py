@@ -20,8 +20,8 @@ GROUPS = ("joints", "frame", "effects")
 class GroupReadings(NamedTuple):
     """The joint comparators, the frame comparators, or the quantities that the effects need, in one snapshot.
 
-    values : in mm since machine zero; of quantities nothing. lost : which cannot be used. oldest_s, newest_s : monotonic
-    times of the oldest and of the newest reading.
+    values : in mm since machine zero; of quantities nothing. lost : which cannot be used.
+    oldest_s, newest_s : monotonic times of the oldest and of the newest reading.
     """
 
     values: FloatArray

@@ -2,12 +2,16 @@
 
 A reading is as old as its gauge's turn on the line makes it, and each is differently old. Each is carried on by its own
 speed (`compd.live.acquisition.motion_estimate`), which comes with it: so a replay has all that the cycle had. One of a
-gauge that does not answer any more is not carried away: after two rounds, or at the standstill to which it braked, it stays where it is.
+gauge that does not answer any more is not carried away: after two rounds, or at the standstill to which it braked, it
+stays where it is.
 """
 
 from __future__ import annotations
 
 from compd.gauge import Reading
+
+# A device samples up to so long after the request or the trigger has left, s; a reading has the earliest time possible.
+SAMPLED_LATER_S = 1e-3
 
 
 def extrapolated(reading: Reading, now_s: float) -> float:
@@ -33,4 +37,4 @@ def age_uncertainty_mm(reading: Reading, now_s: float, carried_on: bool) -> floa
     speed, _, u_mm_per_s, horizon_s = motion
     age_s = max(0.0, now_s - reading.time_s)
     not_carried_s = max(0.0, age_s - horizon_s) if carried_on else age_s
-    return float(abs(speed) * not_carried_s + u_mm_per_s * age_s)
+    return float(abs(speed) * (SAMPLED_LATER_S + not_carried_s) + u_mm_per_s * age_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -47,28 +48,41 @@ def with_absent(noise: GaugeNoise | None, absent_mm: FloatArray) -> GaugeNoise |
 class TipUncertainty(NamedTuple):
     """Of one place of the tip.
 
-    by_noise_um : (3), standard uncertainty without age, um; nan where it is not known, see `tip_uncertainty_mm`.
+    by_noise_um : (3), standard uncertainty without age, um; nan where it is not known, see `tip_uncertainty_mm`. None
+        where the noise of a gauge is not known.
     tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, mm per mm: scales, joints, frame.
     """
 
-    by_noise_um: FloatArray
-    tip_by_gauge: FloatArray
+    by_noise_um: FloatArray | None
+    tip_by_gauge: FloatArray | None
 
 
-def with_age(by_noise_um: FloatArray, tip_by_gauge: FloatArray, age_mm: FloatArray) -> FloatArray:
-    """(3,) standard uncertainty of the tip, um, with that of each length by its age (n + k + 9), mm.
+def with_age(
+    by_noise_um: FloatArray | None, tip_by_gauge: FloatArray | None, age_mm: Callable[[], FloatArray]
+) -> FloatArray | None:
+    """(3,) standard uncertainty of the tip, um, with that of each length by its age; None where there is none.
 
-    Gauges that are not read at the same time are independent here: so the skew of a setpoint is in it, too.
+    Each length has its own age, and they count as independent: so the skew of a setpoint is in it, too.
+
+    by_noise_um, tip_by_gauge : a `TipUncertainty`; without `tip_by_gauge`, in a recording of a release up to 0.2.0,
+        age does not count. age_mm : gives that of each length by its age, (n + k + 9), mm.
     """
-    by_age = tip_by_gauge * (UM_PER_MM * age_mm)
+    if by_noise_um is None or tip_by_gauge is None:
+        return by_noise_um
+    length_mm = age_mm()
+    if not length_mm.any():
+        return by_noise_um
+    by_age = tip_by_gauge * (UM_PER_MM * length_mm)
     total_um: FloatArray = np.sqrt(by_noise_um * by_noise_um + (by_age * by_age).sum(axis=1))
     return total_um
 
 
 def tip_uncertainty(
-    machine: MachineModel, noise: GaugeNoise, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
+    machine: MachineModel, noise: GaugeNoise | None, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
 ) -> TipUncertainty:
     """Of the tip with the scales at scale_mm (n,)."""
+    if noise is None:
+        return TipUncertainty(None, None)
     assert machine.constants is not None
     motion = effects.motion
     rows = observe(

@@ -129,7 +129,7 @@ def packed(reading: Reading) -> bytes:
 def unpacked(content: bytes) -> Reading | None:
     """The reading in the content of a slot; None where its checksum does not fit."""
     value, time_s, speed, braking, u, horizon_s, number, length, checksum = _HEAD.unpack_from(content)
-    motion = None if horizon_s != horizon_s else ReadingMotion(speed, braking, u, horizon_s)
+    motion = None if math.isnan(horizon_s) else ReadingMotion(speed, braking, u, horizon_s)
     if not length:
         whole = zlib.crc32(content[:_CHECKED_BYTES]) == checksum
         return Reading(value, time_s, _QUALITIES[number], "", motion) if whole else None

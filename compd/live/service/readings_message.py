@@ -115,10 +115,9 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
 def _reading(reading: Reading) -> dict[str, Any]:
     """A reading as plain data: its value, or why there is none."""
     value, time_s, quality, detail, motion = reading
-    if quality is Quality.OK and motion is None:
-        return {"value": value, "time_s": time_s}
     if quality is Quality.OK:
-        return {"value": value, "time_s": time_s, "motion": omit_unknown(motion._asdict())}
+        good = {"value": value, "time_s": time_s}
+        return good if motion is None else good | {"motion": omit_unknown(motion._asdict())}
     fault = {"quality": quality, "time_s": time_s}
     return fault | {"detail": detail} if detail else fault
 

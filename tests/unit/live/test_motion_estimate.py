@@ -94,8 +94,8 @@ def test_readings_at_the_same_time_have_no_speed():
 
 def test_the_uncertainty_grows_with_age_and_is_larger_where_nothing_is_carried_on():
     reading = Reading(1.0, 10.0, Quality.OK, "", ReadingMotion(50.0, 0.0, 2.0, 0.08))
-    assert age_uncertainty_mm(reading, 10.05, carried_on=True) == pytest.approx(0.05 * 2.0)
-    assert age_uncertainty_mm(reading, 10.05, carried_on=False) == pytest.approx(0.05 * 52.0)
+    assert age_uncertainty_mm(reading, 10.05, carried_on=True) == pytest.approx(0.05 * 2.0 + 0.05)
+    assert age_uncertainty_mm(reading, 10.05, carried_on=False) == pytest.approx(0.05 * 52.0 + 0.05)
     beyond = age_uncertainty_mm(reading, 10.18, carried_on=True)
-    assert beyond == pytest.approx(0.18 * 2.0 + 0.1 * 50.0), "silent: the motion goes on unseen"
+    assert beyond == pytest.approx(0.18 * 2.0 + 0.1 * 50.0 + 0.05), "silent: the motion goes on unseen"
     assert age_uncertainty_mm(bad(10.0, Quality.TIMEOUT), 10.05, carried_on=True) == 0.0

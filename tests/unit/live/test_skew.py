@@ -83,6 +83,7 @@ def test_while_comparators_are_held_their_age_is_skew_and_hold_s_limits_it():
 @pytest.mark.parametrize("lost", ["joints.1", "cabinet.t1"])
 def test_degraded_groups_count_until_they_are_absent(lost):
     live = machine(on_stale="degrade")
+    live.settings = replace(live.settings, loop=live.settings.loop.model_copy(update={"skew_s": 0.05}))
     live.settle()
     live.faults[lost] = Quality.LINE_LOST
     for _ in range(40):
