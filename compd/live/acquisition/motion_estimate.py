@@ -30,6 +30,8 @@ LONGEST_WINDOW_S = 1.0
 LARGEST_GROWTH = 2.0
 # A reading is replaced one round after it was made, and one that waits for the end of its round after two.
 HORIZON_ROUNDS = 2.0
+# Drives come to rest from their full speed within 0.1 to 0.3 s: for longer than this, s, no motion is taken to go on.
+LONGEST_HORIZON_S = 0.15
 # A tolerance is six standard deviations of the difference between two readings.
 SIGMAS = 6.0
 # Windows are as long as the last one but for the scatter of polls.
@@ -50,7 +52,7 @@ def estimated_motion(history: Sequence[Sample], tolerance_mm: float) -> ReadingM
     if duration_s <= 0.0:
         return UNKNOWN
     rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
-    horizon_s = HORIZON_ROUNDS * max(rounds)
+    horizon_s = min(HORIZON_ROUNDS * max(rounds), LONGEST_HORIZON_S)
     slopes = _slopes(history, start, duration_s)
     now = slopes[0]
     if abs(history[last].value - history[start].value) <= tolerance_mm:

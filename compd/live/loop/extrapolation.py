@@ -2,8 +2,8 @@
 
 A reading is as old as its gauge's turn on the line makes it, and each is differently old. Each is carried on by its own
 speed (`compd.live.acquisition.motion_estimate`), which comes with it: so a replay has all that the cycle had. One of a
-gauge that does not answer any more is not carried away: after two rounds, or at the standstill to which it braked, it
-stays where it is.
+gauge that does not answer any more is not carried away: after two rounds or 0.15 s, or at the standstill to which it
+braked, it stays where it is.
 """
 
 from __future__ import annotations

@@ -77,6 +77,13 @@ def test_a_gauge_that_falls_silent_is_not_carried_away():
     assert [carried(values, age_s) for age_s in (0.08, 0.1, 0.5)] == pytest.approx([end] * 3)
 
 
+def test_where_a_round_takes_long_nothing_is_carried_on_for_longer_than_drives_take_to_stop():
+    slow = [50.0 * 0.2 * k for k in range(6)]
+    shown = motion(slow, [0.2 * k for k in range(6)])
+    assert shown.speed_mm_per_s == pytest.approx(50.0)
+    assert shown.horizon_s == 0.15
+
+
 def test_a_start_is_carried_on_with_at_most_twice_the_speed_before():
     assert motion([0.0, 0.0, 0.1, 1.0]).speed_mm_per_s == pytest.approx(2 * 0.1 / ROUND_S)
 
