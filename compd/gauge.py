@@ -85,6 +85,23 @@ class Quality(StrEnum):
     DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
 
 
+class ReadingMotion(NamedTuple):
+    """How what a length gauge measures moves, by its own last readings. compd finds it; a driver leaves it out.
+
+    Attributes
+    ----------
+    speed_mm_per_s : at the time of the reading, mm/s; 0 where it does not move, or not steadily.
+    braking_mm_per_s2 : by how much its size falls, mm/s2; 0 where it does not brake.
+    u_mm_per_s : standard uncertainty of the speed, mm/s; nan where there are not enough readings yet.
+    horizon_s : for so long after a reading, s, the motion may be taken to go on.
+    """
+
+    speed_mm_per_s: float
+    braking_mm_per_s2: float
+    u_mm_per_s: float
+    horizon_s: float
+
+
 class Reading(NamedTuple):
     """One channel of one gauge at one time. Drivers make it by `good` and `bad`.
 
@@ -95,12 +112,14 @@ class Reading(NamedTuple):
         have sampled, so that the age of a reading is never understated.
     quality : OK, or the reason why there is no value.
     detail : what the device sent or the line saw, for a person ("ER,MS,31"); "" when OK.
+    motion : of a length, where compd knows it; drivers leave it out.
     """
 
     value: float
     time_s: float
     quality: Quality
     detail: str = ""
+    motion: ReadingMotion | None = None
 
     @property
     def ok(self) -> bool:

@@ -5,6 +5,9 @@ takes to answer. What the computer adds is not in it.
 
     exchange = quiet + (sent + received) x character + turnaround,    round = sum of all exchanges,    rate = 1 / round
 
+A round trigger and its settling time come before them. Without it the readings of a round are apart by all exchanges
+but one.
+
 Where replies do not say whose they are, a round ends with a silence that is longer than the longest exchange.
 
 Example: nine values as int16 in one block (8 bytes there, 23 back) at 19200 baud, 8N1: a character takes 0.52 ms, the
@@ -19,6 +22,7 @@ from dataclasses import dataclass, field, replace
 
 from compd.configuration import Configuration
 from compd.configuration.lines import LineSettings, ModbusAsciiLine, ModbusRtuLine, SerialPortSettings
+from compd.configuration.round_trigger import BROADCAST, WRITE_REGISTERS, TriggerBytes
 from compd.errors import Problem
 from compd.gauge import replies_tell_whose
 from compd.lines.open import QUIET_CHARACTERS
@@ -31,6 +35,9 @@ USUAL_TURNAROUND_S = 10e-3
 # An FTDI adapter hands over a packet that is not full when its latency timer has run out: 16 ms, if nobody shortens it
 # (FTDI AN232B-04, "Data Throughput, Latency and Handshaking").
 LATENCY_TIMER_S = 16e-3
+# Lengths that are further apart, s, and nobody limits it or latches them: at 1 mm/s, which is slow for a machine that
+# moves, 20 um, and a comparator shows a hundredth of that.
+LARGEST_SPREAD_S = 0.02
 # Over Ethernet: a packet there and back through a device's firmware. No bits to count.
 TCP_EXCHANGE_S = 2e-3
 
@@ -85,6 +92,7 @@ class LineBudget:
 
     bytes : there and back. ideal_s, usual_s : duration of a round with the shortest and the usual turnaround.
     absent_s : what a round costs more when a device that is absent is asked again.
+    spread_s : time from the first to the last reading of a round, with the usual turnaround; 0 behind a round trigger.
     unknown : gauges whose drivers do not say what they move; they are not in the figures.
     """
 
@@ -96,6 +104,7 @@ class LineBudget:
     ideal_s: float
     usual_s: float
     absent_s: float
+    spread_s: float = 0.0
     unknown: tuple[str, ...] = field(default=())
 
     @property
@@ -128,6 +137,8 @@ def budget_of_line(
         gauges = {name: traffic and [_as_text(*exchange) for exchange in traffic] for name, traffic in gauges.items()}
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
     slowest = pace(line, USUAL_TURNAROUND_S)
+    trigger_s = _trigger_s(line, pace(line)) if known else 0.0
+    usual_s = [slowest.exchange_s(*exchange) for exchange in known]
     # The request goes out, and nothing comes for the timeout.
     absent_s = max(
         (line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
@@ -139,11 +150,30 @@ def budget_of_line(
         gauges=len(gauges),
         exchanges=len(known),
         bytes=sum(sent + received for sent, received in known),
-        ideal_s=pace(line).round_s(known) + (0.0 if tells_whose else _silence_s(pace(line), known)),
-        usual_s=slowest.round_s(known) + (0.0 if tells_whose else _silence_s(slowest, known)),
+        ideal_s=trigger_s + pace(line).round_s(known) + (0.0 if tells_whose else _silence_s(pace(line), known)),
+        usual_s=trigger_s + sum(usual_s) + (0.0 if tells_whose else _silence_s(slowest, known)),
         absent_s=absent_s,
+        spread_s=0.0 if line.round_trigger is not None else sum(usual_s) - min(usual_s, default=0.0),
         unknown=tuple(gauge for gauge, traffic in gauges.items() if traffic is None),
     )
+
+
+def _trigger_s(line: LineSettings, line_pace: Pace) -> float:
+    """What a round trigger takes with its settling time, s; over TCP, and to one slave alone, with its confirmation."""
+    trigger = line.round_trigger
+    if trigger is None:
+        return 0.0
+    settle_s = trigger.settle_s or 0.0
+    if isinstance(trigger, TriggerBytes):
+        return line_pace.quiet_s + len(trigger.request) * line_pace.character_s + settle_s
+    several = trigger.function == WRITE_REGISTERS
+    sent = 9 + 2 * len(trigger.values) if several else 8  # Modbus over Serial Line V1.02: with unit and CRC
+    received = 8
+    if isinstance(line, ModbusAsciiLine):
+        (sent, received) = _as_text(sent, received)
+    if trigger.unit == BROADCAST and isinstance(line, SerialPortSettings):
+        return line_pace.quiet_s + sent * line_pace.character_s + settle_s
+    return max(line_pace.exchange_s(sent, received), settle_s)
 
 
 def _as_text(sent: int, received: int) -> tuple[int, int]:
@@ -177,7 +207,50 @@ def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget])
             for gauge in _gauges_on(configuration, budget.name)
         )
         problems += line_warnings(budget, stale_after_s, configuration.where("lines", budget.name))
+    return [*problems, *_skew_warnings(configuration, budgets)]
+
+
+def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
+    """Lines whose lengths are measured far apart: beyond `loop.skew_s`, or unnoticed where that is left out."""
+    allowed_s = configuration.loop.skew_s
+    measuring = [budget for budget in budgets if budget.known and _measures_lengths(configuration, budget.name)]
+    problems = []
+    for budget in measuring:
+        # just before its next reading comes, a length is a round older than the newest of another line
+        skew_s = max(budget.usual_s, budget.line.poll_every_s)
+        if allowed_s is not None and skew_s > allowed_s:
+            problems.append(
+                Problem(
+                    where=configuration.where("loop", "skew_s"),
+                    what=f"line `{budget.name}` takes {skew_s * 1e3:.0f} ms for a round: setpoints will be refused",
+                    value=f"{allowed_s:g} s",
+                    allowed=f"{skew_s:.3g} s or more",
+                    next_step="raise it, or the baud rate, or spread the gauges over more lines",
+                )
+            )
+        elif allowed_s is None and budget.spread_s > LARGEST_SPREAD_S:
+            problems.append(
+                Problem(
+                    where=configuration.where("lines", budget.name),
+                    what=f"its lengths are measured {budget.spread_s * 1e3:.0f} ms apart within a round: on the move "
+                    "they do not belong together, and no setpoint is refused for it",
+                    allowed=f"{LARGEST_SPREAD_S * 1e3:g} ms, or a limit",
+                    next_step="set `round_trigger` where the devices can latch, or say by `loop.skew_s` how far apart "
+                    "lengths may be",
+                )
+            )
     return problems
+
+
+def _measures_lengths(configuration: Configuration, line: str) -> bool:
+    """Whether a length of the wiring is read on this line."""
+    wiring = configuration.wiring
+    channels = [
+        *(wire.gauge for wire in wiring.scale),
+        *(wire.gauge for wire in wiring.joint),
+        *(wire.gauge for wire in wiring.frame),
+    ]
+    return not {channel.split(".")[0] for channel in channels}.isdisjoint(_gauges_on(configuration, line))
 
 
 def _gauges_on(configuration: Configuration, line: str) -> list[str]:

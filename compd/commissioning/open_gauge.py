@@ -28,6 +28,7 @@ from compd.lines import Line, open_line, open_stream
 from compd.lines.echo import explained
 from compd.lines.port import Port
 from compd.lines.stream import StreamLine
+from compd.live.acquisition.round_trigger import read_latched
 from compd.plugins import GAUGES, load
 
 SettingsT = TypeVar("SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusAsciiLine, ModbusTcpLine)
@@ -226,7 +227,7 @@ def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Seq
     """One poll on a line that is opened for it and closed again, with its bytes shown. Raises LineFault."""
     line = open_tapped_line(target.line, clock, listener)
     try:
-        return target.gauge.read(line)
+        return read_latched(target.gauge, line, target.line.round_trigger)
     except LineFault as fault:
         raise explained(fault, line) from fault
     finally:
@@ -247,7 +248,7 @@ def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator
             try:
                 if line is None:
                     line = open_line(target.line, clock)
-                yield target.gauge.read(line)
+                yield read_latched(target.gauge, line, target.line.round_trigger)
             except LineFault as raised:
                 fault = raised if line is None else explained(raised, line)
                 yield [bad(clock.monotonic(), fault.quality, fault.detail)] * len(target.gauge.channels)

@@ -42,6 +42,9 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "identity": None,
     "write_first": [],
     "write_before_poll": [],
+    "extrapolate": True,
+    "skew_s": None,
+    "round_trigger": None,
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

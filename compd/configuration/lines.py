@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
+from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.configuration.section import Positive, Section, Text, refusal
 from compd.gauge import Gauge
 
@@ -26,6 +27,9 @@ class _LineSettings(Section):
     pause_s: NotNegative = Field(
         default=0.0, description="from a reply to the next request, for devices that are deaf after a reply"
     )
+
+
+_TRIGGER = "latches all gauges of the line before each round: their readings have its time; left out: none does"
 
 
 class Rs485(Section):
@@ -81,6 +85,7 @@ class SerialLine(SerialPortSettings):
     """RS-232 or RS-485: a serial port, or a pyserial URL."""
 
     kind: Literal["serial"] = Field(description="bytes over a serial port")
+    round_trigger: TriggerBytes | None = Field(default=None, description=_TRIGGER)
 
 
 class TcpLine(_LineSettings):
@@ -90,6 +95,7 @@ class TcpLine(_LineSettings):
     host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="TCP port of the device")
     echo: bool = Field(default=False, description=_ECHO)
+    round_trigger: TriggerBytes | None = Field(default=None, description=_TRIGGER)
 
 
 class _ModbusSerialSettings(SerialPortSettings):
@@ -98,6 +104,7 @@ class _ModbusSerialSettings(SerialPortSettings):
         description="ask for a register more every second time, so that a late reply has another length; a slave that "
         "refuses it, or is silent, is not asked again: switch it off for one that does worse",
     )
+    round_trigger: TriggerWrite | None = Field(default=None, description=_TRIGGER)
 
 
 class ModbusRtuLine(_ModbusSerialSettings):
@@ -118,6 +125,7 @@ class ModbusTcpLine(_LineSettings):
     kind: Literal["modbus_tcp"] = Field(description="Modbus TCP registers")
     host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(default=502, description="TCP port of the device")
+    round_trigger: TriggerWrite | None = Field(default=None, description=_TRIGGER)
 
 
 def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:

@@ -84,6 +84,16 @@ class LoopSettings(Section):
         "invalid at once"
     )
     hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
+    extrapolate: bool = Field(
+        default=True,
+        description="carry every length on to the time of the cycle, by the speed that its own last readings show, "
+        "where that is more than they scatter; false: use each as it was read",
+    )
+    skew_s: Positive | None = Field(
+        default=None,
+        description="how far apart in time the lengths of one setpoint may be measured: beyond it the setpoint is "
+        "`refused`; left out: as far as `stale_after_s` allows",
+    )
     priority: Annotated[int, Field(ge=1, le=98)] = Field(
         default=40, description="real-time priority of the loop (SCHED_FIFO), where permitted"
     )

@@ -199,7 +199,8 @@ class StreamLine:
         self._received.clear()
         self._next_line_s = math.nan
         give_up_s = self._clock.monotonic() + self._timeout_s
-        while data := self._port.read(self._last_byte_s + self._gap_s - self._clock.monotonic()):
+        # also behind what was sent and is not answered
+        while data := self._port.read(max(self._last_byte_s, self._left_s) + self._gap_s - self._clock.monotonic()):
             self._last_byte_s = self._clock.monotonic()
             self.unexpected_bytes += len(data)
             if self._last_byte_s > give_up_s:

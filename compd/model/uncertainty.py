@@ -64,15 +64,29 @@ def parameter_variance(derivatives: FloatArray, covariance: FloatArray) -> Float
     return np.asarray((derivatives @ covariance * derivatives).sum(axis=2))
 
 
-def tip_uncertainty_mm(model: MachineModel, rows: Observations, noise: GaugeNoise, memories: Memories) -> FloatArray:
+def tip_sensitivities(model: MachineModel, rows: Observations) -> dict[Port, Sensitivity]:
+    """Derivatives of the tip at every port at which a gauge is read or an effect adds, for `tip_uncertainty_mm`."""
+    return sensitivities(
+        model, rows, {*GAUGE_PORTS, *(port for fitted in model.live_effects for port in fitted.effect.ports)}
+    )
+
+
+def tip_uncertainty_mm(
+    model: MachineModel,
+    rows: Observations,
+    noise: GaugeNoise,
+    memories: Memories,
+    by_port: Mapping[Port, Sensitivity] | None = None,
+) -> FloatArray:
     """Standard uncertainty of the tip (N, 3): in {M}, with the tool on the plate of the touched place in {P}.
+
+    by_port : the `tip_sensitivities` at these rows, where they are known already.
 
     The noise of the scales also changes what an effect at the port `scale` adds; that is left out: at most a few per
     cent of the noise itself.
     nan where a fitted number's error or a needed quantity's noise is not known.
     """
-    ports = {port for fitted in model.live_effects for port in fitted.effect.ports}
-    by_port = sensitivities(model, rows, {*ports, *GAUGE_PORTS})
+    by_port = tip_sensitivities(model, rows) if by_port is None else by_port
     variance = gauge_variance({port: by_port[port].tip for port in GAUGE_PORTS}, noise)
     variance = variance + _variance_by_effects(model, rows, by_port, memories)
     for name in rows.quantities:

@@ -17,6 +17,7 @@ ATTITUDES = ("rx", "ry", "rz")
 FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
 ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
 DISTANCE_COLUMN = "reference_distance_mm"
+SKEW_COLUMN = "skew_s"
 POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
 # Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
@@ -79,6 +80,12 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             r"frame_(?:t[1-3]|u[1-6])",
             "um",
             "frame comparators: change of the distances t1 to t3, u1 to u6 since machine zero",
+        ),
+        (
+            "skew_s",
+            r"skew",
+            "s",
+            "how much later than the oldest the newest length of the row was measured; optional, and no covariate",
         ),
         (
             "approach_<i>",
@@ -149,7 +156,7 @@ _RESERVED = re.compile(
     r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
 )
 _COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")
-_COMMON = ("time_s", *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
+_COMMON = ("time_s", SKEW_COLUMN, *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
 
 
 class ColumnName(NamedTuple):

@@ -16,6 +16,7 @@ from compd.recording.columns import (
     DISTANCE_COLUMN,
     FRAME_COLUMNS,
     ID_COLUMNS,
+    SKEW_COLUMN,
     approach_columns,
     joint_columns,
     parse_name,
@@ -299,7 +300,7 @@ def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) 
 
 def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
     """Names of the columns that have no attribute of their own in a Recording."""
-    own = {"time_s", *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
+    own = {"time_s", SKEW_COLUMN, *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
     own |= {*scale_columns(layout.scales), *joint_columns(layout.joints)}
     own |= {*approach_columns(layout.scales)} if layout.approach else set()
     return (name for name in names if name not in own and not name.startswith(("reference_", "model_")))

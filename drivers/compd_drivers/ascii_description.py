@@ -7,10 +7,11 @@ from typing import NamedTuple, Self
 
 from pydantic import Field, model_validator
 
+from compd.escapes import unescape
 from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.number_form import DecimalMark
-from compd_drivers.reply_format import ReplyFormat, unescape
+from compd_drivers.reply_format import ReplyFormat
 
 # An error form that fits more than this share of so many values of all kinds leaves no value.
 NEARLY_EVERY = 0.9

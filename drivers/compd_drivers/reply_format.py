@@ -36,13 +36,12 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from random import Random
 from typing import Literal, cast
 
+from compd.escapes import unescape
 from compd_drivers.checksums import CHECKSUMS, ChecksumField, ChecksumKind
 from compd_drivers.number_form import DecimalMark, FactorWords, NumberForm, characters
 
 OPEN_LENGTH = 32  # bytes of a number without width: more than any instrument sends
 OPEN_SKIPPED = 256  # bytes of a skipped part without width, such as the rest of a protocol's line
-_ESCAPE = re.compile(r"\\(?:x([0-9A-Fa-f]{2})|(.))", re.DOTALL)
-_ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}
 _CONVERTER = re.compile(
     r"%(?:(?P<percent>%)"
     r"|(?P<digits>[0#]?)(?P<skip>\d*)(?:\.(?P<behind>\d+))?<(?P<checksum>\w+)>"
@@ -50,24 +49,6 @@ _CONVERTER = re.compile(
     r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]|\{(?P<words>[^}]*)\}))",
 )
 _BYTE = struct.Struct("B").pack
-
-
-def unescape(text: str) -> bytes:
-    r"""Bytes for text with \r \n \t \\ \xHH. ValueError for another escape, or a character beyond \xff."""
-
-    def byte(match: re.Match[str]) -> str:
-        if match[1]:
-            return chr(int(match[1], 16))
-        if match[2] not in _ESCAPES:
-            raise ValueError(f"unknown escape \\{match[2]}; there are \\r \\n \\t \\\\ and \\xHH")
-        return _ESCAPES[match[2]]
-
-    if text.endswith("\\") and not text.endswith("\\\\"):
-        raise ValueError("a single backslash at the end; write \\\\")
-    try:
-        return _ESCAPE.sub(byte, text).encode("latin-1")
-    except UnicodeEncodeError as error:
-        raise ValueError(f"{text[error.start]!r} is not a single byte; write its code as \\xHH") from error
 
 
 class ReplyFormat:

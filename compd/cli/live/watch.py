@@ -210,11 +210,12 @@ def state_colour(name: str) -> str:
 def _headline(version: dict[str, Any], setpoint: dict[str, Any]) -> Text:
     state = setpoint["state"]
     age = f", oldest gauge {setpoint['age_s'] * 1e3:.0f} ms" if "age_s" in setpoint else ""
+    skew = f", skew {setpoint['skew_s'] * 1e3:.0f} ms" if "skew_s" in setpoint else ""
     return Text.assemble(
         (version["machine"], "bold"),
         "  ",
         (state.upper(), f"bold {state_colour(state)}"),
-        f"  {setpoint['mode']}, setpoint {setpoint['seq']}{age}",
+        f"  {setpoint['mode']}, setpoint {setpoint['seq']}{age}{skew}",
     )
 
 

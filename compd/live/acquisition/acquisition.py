@@ -25,6 +25,7 @@ from compd.lines.stream import shown
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.reply_order import ReplyOrder
+from compd.live.acquisition.round_trigger import send_trigger
 from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
 
@@ -34,6 +35,8 @@ _NO_TRUST: Mapping[str, ReadingTrust] = {}
 # Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
 # take the interpreter from the other lines, and a processor from everybody.
 FASTEST_ROUND_S = 2e-3
+# In place of a round trigger's time, where it could not be sent.
+NOT_LATCHED_S = -math.inf
 # Faults after which no byte of a reply can follow. After all others the line is drained, or the rest of a reply would
 # be taken for the answer to the next request.
 NOTHING_UNDER_WAY = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
@@ -105,6 +108,7 @@ class LineThread:
         self._settings = settings
         self._clock = clock
         self._opener = opener
+        self._trigger = settings.round_trigger
         self._line: OpenLine | None = None
         self._order = ReplyOrder([driver for _, driver in gauges], settings.timeout_s)
         self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the time from request to reply, s
@@ -196,9 +200,11 @@ class LineThread:
         """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
         self._dropped_before = line.unexpected_bytes
-        for gauge in self.gauges:
-            if gauge.rests_until_s <= start_s and not self._stop.is_set():
-                self._poll(gauge, line)
+        due = [gauge for gauge in self.gauges if gauge.rests_until_s <= start_s]
+        latched_s = self._latch(due, line)
+        for gauge in due:
+            if latched_s != NOT_LATCHED_S and not self._stop.is_set():
+                self._poll(gauge, line, latched_s)
         self._publish_waiting(line)
         end_s = self._clock.monotonic()
         self.round_s = end_s - start_s
@@ -207,10 +213,30 @@ class LineThread:
         if wake_s > end_s:
             self._clock.wait(self._stop, wake_s - end_s)
 
-    def _poll(self, gauge: PolledGauge, line: OpenLine) -> None:
+    def _latch(self, due: Sequence[PolledGauge], line: OpenLine) -> float | None:
+        """Send the round trigger: its time (s); None where the line has none, NOT_LATCHED_S where it failed.
+
+        The gauges of that round have no value then: they would show what they have latched before. Raises LineFault
+        (LINE_LOST).
+        """
+        if self._trigger is None or not due:
+            return None
+        try:
+            return send_trigger(self._trigger, line)
+        except LineFault as fault:
+            if fault.quality is Quality.LINE_LOST:
+                raise
+            first, *others = due
+            text = f"round trigger: {explained(fault, line).detail}"
+            self._fail(first, line, fault.quality, text)
+            for gauge in others:
+                gauge.fail(fault.quality, text, self._clock.monotonic())
+            return NOT_LATCHED_S
+
+    def _poll(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> None:
         with self._faults_of(gauge, line):
             before_s = line.last_request_s
-            readings = self._ask(gauge, line)
+            readings = self._ask(gauge, line, latched_s)
             now_s = self._clock.monotonic()
             self._back_off.succeeded()
             # a device that speaks unasked has no late replies
@@ -222,16 +248,16 @@ class LineThread:
                     self._order.answered(now_s - asked_s)
                 gauge.put(readings, now_s)
 
-    def _ask(self, gauge: PolledGauge, line: OpenLine) -> Sequence[Reading]:
+    def _ask(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> Sequence[Reading]:
         """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""
         now_s = self._clock.monotonic()
         self._order.asked(now_s)
         if not (gauge.fresh(now_s) and self._order.asks_twice()):
-            return gauge.read(line)
+            return gauge.read(line, latched_s)
         gauge.driver.read(line)
         again_s = self._clock.monotonic()
         self._order.asked(again_s)
-        readings = gauge.read(line)
+        readings = gauge.read(line, latched_s)
         self._order.answered_again(self._clock.monotonic() - again_s)
         return readings
 

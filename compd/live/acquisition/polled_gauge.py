@@ -12,6 +12,7 @@ from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
 from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
+from compd.live.acquisition.round_trigger import stamped
 from compd.live.memory.latest import LONGEST_DETAIL, Latest
 
 log = structlog.get_logger()
@@ -93,9 +94,12 @@ class PolledGauge:
         self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
         self._logged = Quality.NEVER_READ
 
-    def read(self, line: Any) -> Sequence[Reading]:
-        """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises."""
-        return self._trust.read(lambda: self.driver.read(line))
+    def read(self, line: Any, latched_s: float | None = None) -> Sequence[Reading]:
+        """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises.
+
+        latched_s : when the round trigger has latched it, monotonic time (s); None without one.
+        """
+        return self._trust.read(lambda: stamped(self.driver.read(line), latched_s))
 
     def put(self, readings: Sequence[Reading], now_s: float) -> None:
         """Publish the readings of one poll, one per channel in order, and count the poll.

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.gauge import Quality, Reading, bad
+from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     Interval,
@@ -161,7 +162,7 @@ class ReadingTrust:
         self._memory.believe(self._i, sample.value, sample.time_s)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading
+        return reading._replace(motion=estimated_motion(self._history, self._tolerance_mm))
 
     def _refused(self, reading: Reading) -> Reading:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
@@ -193,7 +194,11 @@ class ReadingTrust:
         return self._begin(reading, sample, first)
 
     def _continued(self, reading: Reading, sample: Sample, first: Reading | None) -> Reading:
-        """A reading that follows others, of a gauge that was never away."""
+        """A reading that follows others, of a gauge that was never away.
+
+        The second answer of a gauge that was latched is the same sample once more: it says whether the first one was
+        damaged, and nothing of motion.
+        """
         earlier = None if first is None else Sample(first.value, first.time_s, sample.window_s)
         if self._is_expected(sample):
             return self._believed(reading, sample)
@@ -207,13 +212,15 @@ class ReadingTrust:
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits
         before, base_s = self._speed_before()
-        if self._is_from_rest_to_rest(before, earlier, sample):
+        latched = earlier.time_s == sample.time_s
+        if not latched and self._is_from_rest_to_rest(before, earlier, sample):
             duration_s = earlier.time_s + earlier.window_s - last.time_s
             possible = abs(earlier.value - last.value) <= rest_to_rest_mm(limits, duration_s, self._tolerance_mm)
         else:
             possible = is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits)
         if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
-            self._history.append(earlier)
+            if not latched:
+                self._history.append(earlier)
             return self._believed(reading, sample)
         if stays:
             self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)

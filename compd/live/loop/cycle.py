@@ -27,9 +27,10 @@ from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
 from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
+from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
 from compd.live.loop.states import Mode, State
-from compd.live.loop.tip_uncertainty import uncertainty_um, with_absent
+from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty, with_absent, with_age
 from compd.live.loop.wiring import MachineWires, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -45,6 +46,7 @@ class _Outcome(NamedTuple):
     """State and reason of a setpoint, with its values where they are valid.
 
     oldest_s : monotonic time of the oldest reading used. expires_s : from when the readings must not be used any more.
+    skew_s : between the oldest and the newest length that was used; nan where that is not known.
     """
 
     state: State
@@ -52,6 +54,7 @@ class _Outcome(NamedTuple):
     values: SetpointValues | None = None
     oldest_s: float = math.nan
     expires_s: float = math.nan
+    skew_s: float = math.nan
 
 
 def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tuple[Setpoint, CycleState]:
@@ -98,6 +101,7 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         models.applied.hash,
         inputs,
         state,
+        outcome.skew_s,
     )
     return setpoint, next_state
 
@@ -120,13 +124,16 @@ def _compute(
     comparators = usable.comparators
     if comparators is None:
         return _Outcome(usable.state, usable.reason), state
-    last_good = state.last_good if live is None else live
 
     scales = _scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
     if scales.state is not None and not scales.state.valid:
         reason = "; ".join(filter(None, (scales.reason, usable.reason)))
-        return _Outcome(scales.state, reason), state._replace(last_good=last_good)
+        return _Outcome(scales.state, reason), state if live is None else state._replace(last_good=live)
     scale_mm, oldest_s = scales.values, min(comparators.oldest_s, scales.oldest_s)
+    skew_s = skew_between(comparators.length_times_s, scales.oldest_s, scales.newest_s)
+    if usable.state is State.OK and skew_s > settings.largest_skew_s:  # what is held instead, `hold_s` limits
+        return _refused_skew(snapshot, skew_s, target, settings), state
+    last_good = state.last_good if live is None else live
 
     change_mm, joints = comparators.change_mm, wires.joints
     values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
@@ -147,13 +154,11 @@ def _compute(
     if refusal:
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, refusal), state
-    correction_mm = limited.applied_mm
 
-    u_tip_um = state.u_tip_um
-    if _uncertainty_is_due(tick, u_tip_um, usable, settings):
+    u_tip = TipUncertainty(state.u_tip_um, state.tip_by_gauge)
+    if _uncertainty_is_due(tick, u_tip.by_noise_um, usable, settings):
         noise = settings.noise if usable.absent_mm is None else with_absent(settings.noise, usable.absent_mm)
-        setpoint_mm = compensation.scale_setpoint_mm
-        u_tip_um = None if noise is None else uncertainty_um(machine, noise, values, setpoint_mm, warm_start.effects)
+        u_tip = tip_uncertainty(machine, noise, values, compensation.scale_setpoint_mm, warm_start.effects)
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
@@ -167,15 +172,16 @@ def _compute(
     next_state = CycleState(
         zero,
         warm_start,
-        correction_mm,
+        limited.applied_mm,
         last_good,
         scales_seen,
         shadow_memory,
         adopting,
-        u_tip_um,
+        u_tip.by_noise_um,
         tip_correction_mm,
         zero_vectors,
         models,
+        u_tip.tip_by_gauge,
     )
     if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
@@ -183,8 +189,14 @@ def _compute(
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
-    setpoint_values = _setpoint_values(compensation, correction_mm, u_tip_um, shadow, wires.tool_on_plate)
-    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s), next_state
+    u_tip_um = with_age(*u_tip, lambda: _age_uncertainty_mm(snapshot, target, settings))
+    setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
+    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
+
+
+def _refused_skew(snapshot: Snapshot, skew_s: float, target: Target | None, settings: CycleSettings) -> _Outcome:
+    wires = settings.wires.length_wires if target is None else settings.wires.comparators.wires
+    return _Outcome(State.REFUSED, skew_reason(wires, snapshot, settings.largest_skew_s), skew_s=skew_s)
 
 
 def _refusal(
@@ -218,13 +230,14 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
 
 
 class _Scales(NamedTuple):
-    """The scales of a cycle: values (n) in mm since machine zero, and the time of the oldest reading.
+    """The scales of a cycle: values (n) in mm since machine zero, and the times of the oldest and the newest reading.
 
     state, reason : where they make the setpoint invalid or worse than it were; None and "" otherwise.
     """
 
     values: FloatArray
     oldest_s: float
+    newest_s: float
     state: State | None = None
     reason: str = ""
 
@@ -235,17 +248,17 @@ def _scales(
     """The scales in CMM mode. In machine-tool mode they are not used, but they may be compared with the setpoints."""
     wires = settings.wires.scale
     if target is not None:
-        unread = _Scales(settings.unread_scales_mm, math.inf)
+        unread = _Scales(settings.unread_scales_mm, math.inf, -math.inf)
         if not (settings.scales_checked and (lost := wires.lost(snapshot))):
             return unread
         state = State.FAULT if lost.distrusted else State.DEGRADED
         return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, lost = wires.read(snapshot, zero_mm)
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
     if not lost:
-        return _Scales(values, oldest_s)
+        return _Scales(values, oldest_s, newest_s)
     # no policy replaces a scale: without it the tip is not known
     state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
-    return _Scales(values, oldest_s, state, f"the tip is not known: {lost}")
+    return _Scales(values, oldest_s, newest_s, state, f"the tip is not known: {lost}")
 
 
 def _uncertainty_is_due(
@@ -255,6 +268,15 @@ def _uncertainty_is_due(
     if settings.noise is None:
         return False
     return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
+
+
+def _age_uncertainty_mm(snapshot: Snapshot, target: Target | None, settings: CycleSettings) -> FloatArray:
+    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used."""
+    wires, extrapolate = settings.wires, settings.loop.extrapolate
+    age_mm = wires.length_age_uncertainty_mm(snapshot, extrapolate)
+    if target is not None:
+        age_mm[: len(wires.scale.wires)] = 0.0
+    return age_mm
 
 
 def _comparators(
@@ -270,7 +292,8 @@ def _comparators(
     if inputs.ending:
         return None, held_comparators(last_good, inputs.ending, now_s, settings.loop)
     wires = settings.wires
-    lengths = wires.comparators.read(snapshot, zero_mm)
+    extrapolate = settings.loop.extrapolate
+    lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
     if applied.quantities:
@@ -279,26 +302,27 @@ def _comparators(
         oldest_s = min(oldest_s, needed.oldest_s)
         quantities = applied.by_name(needed)
     if not lost:
-        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities)
+        length_times_s = lengths.oldest_s, lengths.newest_s
+        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s)
         return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
     if settings.loop.on_stale == "degrade":
         groups = (
-            _group(wires.joint, snapshot, zero_mm[: wires.joints]),
-            _group(wires.frame, snapshot, zero_mm[wires.joints :]),
+            _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
+            _group(wires.frame, snapshot, zero_mm[wires.joints :], extrapolate),
             _quantity_group(applied, snapshot),
         )
         return degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
     return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
 
 
-def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray) -> GroupReadings:
-    values, oldest_s, lost = wires.read(snapshot, zero_mm)
-    return GroupReadings(values, lost, oldest_s)
+def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
+    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, extrapolate)
+    return GroupReadings(values, lost, oldest_s, newest_s)
 
 
 def _quantity_group(applied: LiveModel, snapshot: Snapshot) -> GroupReadings:
     needed = applied.read(snapshot)
-    return GroupReadings(needed.values, needed.lost, needed.oldest_s)
+    return GroupReadings(needed.values, needed.lost, needed.oldest_s, needed.newest_s)
 
 
 def _tip_correction(

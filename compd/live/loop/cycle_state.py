@@ -37,7 +37,7 @@ class ZeroVectors(NamedTuple):
 class CycleState(NamedTuple):
     """What one cycle hands to the next. Nothing in it is ever changed in place.
 
-    A recording keeps all fields but two. `zero_vectors` and `models` follow from the inputs of the same cycle.
+    A recording keeps all fields but two: `zero_vectors` and `models` follow from the inputs of the same cycle.
 
     Attributes
     ----------
@@ -49,11 +49,13 @@ class CycleState(NamedTuple):
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
     adopting : whether the correction is still slewing towards that of a newly adopted model.
-    u_tip_um : (3), standard uncertainty of the tip; None where it has not been computed.
+    u_tip_um : (3), standard uncertainty of the tip without the age of its readings; None where that has not been
+        computed.
     tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
         setpoint was invalid or in the other mode.
     zero_vectors : the readings of `zero`; None where they have yet to be read from it.
     models : those of the last cycle; None before the first.
+    tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, computed with `u_tip_um`; None without it.
     """
 
     zero: MachineZero | None
@@ -67,6 +69,7 @@ class CycleState(NamedTuple):
     tip_correction_mm: FloatArray | None = None
     zero_vectors: ZeroVectors | None = None
     models: Models | None = None
+    tip_by_gauge: FloatArray | None = None
 
     @classmethod
     def at_start(cls, model: MachineModel) -> Self:
@@ -119,6 +122,11 @@ class CycleSettings:
     def period_s(self) -> float:
         """Seconds from tick to tick."""
         return 1.0 / self.loop.rate_hz
+
+    @cached_property
+    def largest_skew_s(self) -> float:
+        """How far apart in time the lengths of a setpoint may be, s; inf without a limit."""
+        return math.inf if self.loop.skew_s is None else self.loop.skew_s
 
     @cached_property
     def uncertainty_every(self) -> int:

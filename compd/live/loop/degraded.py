@@ -20,12 +20,14 @@ GROUPS = ("joints", "frame", "effects")
 class GroupReadings(NamedTuple):
     """The joint comparators, the frame comparators, or the quantities that the effects need, in one snapshot.
 
-    values : in mm since machine zero; of quantities nothing. lost : which cannot be used. oldest_s : of the readings.
+    values : in mm since machine zero; of quantities nothing. lost : which cannot be used.
+    oldest_s, newest_s : monotonic times of the oldest and of the newest reading.
     """
 
     values: FloatArray
     lost: Lost
     oldest_s: float
+    newest_s: float
 
 
 def degraded_comparators(
@@ -64,6 +66,7 @@ def degraded_comparators(
         min(last_good.oldest_s, *(group.oldest_s for group in groups)),
         last_good.quantities if groups[2].lost else quantities,
         times_s,
+        _length_times_s(groups[:2], weights, last_good),
     )
     absent = [name for name, weight in zip(GROUPS, weights, strict=True) if weight == 0.0]
     fading = [f"{name} count {weight:.0%}" for name, weight in zip(GROUPS, weights, strict=True) if 0.0 < weight < 1.0]
@@ -85,6 +88,18 @@ def degraded_comparators(
         missing_mm,
     )
     return newest, usable
+
+
+def _length_times_s(
+    lengths: tuple[GroupReadings, ...], weights: list[float], last_good: ComparatorSet
+) -> tuple[float, ...]:
+    """Times of the oldest and of the newest length that counts: live, or of the last good set and not yet absent."""
+    times_s = [time_s for group in lengths if not group.lost for time_s in (group.oldest_s, group.newest_s)]
+    if any(group.lost and weight > 0.0 for group, weight in zip(lengths, weights, strict=False)):
+        if not last_good.length_times_s:
+            return ()
+        times_s += last_good.length_times_s
+    return (min(times_s), max(times_s)) if times_s else ()
 
 
 def _listed(names: list[str]) -> str:

@@ -30,6 +30,6 @@ class Directions:
         assert setpoint.inputs is not None
         readings = setpoint.inputs.snapshot.readings
         for link, (slot, sign) in enumerate(self._wires):
-            value, _, quality, _ = readings[slot]
+            value, _, quality, *_ = readings[slot]
             if quality is Quality.OK:
                 self._travels[link] = advance(self._travels[link], sign * value)

@@ -97,6 +97,7 @@ class Setpoint(NamedTuple):
     mode : what determined the tip.
     values : None unless valid, so that no value can be taken for a good one.
     model : hash of the model file that was applied; "" without effects.
+    skew_s : how much later than the oldest the newest length that was used was measured; nan where that is not known.
     inputs, state_before : what it was computed from, for READINGS messages; they are no part of a SETPOINT.
     """
 
@@ -111,6 +112,7 @@ class Setpoint(NamedTuple):
     model: str = ""
     inputs: CycleInputs | None = None
     state_before: CycleState | None = None
+    skew_s: float = math.nan
 
     @property
     def valid(self) -> bool:
@@ -135,6 +137,8 @@ class Setpoint(NamedTuple):
             message["model"] = self.model
         if math.isfinite(self.age_s):
             message["age_s"] = round(self.age_s, _DECIMALS_S)
+        if math.isfinite(self.skew_s):
+            message["skew_s"] = round(self.skew_s, _DECIMALS_S)
         if self.values is not None:
             message |= _json_values(self.values)
         return encode_compact(message).encode() + b"\n"

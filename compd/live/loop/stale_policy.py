@@ -28,6 +28,7 @@ class ComparatorSet(NamedTuple):
     oldest_s : monotonic time of the oldest reading in the set.
     quantities : temperatures, forces and the rest that the effects of the applied model need.
     group_times_s : monotonic times from which joints, frame and quantities are, where they differ; else empty.
+    length_times_s : monotonic times of the oldest and of the newest reading of a length; empty where that is not known.
     """
 
     change_mm: FloatArray
@@ -35,6 +36,7 @@ class ComparatorSet(NamedTuple):
     oldest_s: float
     quantities: Mapping[str, FloatArray] = _NO_QUANTITIES
     group_times_s: tuple[float, ...] = ()
+    length_times_s: tuple[float, ...] = ()
 
 
 class UsableComparators(NamedTuple):

@@ -57,7 +57,10 @@ class State(StrEnum):
         "stop", 7, False, 4, "a gauge is lost without a substitute, the loop makes no setpoints, or the daemon ends",
         _BACK,
     )
-    REFUSED = "refused", 8, False, 4, _BEYOND + "out of reach, or not finite", _LATER
+    REFUSED = (
+        "refused", 8, False, 4, _BEYOND + "out of reach, not finite, or of lengths that were measured further apart "
+        "than `loop.skew_s`", _LATER,
+    )
     DEGRADED = (
         "degraded", 9, True, 2, "a correction that `reason` names is absent; `u_tip_um` says what that costs", _BACK,
     )

@@ -1,8 +1,10 @@
-"""The live tip's standard uncertainty, from the noise that the configuration declares for its gauges."""
+"""The live tip's standard uncertainty: from the noise that the configuration declares for its gauges, and their age."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from compd.model.apply_effects import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observe import observe
-from compd.model.uncertainty import GaugeNoise, tip_uncertainty_mm
+from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, tip_sensitivities, tip_uncertainty_mm
 from compd.units import UM_PER_MM
 
 
@@ -43,10 +45,44 @@ def with_absent(noise: GaugeNoise | None, absent_mm: FloatArray) -> GaugeNoise |
     )
 
 
-def uncertainty_um(
-    machine: MachineModel, noise: GaugeNoise, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
-) -> FloatArray:
-    """Of the tip (3,) with the scales at scale_mm (n,), in um; nan where it is not known, see `tip_uncertainty_mm`."""
+class TipUncertainty(NamedTuple):
+    """Of one place of the tip.
+
+    by_noise_um : (3), standard uncertainty without age, um; nan where it is not known, see `tip_uncertainty_mm`. None
+        where the noise of a gauge is not known.
+    tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, mm per mm: scales, joints, frame.
+    """
+
+    by_noise_um: FloatArray | None
+    tip_by_gauge: FloatArray | None
+
+
+def with_age(
+    by_noise_um: FloatArray | None, tip_by_gauge: FloatArray | None, age_mm: Callable[[], FloatArray]
+) -> FloatArray | None:
+    """(3,) standard uncertainty of the tip, um, with that of each length by its age; None where there is none.
+
+    Each length has its own age, and they count as independent: so the skew of a setpoint is in it, too.
+
+    by_noise_um, tip_by_gauge : a `TipUncertainty`; without `tip_by_gauge`, in a recording of a release up to 0.2.0,
+        age does not count. age_mm : gives that of each length by its age, (n + k + 9), mm.
+    """
+    if by_noise_um is None or tip_by_gauge is None:
+        return by_noise_um
+    length_mm = age_mm()
+    if not length_mm.any():
+        return by_noise_um
+    by_age = tip_by_gauge * (UM_PER_MM * length_mm)
+    total_um: FloatArray = np.sqrt(by_noise_um * by_noise_um + (by_age * by_age).sum(axis=1))
+    return total_um
+
+
+def tip_uncertainty(
+    machine: MachineModel, noise: GaugeNoise | None, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
+) -> TipUncertainty:
+    """Of the tip with the scales at scale_mm (n,)."""
+    if noise is None:
+        return TipUncertainty(None, None)
     assert machine.constants is not None
     motion = effects.motion
     rows = observe(
@@ -62,5 +98,6 @@ def uncertainty_um(
         if motion is None
         else Movement.from_motions([motion]),
     )
-    tip_um: FloatArray = tip_uncertainty_mm(machine, rows, noise, effects.memories)[0] * UM_PER_MM
-    return tip_um
+    by_port = tip_sensitivities(machine, rows)
+    tip_um = tip_uncertainty_mm(machine, rows, noise, effects.memories, by_port)[0] * UM_PER_MM
+    return TipUncertainty(tip_um, np.concatenate([by_port[port].tip[0] for port in GAUGE_PORTS], axis=1))

@@ -13,6 +13,7 @@ from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
+from compd.live.loop.extrapolation import age_uncertainty_mm, extrapolated
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost
 from compd.live.memory.latest import Latest, Snapshot
@@ -25,12 +26,13 @@ class WiredValues(NamedTuple):
 
     values : (k), sign * (reading - zero) in the unit of each wire: mm since machine zero for lengths, the gauge's own
         for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
-    oldest_s : monotonic time of the oldest reading; inf without wires.
+    oldest_s, newest_s : monotonic times of the oldest and of the newest reading; inf and -inf without wires.
     lost : which readings cannot be used, and why.
     """
 
     values: FloatArray
     oldest_s: float
+    newest_s: float
     lost: Lost
 
 
@@ -60,24 +62,29 @@ class Wires:
         """(k,) raw readings (mm) at machine zero."""
         return np.array([zero.readings_mm[wire.channel] for wire in self.wires])
 
-    def read(self, snapshot: Snapshot, zero: FloatArray) -> WiredValues:
-        """The values in a snapshot; `zero` (k) from `zero_vector`, or zeros for quantities."""
+    def read(self, snapshot: Snapshot, zero: FloatArray, extrapolate: bool = False) -> WiredValues:
+        """The values in a snapshot; `zero` (k) from `zero_vector`, or zeros for quantities.
+
+        extrapolate : carry each reading on to the snapshot's time.
+        """
         now_s, readings = snapshot
         used = [readings[slot] for slot, _ in self._slots]
-        values = (np.array([reading[0] for reading in used]) - zero) * self._sign
-        oldest_s = min([reading[1] for reading in used], default=math.inf)
+        raw = [extrapolated(reading, now_s) if extrapolate else reading[0] for reading in used]
+        values = (np.array(raw) - zero) * self._sign
+        times_s = [reading[1] for reading in used]
+        oldest_s, newest_s = min(times_s, default=math.inf), max(times_s, default=-math.inf)
         lost = self.lost(snapshot)
         if lost:
             bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s) is not None]
             values[bad] = math.nan
-        return WiredValues(values, oldest_s, lost)
+        return WiredValues(values, oldest_s, newest_s, lost)
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which readings are not good or too old, and why."""
         now_s, readings = snapshot
         ok = Quality.OK  # in a local variable: the lookup in an Enum costs more than the rest of this loop
         for slot, stale_after_s in self._slots:
-            _, time_s, quality, _ = readings[slot]
+            _, time_s, quality, _, _ = readings[slot]
             if quality is not ok or now_s - time_s > stale_after_s:
                 faults = (_fault(wire, readings[wire.slot], now_s) for wire in self.wires)
                 return lost(fault for fault in faults if fault is not None)
@@ -134,6 +141,7 @@ class MachineWires:
         self.frame = self.comparators.part(self.joints, len(self.comparators.wires))
         self.tool_on_plate = configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
+        self._length_slots = [wire.slot for wire in self.length_wires]
 
     @property
     def length_channels(self) -> tuple[str, ...]:
@@ -149,6 +157,14 @@ class MachineWires:
     def all_wires(self) -> tuple[Wire, ...]:
         """Length gauges, then quantities."""
         return (*self.length_wires, *self._quantities.values())
+
+    def length_age_uncertainty_mm(self, snapshot: Snapshot, extrapolate: bool) -> FloatArray:
+        """(n + k + 9) standard uncertainty of each length by its age, mm: scales, joints, frame.
+
+        0 for one that is not good; nan where it is not known how it moves.
+        """
+        now_s, readings = snapshot
+        return np.array([age_uncertainty_mm(readings[slot], now_s, extrapolate) for slot in self._length_slots])
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which length gauges cannot be used, and why."""

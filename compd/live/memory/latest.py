@@ -1,10 +1,11 @@
 """The newest reading of every channel: written by the lines' threads, read by the loop as one snapshot per cycle.
 
-The readings are in shared memory, one slot of 192 bytes per channel after a list of versions:
+The readings are in shared memory, one slot of 224 bytes per channel after a list of versions:
 
     version    8 bytes for each channel: odd while its slot is being written, another number after every write
     value      8 bytes, float64, in the channel's unit; nan where there is none
     time_s     8 bytes, float64, monotonic
+    motion     32 bytes, four float64, a `ReadingMotion`; nan where there is none
     quality    1 byte, number of the Quality
     length     1 byte, of the detail
     (unused)   2 bytes
@@ -14,6 +15,7 @@ The readings are in shared memory, one slot of 192 bytes per channel after a lis
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
@@ -21,16 +23,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.gauge import Quality, Reading, bad
+from compd.gauge import Quality, Reading, ReadingMotion, bad
 from compd.live.memory.shared_array import shared_memory
 
-_SLOT = struct.Struct("=ddBBxxI168s")
-_HEAD = struct.Struct("=ddBBxxI")
-_CHECKED = struct.Struct("=ddBBxx")
+_SLOT = struct.Struct("=ddddddBBxxI168s")
+_HEAD = struct.Struct("=ddddddBBxxI")
+_CHECKED = struct.Struct("=ddddddBBxx")
 _CHECKED_BYTES = _CHECKED.size
 SLOT_BYTES = _SLOT.size
 LONGEST_DETAIL = SLOT_BYTES - _HEAD.size
 _TRIES = 2
+_NO_MOTION = (math.nan,) * 4
 
 _QUALITIES = tuple(Quality)
 _NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
@@ -113,23 +116,27 @@ class Latest:
 
 def packed(reading: Reading) -> bytes:
     """A reading as the content of a slot; a longer detail is cut off."""
-    value, time_s, quality, detail = reading
+    value, time_s, quality, detail, motion = reading
+    speed, braking, u, horizon_s = motion or _NO_MOTION
     text = b""
     if detail:
         text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
-    head = _CHECKED.pack(value, time_s, _NUMBERS[quality], len(text))
-    return _SLOT.pack(value, time_s, _NUMBERS[quality], len(text), zlib.crc32(text, zlib.crc32(head)), text)
+    head = _CHECKED.pack(value, time_s, speed, braking, u, horizon_s, _NUMBERS[quality], len(text))
+    checksum = zlib.crc32(text, zlib.crc32(head))
+    return _SLOT.pack(value, time_s, speed, braking, u, horizon_s, _NUMBERS[quality], len(text), checksum, text)
 
 
 def unpacked(content: bytes) -> Reading | None:
     """The reading in the content of a slot; None where its checksum does not fit."""
-    value, time_s, number, length, checksum = _HEAD.unpack_from(content)
+    value, time_s, speed, braking, u, horizon_s, number, length, checksum = _HEAD.unpack_from(content)
+    motion = None if math.isnan(horizon_s) else ReadingMotion(speed, braking, u, horizon_s)
     if not length:
-        return Reading(value, time_s, _QUALITIES[number]) if zlib.crc32(content[:_CHECKED_BYTES]) == checksum else None
+        whole = zlib.crc32(content[:_CHECKED_BYTES]) == checksum
+        return Reading(value, time_s, _QUALITIES[number], "", motion) if whole else None
     text = content[_HEAD.size : _HEAD.size + length]
     if zlib.crc32(text, zlib.crc32(content[:_CHECKED_BYTES])) != checksum:
         return None
-    return Reading(value, time_s, _QUALITIES[number], text.decode())
+    return Reading(value, time_s, _QUALITIES[number], text.decode(), motion)
 
 
 def unpack_readings(image: bytes) -> tuple[Reading, ...]:

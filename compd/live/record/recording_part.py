@@ -11,7 +11,7 @@ from typing import Any
 
 from compd.files import sync_directory, write_new_file
 from compd.json_text import encode_compact
-from compd.recording.columns import approach_columns, decimals, number_text
+from compd.recording.columns import SKEW_COLUMN, approach_columns, decimals, number_text
 from compd.recording.sidecar import sidecar_contents, sidecar_text
 from compd.units import UM_PER_MM
 
@@ -59,7 +59,7 @@ class RecordingPart:
         self.rows = 0
         self._rows_added = 0
         self._columns: Sequence[Message] = watch["columns"]
-        names = ["time_s", *(column["column"] for column in self._columns)]
+        names = ["time_s", *(column["column"] for column in self._columns), SKEW_COLUMN]
         self._decimals = {name: decimals(name) for name in names}
         self._origin_s = origin_s
         sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
@@ -149,6 +149,7 @@ class RecordingPart:
         now_s, readings = message["time_s"], message["readings"]
         cells = [self._number("time_s", now_s - self._origin_s)]
         cells += [self._cell(column, readings[column["channel"]], now_s) for column in self._columns]
+        cells += [self._number(SKEW_COLUMN, message["setpoint"]["skew_s"]) if "skew_s" in message["setpoint"] else ""]
         # empty until a link has moved
         cells += [str(direction) if direction else "" for direction in message.get("approach", ())[: self._links]]
         return ",".join(cells)

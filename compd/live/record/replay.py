@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.pipeline import build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
+from compd.recording.columns import SKEW_COLUMN
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")
@@ -136,6 +138,8 @@ def replay_cycles(
         # the recorded state is that after the models were adopted
         state, inputs = recorded.state._replace(models=used), recorded.inputs._replace(models=used)
         setpoint, _ = step(state, inputs, pipeline.settings)
+        if SKEW_COLUMN not in message["setpoint"]:  # nor had the setpoints of releases up to 0.2.0
+            setpoint = setpoint._replace(skew_s=math.nan)
         yield ReplayedCycle(where, inputs.tick, recorded.setpoint_line, setpoint.to_json())
 
 

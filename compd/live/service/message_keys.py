@@ -112,6 +112,11 @@ class SetpointKeys(SentMessage):
         default=None, description="hash of the model file that is applied; absent without effects"
     )
     age_s: float | None = Field(default=None, description="age of the oldest reading used, s")
+    skew_s: float | None = Field(
+        default=None,
+        description="how much later than the oldest the newest length that was used was measured, s; absent where none "
+        "was. `loop.skew_s` limits it",
+    )
     tip_M_mm: Vector | None = Field(
         default=None,
         description="the tip in {M}, the surface plate, mm; in mode cmm measured, in mode machine_tool the target, "
@@ -140,11 +145,23 @@ class SetpointKeys(SentMessage):
         default=None,
         description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
         "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
-        "once a second; absent while any of them is not known",
+        "once a second, and from the age of each length and how surely its motion is known, in every cycle; absent "
+        "while any of them is not known",
     )
     shadow: ShadowKeys | None = Field(
         default=None, description="what the shadow model asks for in this cycle; absent without a shadow"
     )
+
+
+class MotionKeys(Keys):
+    """How what a length gauge measures moves, by its own last readings."""
+
+    speed_mm_per_s: float = Field(description="at the time of the reading; 0 where it does not move, or not steadily")
+    braking_mm_per_s2: float = Field(description="by how much the size of the speed falls; 0 where it does not brake")
+    u_mm_per_s: float | None = Field(
+        default=None, description="standard uncertainty of the speed; absent while it is not known"
+    )
+    horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
 
 
 class ReadingKeys(Keys):
@@ -154,6 +171,9 @@ class ReadingKeys(Keys):
     time_s: float = Field(description="when the gauge was asked, s on the daemon's monotonic clock")
     quality: Quality | None = Field(default=None, description="why there is no value; absent where there is one")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
+    motion: MotionKeys | None = Field(
+        default=None, description="of a length that is good: by it `loop.extrapolate` carries the value on"
+    )
 
 
 class ZeroFileKeys(Keys):
@@ -396,5 +416,10 @@ class StatusKeys(VersionKeys):
         "for each line of `acquisition.own_process`"
     )
     publisher: PublisherStatusKeys = Field(description="the clients")
+    skew_s: float | None = Field(
+        default=None,
+        description="how much later than the oldest the newest length that is good now was measured, s; absent where "
+        "none is",
+    )
     lines: dict[str, LineStatusKeys] = Field(description="every line, by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from compd.errors import Problem, StateError
-from compd.gauge import Quality, Reading
+from compd.gauge import Quality, Reading, ReadingMotion
+from compd.json_text import omit_unknown
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
@@ -113,16 +114,24 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
 
 def _reading(reading: Reading) -> dict[str, Any]:
     """A reading as plain data: its value, or why there is none."""
-    value, time_s, quality, detail = reading
+    value, time_s, quality, detail, motion = reading
     if quality is Quality.OK:
-        return {"value": value, "time_s": time_s}
+        good = {"value": value, "time_s": time_s}
+        return good if motion is None else good | {"motion": omit_unknown(motion._asdict())}
     fault = {"quality": quality, "time_s": time_s}
     return fault | {"detail": detail} if detail else fault
 
 
 def _parsed_reading(data: Mapping[str, Any]) -> Reading:
     quality = Quality(data.get("quality", Quality.OK))
-    return Reading(data.get("value", math.nan), data["time_s"], quality, data.get("detail", ""))
+    motion = data.get("motion")
+    return Reading(
+        data.get("value", math.nan),
+        data["time_s"],
+        quality,
+        data.get("detail", ""),
+        None if motion is None else ReadingMotion(**{"u_mm_per_s": math.nan, **motion}),
+    )
 
 
 def _target(target: Target) -> dict[str, Any]:

@@ -40,6 +40,7 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
     "adopting": "adopting",
     "u_tip_um": "u_tip_um",
     "tip_correction_mm": "tip_correction_mm",
+    "tip_by_gauge": "tip_by_gauge",
 }
 
 
@@ -59,8 +60,10 @@ def to_plain(value: Any) -> Any:
             }
         case tuple() if hasattr(value, "_fields"):
             names = _CYCLE_STATE_FIELDS if isinstance(value, CycleState) else {name: name for name in value._fields}
-            if isinstance(value, ComparatorSet) and not value.group_times_s:
-                names = {name: name for name in names if name != "group_times_s"}
+            if isinstance(value, CycleState) and value.tip_by_gauge is None:
+                names = {name: field for name, field in names.items() if name != "tip_by_gauge"}
+            if isinstance(value, ComparatorSet):
+                names = {name: name for name in names if not name.endswith("_times_s") or getattr(value, name)}
             fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
         case tuple():

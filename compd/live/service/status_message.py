@@ -13,6 +13,7 @@ from compd.gauge import Quality
 from compd.json_text import omit_unknown
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
+from compd.live.loop.skew import skew_of
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
@@ -62,6 +63,7 @@ class StatusReport:
             "realtime": self.control.realtime.read() or {},
             "processes": self.control.processes.read() or {},
             "publisher": published,
+            "skew_s": self._skew_s(now_s),
             "lines": self.lines(),
             "gauges": self._gauges(now_s),
         }
@@ -80,6 +82,12 @@ class StatusReport:
             name: {key: part for key, part in model.items() if key != "file"}
             for name, model in self.adopted.summary.items()
         }
+
+    def _skew_s(self, now_s: float) -> float:
+        """Between the oldest and the newest length that is good now; nan without any."""
+        readings = self.latest.snapshot(now_s).readings
+        wired = [(readings[wire.slot], wire.stale_after_s) for wire in self.wires.length_wires]
+        return round(skew_of(r for r, stale_after_s in wired if r.ok and now_s - r.time_s <= stale_after_s), 6)
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
         """Every channel: its raw value, before sign and machine zero, and its age (s); or why there is no value."""

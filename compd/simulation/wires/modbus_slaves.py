@@ -21,7 +21,9 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
+from compd.configuration.round_trigger import TriggerWrite
 from compd.simulation.wires.device import SimulatedRegisterDevice
+from compd.simulation.wires.latch import Latch
 
 READ_COILS, READ_HOLDING, WRITE_REGISTERS = 1, 3, 16
 COIL_ON = 0xFF00
@@ -35,9 +37,19 @@ class ModbusSlaves:
     """The slaves on one wire, by unit number; requests to an absent unit get no reply."""
 
     def __init__(
-        self, devices: Sequence[SimulatedRegisterDevice], over_tcp: bool = False, as_text: bool = False
+        self,
+        devices: Sequence[SimulatedRegisterDevice],
+        over_tcp: bool = False,
+        as_text: bool = False,
+        trigger: TriggerWrite | None = None,
+        latch: Latch | None = None,
     ) -> None:
-        """over_tcp : Modbus TCP framing (MBAP) instead of RTU. as_text : ASCII framing instead."""
+        """over_tcp : Modbus TCP framing (MBAP) instead of RTU. as_text : ASCII framing instead.
+
+        trigger : the write by which the devices latch what they sense, in `latch`.
+        """
+        self._trigger = trigger
+        self._latch = latch
         self._devices = {device.unit: device for device in devices}
         self._over_tcp = over_tcp
         self._as_text = as_text
@@ -95,16 +107,25 @@ class ModbusSlaves:
             transaction, unit, message = MBAP.unpack_from(request)[0], request[6], request[7:]
         else:
             transaction, unit, message = 0, request[0], request[1:-2]
+        latched = self._is_trigger(unit, message)
+        if latched and self._latch is not None:
+            self._latch.close()
         if unit == 0 and not self._over_tcp:  # a broadcast, which nobody answers
             for each in self._devices.values():
                 _reply(each, message)
             return b""
         device = self._devices.get(unit)
-        if device is None:
+        if device is None and not latched:
             return b""
-        reply = _reply(device, message)
+        reply = _reply(device, message, latched)
         reply.dev_id, reply.transaction_id = unit, transaction
         return self._framer.buildFrame(reply)
+
+    def _is_trigger(self, unit: int, message: bytes) -> bool:
+        trigger = self._trigger
+        if trigger is None or unit != trigger.unit or len(message) < 5:
+            return False
+        return (message[0], int.from_bytes(message[1:3], "big")) == (trigger.function, trigger.address)
 
 
 def _unit_and_message(text: bytes) -> bytes:
@@ -120,17 +141,18 @@ def _crc_matches(frame: bytes) -> bool:
     return FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big"))
 
 
-def _reply(device: SimulatedRegisterDevice, message: bytes) -> ModbusPDU:
+def _reply(device: SimulatedRegisterDevice | None, message: bytes, latched: bool = False) -> ModbusPDU:
+    """The reply to a request; `latched`: it is the round trigger, which every register takes."""
     function = message[0]
     if len(message) < 5:
         return ExceptionResponse(function, ILLEGAL_FUNCTION)
     address, count = struct.unpack_from(">HH", message, 1)
     match function:
-        case 1 | 2 if len(message) == 5:
+        case 1 | 2 if len(message) == 5 and device is not None:
             bits = device.bits(function, address, count)
             kind = ReadCoilsResponse if function == READ_COILS else ReadDiscreteInputsResponse
             return ExceptionResponse(function, ILLEGAL_ADDRESS) if bits is None else kind(bits=bits)
-        case 3 | 4 if len(message) == 5:
+        case 3 | 4 if len(message) == 5 and device is not None:
             registers = device.registers(function, address, count)
             holding = ReadHoldingRegistersResponse if function == READ_HOLDING else ReadInputRegistersResponse
             return ExceptionResponse(function, ILLEGAL_ADDRESS) if registers is None else holding(registers=registers)
@@ -145,4 +167,5 @@ def _reply(device: SimulatedRegisterDevice, message: bytes) -> ModbusPDU:
             written = WriteMultipleRegistersResponse(address=address, count=count)
         case _:
             return ExceptionResponse(function, ILLEGAL_FUNCTION)
-    return written if device.write(function, address, values) else ExceptionResponse(function, ILLEGAL_ADDRESS)
+    taken = latched or (device is not None and device.write(function, address, values))
+    return written if taken else ExceptionResponse(function, ILLEGAL_ADDRESS)

@@ -19,7 +19,9 @@ from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import Clock, MonotonicClock
 from compd.configuration.lines import LineSettings, SerialPortSettings
+from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
+from compd.simulation.wires.latch import Latch, TriggeredDevices
 from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
@@ -121,13 +123,20 @@ class SimulatedLine:
         self._link = directory / name
         self._damages = DAMAGES[settings.kind]
         self._listener: Listener
+        latch = Latch(devices) if settings.round_trigger is not None else None
         if settings.kind.startswith("modbus"):
             registers = [device for device in devices if isinstance(device, SimulatedRegisterDevice)]
             self._listener = ModbusSlaves(
-                registers, over_tcp=settings.kind == "modbus_tcp", as_text=settings.kind == "modbus_ascii"
+                registers,
+                over_tcp=settings.kind == "modbus_tcp",
+                as_text=settings.kind == "modbus_ascii",
+                trigger=settings.round_trigger if isinstance(settings.round_trigger, TriggerWrite) else None,
+                latch=latch,
             )
         else:
             self._listener = ByteDevices([device for device in devices if isinstance(device, SimulatedByteDevice)])
+            if latch is not None and isinstance(settings.round_trigger, TriggerBytes):
+                self._listener = TriggeredDevices(self._listener, settings.round_trigger.request, latch)
         self._character_s = 0.0
         self._on_pty = isinstance(settings, SerialPortSettings) and "://" not in settings.port
         if isinstance(settings, SerialPortSettings) and self._on_pty:

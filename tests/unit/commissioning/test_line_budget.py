@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,7 +24,7 @@ from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpL
 from tests.support.paths import CONFIG
 
 
-def rtu(baud: int, **more: float) -> ModbusRtuLine:
+def rtu(baud: int, **more: Any) -> ModbusRtuLine:
     return ModbusRtuLine(kind="modbus_rtu", port="/dev/x", baud=baud, format="8N1", **{"timeout_s": 0.1, **more})  # type: ignore[arg-type]
 
 
@@ -153,3 +155,49 @@ def test_a_line_that_is_too_slow_is_named_with_its_place(tmp_path: Path) -> None
     (warning,) = budget_warnings(configuration, line_budgets(configuration))
     assert re.search(r":\d+ lines.joints: ", str(warning))
     assert "stale" in str(warning)
+
+
+# --- how far apart the readings of a round are -------------------------------------------------------------
+
+BROADCAST = {"function": 5, "address": 0, "values": [1], "settle_s": 0.1}
+
+
+@pytest.mark.parametrize(("baud", "spread_ms"), [(9600, 234), (19200, 157), (115200, 104)])
+def test_nine_units_are_apart_by_all_exchanges_but_one(baud: int, spread_ms: int) -> None:
+    budget = budget_of_line("x", rtu(baud), {"gauge": UNITS})
+    assert 1e3 * budget.spread_s == pytest.approx(spread_ms, abs=0.6)
+    assert budget.spread_s == pytest.approx(budget.usual_s * 8 / 9)
+    assert budget_of_line("x", rtu(baud), {"gauge": INT16}).spread_s == 0.0
+
+
+def test_a_round_trigger_takes_its_time_and_leaves_no_spread() -> None:
+    plain, latched = (
+        budget_of_line("x", rtu(19200, **more), {"gauge": UNITS}) for more in ({}, {"round_trigger": BROADCAST})
+    )
+    assert latched.spread_s == 0.0
+    assert latched.ideal_s - plain.ideal_s == pytest.approx((3.5 + 8) * 10 / 19200 + 0.1)
+    answered = rtu(19200, round_trigger={"function": 16, "address": 0, "values": [1, 2], "unit": 3})
+    more_s = budget_of_line("x", answered, {"gauge": UNITS}).usual_s - plain.usual_s
+    assert more_s == pytest.approx((2 * 3.5 + 13 + 8) * 10 / 19200)
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_lengths_that_are_far_apart_are_warned_of_and_the_shipped_ones_are_not(name: str) -> None:
+    configuration = load(CONFIG / name)
+    budgets = line_budgets(configuration)
+    assert budget_warnings(configuration, budgets) == []
+    line = next(budget for budget in budgets if budget.name.startswith("joint"))
+    others = [budget for budget in budgets if budget is not line]
+    (warning,) = budget_warnings(configuration, [*others, replace(line, spread_s=0.174)])
+    assert "lengths are measured 174 ms apart" in warning.what
+    assert "`loop.skew_s`" in warning.next_step
+    limited = replace(configuration, loop=configuration.loop.model_copy(update={"skew_s": 0.2}))
+    assert budget_warnings(limited, [*others, replace(line, spread_s=0.174)]) == []
+
+
+def test_a_limit_that_a_line_cannot_keep_is_warned_of() -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    limited = replace(configuration, loop=configuration.loop.model_copy(update={"skew_s": 0.01}))
+    warnings = budget_warnings(limited, line_budgets(limited))
+    assert {warning.what.split("`")[1] for warning in warnings} >= {"joints", "cabinet"}
+    assert all("setpoints will be refused" in warning.what for warning in warnings)

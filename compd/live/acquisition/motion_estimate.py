@@ -1,0 +1,108 @@
+"""How what a length gauge measures moves, by its own last readings.
+
+The speed is the slope over as many of the last readings as it takes for the length to change by more than its readings
+scatter: over the last interval while the machine travels, over up to a second of slow drift. So little noise enters,
+and little delay (first-order adaptive windowing: F. Janabi-Sharifi, V. Hayward, C.-S. J. Chen, Discrete-time adaptive
+windowing for velocity estimation, IEEE Trans. Control Systems Technology 8 (2000) 1003-1009).
+
+The slopes of the windows before, each as long, say more:
+
+- A speed counts where the window before shows it too: a single step is no motion to be carried on.
+- Where the slope falls from window to window, the part brakes: it is carried on to its standstill, and not beyond. One
+  that becomes faster is carried on with the speed that it has, since it may stop to do so at any time.
+- What the slope has changed by from one window to the next, within a second, it may change by again: that is its
+  uncertainty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from compd.gauge import ReadingMotion
+from compd.live.acquisition.possible_motion import Sample
+
+# Over longer, s, no speed is measured: a drift that is older says little of now.
+LONGEST_WINDOW_S = 1.0
+# From one window to the next a speed that counts grows at most by this factor: the limit of a slope limiter that keeps
+# it from overshooting (P. K. Sweby, SIAM J. Numer. Anal. 21 (1984) 995-1011).
+LARGEST_GROWTH = 2.0
+# A reading is replaced one round after it was made, and one that waits for the end of its round after two.
+HORIZON_ROUNDS = 2.0
+# Drives come to rest from their full speed within 0.1 to 0.3 s: for longer than this, s, no motion is taken to go on.
+LONGEST_HORIZON_S = 0.15
+# A tolerance is six standard deviations of the difference between two readings.
+SIGMAS = 6.0
+# Windows are as long as the last one but for the scatter of polls.
+_AS_LONG = 0.9
+# A recording has each of them as text: 1 pm/s and 1 us are less than anybody knows of them.
+_DECIMALS_MM, _DECIMALS_S = 9, 6
+UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
+
+
+def estimated_motion(history: Sequence[Sample], tolerance_mm: float) -> ReadingMotion:
+    """The motion at the last of these readings, which are in the order of time.
+
+    tolerance_mm : by which two readings of the same value may differ, mm.
+    """
+    last = len(history) - 1
+    start = _window_start(history, last, tolerance_mm) if last > 0 else last
+    duration_s = history[last].time_s - history[start].time_s
+    if duration_s <= 0.0:
+        return UNKNOWN
+    rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
+    horizon_s = min(HORIZON_ROUNDS * max(rounds), LONGEST_HORIZON_S)
+    slopes = _slopes(history, start, duration_s)
+    now = slopes[0]
+    if abs(history[last].value - history[start].value) <= tolerance_mm:
+        return _rounded(0.0, 0.0, abs(now), horizon_s)
+    changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
+    u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s)
+    before = slopes[1] if len(slopes) > 1 else 0.0
+    if now * before <= 0.0:
+        return _rounded(0.0, 0.0, max(u, abs(now)), horizon_s)
+    if abs(now) >= abs(before):
+        speed = math.copysign(min(abs(now), LARGEST_GROWTH * abs(before)), now)
+        return _rounded(speed, 0.0, max(u, abs(now - speed)), horizon_s)
+    braking = (abs(before) - abs(now)) / duration_s
+    speed = abs(now) - braking * duration_s / 2  # the slope is the speed in the middle of the window
+    if speed <= 0.0:
+        return _rounded(0.0, 0.0, u, horizon_s)
+    return _rounded(math.copysign(speed, now), braking, u, min(horizon_s, speed / braking))
+
+
+def _window_start(history: Sequence[Sample], last: int, tolerance_mm: float) -> int:
+    """Where the shortest window begins in which the length has changed; the longest window where it has not."""
+    newest = history[last]
+    start = last - 1
+    for k in range(last - 1, -1, -1):
+        if newest.time_s - history[k].time_s > LONGEST_WINDOW_S and k < last - 1:
+            break
+        start = k
+        if abs(newest.value - history[k].value) > tolerance_mm:
+            break
+    return start
+
+
+def _slopes(history: Sequence[Sample], start: int, duration_s: float) -> list[float]:
+    """Mean speeds (mm/s): from `start` to the last reading, then of whole windows as long before it, the latest first.
+
+    Windows that ended more than LONGEST_WINDOW_S ago do not count.
+    """
+    newest, begin = history[-1], history[start]
+    slopes = [(newest.value - begin.value) / duration_s]
+    end = begin
+    for k in range(start - 1, -1, -1):
+        if newest.time_s - end.time_s > LONGEST_WINDOW_S:
+            break
+        passed_s = end.time_s - history[k].time_s
+        if passed_s >= _AS_LONG * duration_s:
+            slopes.append((end.value - history[k].value) / passed_s)
+            end = history[k]
+    return slopes
+
+
+def _rounded(speed: float, braking: float, u: float, horizon_s: float) -> ReadingMotion:
+    speed, braking, u = (round(value, _DECIMALS_MM) for value in (speed, braking, u))
+    return ReadingMotion(speed, braking, u, round(horizon_s, _DECIMALS_S))

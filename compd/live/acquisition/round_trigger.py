@@ -1,0 +1,41 @@
+"""The round trigger: one message latches all gauges of a line, so that they are measured at the same time.
+
+It is sent once before the gauges of a round are read, and every reading of that round has its time, also where a gauge
+is missing. The devices latch no earlier than its last bit has left. Whether they have heard it, nobody says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
+from compd.gauge import Gauge, Reading
+
+
+def send_trigger(trigger: TriggerBytes | TriggerWrite, line: Any) -> float:
+    """Latch all gauges of a line, and wait until they have settled.
+
+    line : a stream of bytes, or a Modbus master.
+    Returns the monotonic time (s) at which the trigger's last bit had left. Raises LineFault as the line does.
+    """
+    if isinstance(trigger, TriggerWrite):
+        return float(
+            line.write(trigger.unit, trigger.function, trigger.address, trigger.values, trigger.settle_s or 0.0)
+        )
+    sent_s = float(line.send(trigger.request))
+    line.rest_until(sent_s + trigger.settle_s)
+    return sent_s
+
+
+def stamped(readings: Sequence[Reading], latched_s: float | None) -> Sequence[Reading]:
+    """The readings with the time (s) of the trigger that has latched them; None: as they are, without a trigger."""
+    if latched_s is None:
+        return readings
+    return [reading._replace(time_s=latched_s) for reading in readings]
+
+
+def read_latched(gauge: Gauge[Any], line: Any, trigger: TriggerBytes | TriggerWrite | None) -> Sequence[Reading]:
+    """One poll of a gauge by itself, behind the trigger of its line where there is one. Raises LineFault."""
+    latched_s = None if trigger is None else send_trigger(trigger, line)
+    return stamped(gauge.read(line), latched_s)

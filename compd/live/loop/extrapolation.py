@@ -1,0 +1,40 @@
+"""Readings carried on to the time of a cycle, and how uncertain they are by their age.
+
+A reading is as old as its gauge's turn on the line makes it, and each is differently old. Each is carried on by its own
+speed (`compd.live.acquisition.motion_estimate`), which comes with it: so a replay has all that the cycle had. One of a
+gauge that does not answer any more is not carried away: after two rounds or 0.15 s, or at the standstill to which it
+braked, it stays where it is.
+"""
+
+from __future__ import annotations
+
+from compd.gauge import Reading
+
+# A device samples up to so long after the request or the trigger has left, s; a reading has the earliest time possible.
+SAMPLED_LATER_S = 1e-3
+
+
+def extrapolated(reading: Reading, now_s: float) -> float:
+    """The value of a length (mm) at the monotonic time `now_s` (s)."""
+    value, time_s, _, _, motion = reading
+    if motion is None or motion[0] == 0.0:
+        return value
+    speed, braking, _, horizon_s = motion
+    age_s = now_s - time_s
+    carried_s = age_s if age_s < horizon_s else horizon_s
+    return value + (speed - 0.5 * (braking if speed > 0.0 else -braking) * carried_s) * carried_s
+
+
+def age_uncertainty_mm(reading: Reading, now_s: float, carried_on: bool) -> float:
+    """Standard uncertainty (mm) of a length by the age of its reading; nan where its motion is not known yet.
+
+    0 for a reading without motion: of a gauge that is no length, or in a recording of a release up to 0.2.0.
+    carried_on : whether `extrapolated` is used, and not the value as it was read.
+    """
+    motion = reading.motion
+    if motion is None:
+        return 0.0
+    speed, _, u_mm_per_s, horizon_s = motion
+    age_s = max(0.0, now_s - reading.time_s)
+    not_carried_s = max(0.0, age_s - horizon_s) if carried_on else age_s
+    return float(abs(speed) * (SAMPLED_LATER_S + not_carried_s) + u_mm_per_s * age_s)

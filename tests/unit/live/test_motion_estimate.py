@@ -1,0 +1,108 @@
+"""The motion that readings show, and where it carries them: truths in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from compd.gauge import Quality, Reading, ReadingMotion, bad, good
+from compd.live.acquisition.motion_estimate import estimated_motion
+from compd.live.acquisition.possible_motion import Sample
+from compd.live.loop.extrapolation import age_uncertainty_mm, extrapolated
+
+ROUND_S = 0.04
+TOLERANCE_MM = 0.001
+
+
+def motion(values, times_s=None):
+    times_s = [ROUND_S * k for k in range(len(values))] if times_s is None else times_s
+    samples = [Sample(value, time_s, 1e-3) for value, time_s in zip(values, times_s, strict=True)]
+    return estimated_motion(samples, TOLERANCE_MM)
+
+
+def carried(values, age_s):
+    return extrapolated(good(values[-1], 0.0)._replace(motion=motion(values)), age_s)
+
+
+@pytest.mark.parametrize("speed", [50.0, -50.0, 0.3])
+def test_a_steady_motion_is_carried_on_to_the_time_of_the_cycle(speed):
+    values = [speed * ROUND_S * k for k in range(12)]
+    assert motion(values).speed_mm_per_s == pytest.approx(speed)
+    assert carried(values, 0.03) == pytest.approx(values[-1] + speed * 0.03)
+
+
+def test_a_drift_of_less_than_the_scatter_from_poll_to_poll_is_carried_on_too():
+    rng = np.random.default_rng(3)
+    values = [0.005 * ROUND_S * k + rng.normal(0.0, 0.0001) for k in range(30)]
+    assert motion(values).speed_mm_per_s == pytest.approx(0.005, rel=0.3)
+
+
+def test_noise_alone_is_no_motion():
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        values = rng.normal(0.0, 0.0001, 20).tolist()
+        assert motion(values).speed_mm_per_s == 0.0
+        assert carried(values, 0.05) == values[-1]
+
+
+def test_a_single_step_is_not_carried_on_and_its_speed_is_in_the_uncertainty():
+    step = motion([0.0] * 10 + [0.5])
+    assert step.speed_mm_per_s == 0.0
+    assert step.u_mm_per_s >= 0.5 / ROUND_S
+    assert motion([0.0] * 10 + [0.5, 0.5]).speed_mm_per_s == 0.0
+
+
+def test_a_motion_that_turns_is_not_carried_on():
+    assert motion([0.0, 1.0, 2.0, 3.0, 2.0]).speed_mm_per_s == 0.0
+
+
+def test_a_part_that_brakes_is_carried_on_to_its_standstill_and_not_beyond():
+    braking, speed = 250.0, 20.0  # at the last reading; it stands after 0.08 s, 0.8 mm further
+    times_s = [-ROUND_S * k for k in range(6, -1, -1)]
+    values = [speed * t - 0.5 * braking * t * t for t in times_s]
+    shown = motion(values, times_s)
+    assert shown.speed_mm_per_s == pytest.approx(speed)
+    assert shown.braking_mm_per_s2 == pytest.approx(braking)
+    reading = good(values[-1], 0.0)._replace(motion=shown)
+    assert extrapolated(reading, 0.04) == pytest.approx(speed * 0.04 - 0.5 * braking * 0.04**2)
+    assert extrapolated(reading, 0.08) == pytest.approx(0.8)
+    assert extrapolated(reading, 0.3) == pytest.approx(0.8, abs=1e-4)
+
+
+def test_a_gauge_that_falls_silent_is_not_carried_away():
+    values = [50.0 * ROUND_S * k for k in range(12)]
+    end = values[-1] + 50.0 * 2 * ROUND_S
+    assert [carried(values, age_s) for age_s in (0.08, 0.1, 0.5)] == pytest.approx([end] * 3)
+
+
+def test_where_a_round_takes_long_nothing_is_carried_on_for_longer_than_drives_take_to_stop():
+    slow = [50.0 * 0.2 * k for k in range(6)]
+    shown = motion(slow, [0.2 * k for k in range(6)])
+    assert shown.speed_mm_per_s == pytest.approx(50.0)
+    assert shown.horizon_s == 0.15
+
+
+def test_a_start_is_carried_on_with_at_most_twice_the_speed_before():
+    assert motion([0.0, 0.0, 0.1, 1.0]).speed_mm_per_s == pytest.approx(2 * 0.1 / ROUND_S)
+
+
+def test_too_few_readings_have_no_known_motion():
+    assert math.isnan(motion([1.0]).u_mm_per_s)
+    reading = good(1.0, 0.0)._replace(motion=motion([1.0]))
+    assert extrapolated(reading, 0.1) == 1.0
+    assert math.isnan(age_uncertainty_mm(reading, 0.1, carried_on=True))
+
+
+def test_readings_at_the_same_time_have_no_speed():
+    assert motion([0.0, 1.0], [5.0, 5.0]).speed_mm_per_s == 0.0
+
+
+def test_the_uncertainty_grows_with_age_and_is_larger_where_nothing_is_carried_on():
+    reading = Reading(1.0, 10.0, Quality.OK, "", ReadingMotion(50.0, 0.0, 2.0, 0.08))
+    assert age_uncertainty_mm(reading, 10.05, carried_on=True) == pytest.approx(0.05 * 2.0 + 0.05)
+    assert age_uncertainty_mm(reading, 10.05, carried_on=False) == pytest.approx(0.05 * 52.0 + 0.05)
+    beyond = age_uncertainty_mm(reading, 10.18, carried_on=True)
+    assert beyond == pytest.approx(0.18 * 2.0 + 0.1 * 50.0 + 0.05), "silent: the motion goes on unseen"
+    assert age_uncertainty_mm(bad(10.0, Quality.TIMEOUT), 10.05, carried_on=True) == 0.0
