@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import yaml
 from typer.testing import CliRunner
 
 from compd.cli.live import driver as driver_cli
 from compd.cli.live import gauge as gauge_cli
 from compd.commissioning.capture import read_capture
 from compd.commissioning.scan import PresetCandidate, preset_candidates, probe_port, serial_ports
+from compd.configuration import load as load_machine
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
@@ -59,7 +60,21 @@ def run_gauge(*arguments: str, answers: str | None = None) -> tuple[int, str]:
 def test_list_names_every_driver() -> None:
     code, output = run_gauge("list")
     assert code == 0
-    assert all(name[:12] in output for name in names(GAUGES))
+    assert all(name in output for name in names(GAUGES))
+
+
+def test_names_are_whole_at_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, output = run_gauge("list")
+    assert max(map(len, output.splitlines()[:-1])) <= 80
+    assert all(re.search(rf"^[│ ]*{name}[│ ]", output, re.MULTILINE) for name in names(GAUGES))
+
+
+def test_an_error_in_a_list_of_options_is_said_once(scale: str) -> None:
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--set", "unit=1")
+    with pytest.raises(CompdError) as caught:
+        run_gauge("read", "modbus", *port, "--set", MAP.replace("unit: mm", "unit: ells"))
+    assert [problem.where for problem in caught.value.problems] == ["--set channels.0.unit"]
 
 
 def test_show_has_every_key_of_a_description_down_to_the_last() -> None:
@@ -212,25 +227,76 @@ def test_scan_without_probe_sends_nothing() -> None:
     assert code == 0
 
 
-def test_learn_from_a_file_gives_a_usable_gauge(tmp_path: Path) -> None:
+LEARN = ("--unit", "mm", "--range", "unknown")
+
+
+def test_what_learn_writes_is_what_read_and_watch_take(scale: str, tmp_path: Path) -> None:
+    """A whole description, out of a file of replies and with the port of the gauge."""
     capture = tmp_path / "capture.txt"
-    capture.write_text(
-        '# an unknown gauge\n> "?\\r"\n< 2B 31 2E 32 33 0D\n> "?\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n< "ERR0\\r"\n'
-    )
-    assert read_capture(capture) == (b"?\r", [b"+1.23\r", b"-0.50\r", b"+0.01\r", b"ERR0\r"])
-    written = tmp_path / "gauge.yaml"
-    code, output = run_gauge(
-        "learn", str(capture), "--unit", "um", "--error", "ERR0=sensor_fault", "--to", str(written)
-    )
+    replies = [f'< "{sign}{number:10.4f}    \\r\\n"\n' for sign, number in (("+", 12.3456), ("-", 0.5), ("+", 1.2))]
+    capture.write_text("".join(['# a scale display\n> "\\x02"\n', *replies]))
+    written, port = tmp_path / "gauge.yaml", ("--port", scale, "--baud", "115200", "--format", "8N1")
+    code, output = run_gauge("learn", str(capture), "--unit", "mm", "--range=-20,20", *port, "--to", str(written))
     assert code == 0
-    assert "sensor_fault" in output
-    options = yaml.safe_load(written.read_text())["learned_gauge"]
-    driver = load(GAUGES, "serial_ascii", "x")
-    assert driver(driver.Options.model_validate(options)).channels[0].unit == "mm"
+    assert written.read_text() in output
+    code, output = run_gauge("read", str(written))
+    assert (code, "learned_gauge.value: 1.250000 mm" in output) == (0, True)
+    code, output = run_gauge("watch", str(written), "learned_gauge", "--polls", "3")
+    assert (code, "faults: none" in output) == (0, True)
+    run_gauge("learn", str(capture), "--unit", "mm", "--range=-1,1", *port, "--to", str(written), "--overwrite")
+    code, output = run_gauge("read", str(written))
+    assert (code, "over_range" in output) == (1, True)
 
 
-def test_learn_live(scale: str) -> None:
-    """The simulated display stands still: its replies do not differ, and that is said."""
+def test_a_learned_gauge_is_pasted_into_a_machine(tmp_path: Path) -> None:
+    capture = tmp_path / "capture.txt"
+    capture.write_text('> "?\\r"\n< "+1.23\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n')
+    written, machine = tmp_path / "gauge.yaml", tmp_path / "machine.yaml"
+    port = ("--port", "/dev/serial/by-id/dial", "--baud", "9600", "--format", "7E2")
+    run_gauge("learn", str(capture), *LEARN, *port, "--to", str(written))
+    lines, gauges = written.read_text().removeprefix("lines:\n").split("gauges:\n")
+    shipped = (ROOT / "config" / "tripod-cmm.yaml").read_text()
+    pasted = shipped.replace("\nlines:\n", "\nlines:\n" + lines).replace("\ngauges:\n", "\ngauges:\n" + gauges)
+    machine.write_text(pasted)
+    configuration = load_machine(machine)
+    assert configuration.gauges["learned_gauge"].line == "learned_line"
+    assert configuration.lines["learned_line"].model_dump()["format"] == "7E2"
+
+
+def test_a_file_of_gauges_without_their_line_takes_it_from_the_command_line(scale: str, tmp_path: Path) -> None:
+    file = tmp_path / "gauges.yaml"
+    file.write_text(
+        "gauges:\n  a: {driver: heidenhain_nd28x, line: x}\n  b: {driver: heidenhain_nd28x, line: x, unt: mm}\n"
+    )
+    with pytest.raises(CompdError, match=r"gauges.yaml:3 gauges.b.unt: unknown key"):
+        run_gauge("read", str(file), "a")
+    file.write_text(file.read_text().replace("unt", "unit"))
+    with pytest.raises(CompdError, match=r"gauges.yaml:2 gauges.a.line: the file has no line of this name"):
+        run_gauge("read", str(file), "a")
+    with pytest.raises(CompdError, match="name one of its gauges"):
+        run_gauge("read", str(file))
+    code, output = run_gauge("read", str(file), "a", "--port", scale, "--baud", "115200", "--format", "8N1")
+    assert (code, "a.position: 1.250000 mm" in output) == (0, True)
+
+
+def test_an_error_reply_on_the_command_line(tmp_path: Path) -> None:
+    capture = tmp_path / "capture.txt"
+    capture.write_text('> "?\\r"\n< 2B 31 2E 32 33 0D\n> "?\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n< "\\x15E=0\\r"\n')
+    assert read_capture(capture)[-1] == (b"?\r", b"\x15E=0\r")
+    code, output = run_gauge("learn", str(capture), *LEARN, "--error", r"\x15E=0=sensor_fault")
+    assert code == 0
+    assert "-> sensor_fault" in output
+    with pytest.raises(CompdError, match="--error: has no reply"):
+        run_gauge("learn", str(capture), *LEARN, "--error", "sensor_fault")
+
+
+def test_a_range_that_is_none() -> None:
+    with pytest.raises(CompdError, match="--range: is no range"):
+        run_gauge("learn", "x", "--range", "wide")
+
+
+def test_learn_live(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The simulated display stands still: its replies do not differ, and that is said. They are kept."""
     with pytest.raises(CompdError, match="too few that differ"):
         run_gauge(
             "learn",

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from compd.commissioning.conformance.report import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality, Reading
+from compd.lines.checksums import CHECKSUMS
 from compd.lines.stream import StreamLine
-from compd_drivers.checksums import CHECKSUMS
 from compd_drivers.reply_format import ReplyFormat
 from compd_drivers.simulated.serial_ascii import SimulatedAscii
 from tests.support.ascii_gauge import CHANNEL, fault, gauge, line_with, poll
