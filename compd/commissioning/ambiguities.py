@@ -83,7 +83,7 @@ def _constant_sign(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> 
         columns[k][0].start,
         f"the letter {letter} before a number without sign: does {other} stand there on the other side of zero?",
         [text],
-        f"if so, --factors={f'{letter}=1|{other}=-1'!r}, with the signs as the manual has them; if not, --ignore={letter}",
+        f"if so, --factors={f'{letter}=1|{other}=-1'!r}, with the manual's signs; if not, --ignore={letter}",
     )
 
 
@@ -121,7 +121,7 @@ def number_questions(
                 start,
                 f"has {places} decimals of {unit or 'its unit'}: are the last ones a checksum or a status?",
                 texts[:3],
-                f"--decimals {places} if the display shows so many; --decimals {places - 2} where two are no part of it",
+                f"--decimals {places} if the display shows so many; --decimals {places - 2} where it shows two less",
             )
     whole = [text.partition(mark)[0] for text in texts]
     alike = "".join(
@@ -132,8 +132,8 @@ def number_questions(
             start,
             f"begins with {alike} in every reply: is an address or a status glued to it?",
             texts[:3],
-            f"if so, --constant with the digits that are no part of the number, such as {alike[:2]}; if not, --plain, or "
-            "capture again where the first digits differ, also near zero",
+            f"if so, --constant with the digits that are no part of the number, such as {alike[:2]}; if not, --plain, "
+            "or capture again where the first digits differ, also near zero",
         )
 
 
@@ -154,8 +154,8 @@ def _thousands(columns: Sequence[ReplyColumn], k: int, mark: str, answers: Answe
             columns[k - 2][0].start,
             "may be one number in groups of three digits, which compd does not read, or two numbers",
             [joined],
-            f"one: set the device to send it without groups; two: --names with a name for each, or --constant {before[0]} "
-            "where the first never changes",
+            "one: set the device to send it without groups; two: --names with a name for each, or "
+            f"--constant {before[0]} where the first never changes",
         )
 
 

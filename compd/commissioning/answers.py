@@ -10,7 +10,7 @@ from compd.commissioning.capture import unescaped
 from compd.errors import CompdError, Problem
 
 SKIPPED = "-"
-UNKNOWN = "unknown"
+UNKNOWN: Literal["unknown"] = "unknown"
 Range = tuple[float, float] | Literal["unknown"]
 
 

@@ -1,4 +1,4 @@
-"""A file of gauges and their lines: what `compd gauge learn --to` writes, `read` and `watch` take, and a machine contains.
+"""A file of gauges and their lines: what `compd gauge learn --to` writes, and `read` and `watch` take.
 
 Its two sections stand in a machine's configuration in the same words, so that they are pasted there as they are.
 """

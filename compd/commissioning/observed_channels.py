@@ -116,7 +116,7 @@ class ObservedChannels:
                         what="the replies say another unit",
                         value=unit,
                         allowed=", ".join(filter(None, said)),
-                        next_step="leave out --unit, or set the device to one unit; if it is none, --ignore its letters",
+                        next_step="leave out --unit, or set the device to one; if it is no unit, --ignore its letters",
                     )
                 )
 

@@ -19,7 +19,7 @@ gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and desc
 
 TargetArgument = Annotated[
     str,
-    typer.Argument(help="A driver's name, or a file (.yaml): a machine's configuration, or gauges and their lines."),
+    typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
 ]
 NameArgument = Annotated[str | None, typer.Argument(help="With a file of several gauges: which of them.")]
 Port = Annotated[
@@ -184,7 +184,7 @@ def learn(
     replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
     unit: Annotated[
         str,
-        typer.Option(help="Unit of the numbers on the wire, where they do not say it: mm, um, inch ...; or mm,inch."),
+        typer.Option(help="Unit of the numbers on the wire, where they do not say it: mm, um ...; or mm,inch."),
     ] = "",
     names: Annotated[str, typer.Option(help="Names of the numbers, with commas between; - skips one: a,-,b.")] = "",
     ranges: Annotated[
@@ -206,9 +206,7 @@ def learn(
     ] = None,
     decimals: Annotated[
         int | None,
-        typer.Option(
-            min=0, help="Decimals that the display shows, where more digits follow, or where no point is sent."
-        ),
+        typer.Option(min=0, help="Decimals that the display shows, where more digits follow or no point is sent."),
     ] = None,
     decimal_mark: Annotated[str, typer.Option(help="Where replies leave it open: , or .")] = "",
     skip_end: Annotated[int, typer.Option(min=0, help="Skip so many characters at the end of every reply.")] = 0,
