@@ -83,8 +83,9 @@ def scan(
         bool, typer.Option("--probe", help="Ask every port with each preset's read request. SENDS BYTES to all ports.")
     ] = False,
 ) -> None:
-    """Find serial ports; with --probe, look which preset gets an answer."""
-    from compd.commissioning.scan import probe_ports, serial_ports
+    """Find serial ports; with --probe, look which presets fit what answers."""
+    from compd.commissioning.probe import announcements, preset_candidates
+    from compd.commissioning.scan import serial_ports
 
     ports = serial_ports()
     if not ports:
@@ -101,8 +102,10 @@ def scan(
         "is no gauge may take it for a command."
     )
     typer.confirm("Is nothing dangerous connected?", abort=True)
-    for port, candidate, outcome in probe_ports(ports):
-        typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: {outcome}")
+    candidates = preset_candidates()
+    for port in ports:
+        for text in announcements(port.path, candidates):
+            typer.echo(f"{port.path}: {text}")
 
 
 @gauge.command()

@@ -13,11 +13,15 @@ from typer.testing import CliRunner
 
 from compd.cli.live import driver as driver_cli
 from compd.cli.live import gauge as gauge_cli
+from compd.clock import MonotonicClock
 from compd.commissioning.capture import read_capture
-from compd.commissioning.scan import PresetCandidate, preset_candidates, probe_port, serial_ports
+from compd.commissioning.open_gauge import open_tapped_line
+from compd.commissioning.probe import PresetCandidate, preset_candidates, probe_port
+from compd.commissioning.scan import serial_ports
 from compd.configuration import load as load_machine
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError
+from compd.lines import open_line
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
@@ -217,9 +221,19 @@ def test_scan_and_probe(scale: str, tmp_path: Path) -> None:
     assert str(by_id / "usb-Scale_1") in {port.path for port in serial_ports(by_id)}
     nd28x = load(GAUGES, "heidenhain_nd28x", "x")
     candidate = PresetCandidate("nd", nd28x(nd28x.Options(driver="nd", line="x")), 115200, "8N1")
-    assert probe_port(scale, candidate) == "position 1.25 mm"
-    assert "line_lost" in probe_port(str(tmp_path / "nothing"), candidate)
+    assert str(probe_port(scale, candidate)) == "position 1.25 mm"
+    assert "line_lost" in str(probe_port(str(tmp_path / "nothing"), candidate))
     assert {"heidenhain_nd28x", "sylvac_optors", "adam_4017p"} <= {candidate.name for candidate in preset_candidates()}
+
+
+def test_read_waits_for_the_same_silence_as_the_daemon(scale: str) -> None:
+    """3.5 characters at 9600 baud are 3.6 ms: a request that follows a byte sooner would be seen on the wire."""
+    settings = SerialLine(kind="serial", port=scale, baud=9600, format="8N1", timeout_s=0.5)
+    tapped = open_tapped_line(settings, MonotonicClock(), lambda direction, data: None)
+    tapped.close()
+    line = open_line(settings, MonotonicClock())
+    line.close()
+    assert vars(tapped)["_gap_s"] == vars(line)["_gap_s"] == pytest.approx(3.5 * 10 / 9600)
 
 
 def test_scan_without_probe_sends_nothing() -> None:
