@@ -29,9 +29,10 @@ def gauge_file_text(options: Mapping[str, Any], line: LineSettings | None) -> st
     gauge = {"driver": options["driver"], "line": LEARNED_LINE, **options}
     sections: dict[str, Any] = {}
     if line is not None:
-        sections["lines"] = {LEARNED_LINE: line.model_dump(mode="json", exclude_unset=True)}
+        keys = line.model_dump(mode="json", exclude_unset=True)
+        sections["lines"] = {LEARNED_LINE: {"kind": line.kind, **keys}}
     sections["gauges"] = {LEARNED_GAUGE: gauge}
-    return yaml.safe_dump(sections, sort_keys=False)
+    return yaml.safe_dump(sections, sort_keys=False, default_flow_style=None, width=120)
 
 
 def gauge_of_file(path: Path, name: str | None, port: PortArguments) -> GaugeTarget:

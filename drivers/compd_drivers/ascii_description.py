@@ -93,7 +93,7 @@ class SerialAsciiOptions(ExchangeOptions):
 
     def _literal_problems(self) -> Iterator[str]:
         """What looks like a pattern where every character stands for itself."""
-        exchanges = [*self.requests, *self.init, *([self.echo] if self.echo else [])]
+        exchanges: list[ValueRequest | Exchange] = [*self.requests, *self.init, *([self.echo] if self.echo else [])]
         for text in (self.out, *(exchange.out for exchange in exchanges)):
             if match := _REQUEST_PATTERN.search(text):
                 yield f"{match[0]!r} in `out` {text!r}: a request is sent as it stands; write {_what_it_means(match)}"
