@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from compd.commissioning.answers import Answers, factor_words
 from compd.commissioning.reply_columns import ReplyColumn, varying_word
-from compd.commissioning.unit_words import wire_unit
+from compd.commissioning.unit_words import is_wire_unit
 from compd.errors import Problem
 from compd.lines.checksums import CHECKSUMS
 
@@ -34,7 +34,7 @@ def text_questions(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> 
     if len(words) == 1:
         yield from _constant_sign(columns, k, answers)
         return
-    if any(words <= set(factor_words(table)) for table in answers.factors) or all(map(wire_unit, words)):
+    if any(words <= set(factor_words(table)) for table in answers.factors) or all(map(is_wire_unit, words)):
         return
     characters = set("".join(words)) - set(answers.ignored) - set(JUDGEMENTS)
     if not characters and len({len(word) for word in words}) == 1:
@@ -65,8 +65,9 @@ def text_questions(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> 
 def _constant_sign(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> Iterator[Problem]:
     text = columns[k][0].text.decode("latin-1")
     known = {word for table in answers.factors for word in factor_words(table)} | set(answers.ignored)
-    sign = text.strip(" ")[:1]
-    if k > 0 and sign in ("+", "-") and sign not in known:
+    ends = [text.strip(" ")[:1], *([text.strip(" ")[-1:]] if k == len(columns) - 1 else [])]
+    sign = next((end for end in ends if end in ("+", "-")), "")
+    if k > 0 and sign and sign not in known:
         yield _question(
             columns[k][0].start,
             "stands behind a number: is it the sign?",
@@ -168,13 +169,14 @@ def decimal_mark_of(columns: Sequence[ReplyColumn], answers: Answers) -> tuple[s
         if {part.text for part in columns[k]} != {b","}:
             continue
         before, behind = ([part.text for part in columns[place]] for place in (k - 1, k + 1))
-        if not all(text.isdigit() for text in behind) or len({len(text) for text in behind}) > 1:
+        if not all(re.fullmatch(rb"\d+(?:[eE][+-]?\d+)?", text) for text in behind):
             continue
+        as_long = len({len(text) for text in behind}) == 1
         shown = f"{before[0].decode()},{behind[0].decode()}"
         whole = all(re.fullmatch(rb" *[+-]? *\d+", text) for text in before)
         grouped = all(re.fullmatch(rb" *[+-]? *\d{1,3}\.\d{3}", text) for text in before)
         signed = any(re.match(rb" *[+-]", text) for text in before)
-        if whole and signed and not pointed:
+        if whole and signed and as_long and not pointed:
             return ",", []
         if (whole and not pointed) or grouped:
             one = "set the device to send it without points" if grouped else "--decimal-mark ,"

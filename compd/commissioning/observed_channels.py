@@ -7,6 +7,7 @@ from typing import Any
 
 from compd.commissioning.answers import SKIPPED, UNKNOWN, Answers
 from compd.commissioning.observed_exchange import ObservedExchange
+from compd.commissioning.unit_words import WIRE_UNITS
 from compd.errors import Problem
 from compd.units import unit_factor
 
@@ -81,7 +82,7 @@ class ObservedChannels:
         return channels
 
     def _ask_for_names(self, places: Sequence[tuple[ObservedExchange, int]]) -> None:
-        bare = [all(text.isdigit() for text in exchange.texts(k)) for exchange, k in places]
+        bare = [exchange.is_whole(k) for exchange, k in places]
         if not any(bare) or all(bare):
             return
         self._in_question = {(exchange.request, k) for (exchange, k), whole in zip(places, bare, strict=True) if whole}
@@ -104,7 +105,7 @@ class ObservedChannels:
                 self.problems.append(
                     Problem(
                         where=where,
-                        what="which unit has the number? the replies do not say it",
+                        what=f"which unit has the number? the replies {_say(said)}",
                         value=exchange.texts(k)[0].strip(),
                         next_step="--unit mm (um, inch, degC ...); --unit mm,inch where each channel has its own",
                     )
@@ -116,7 +117,8 @@ class ObservedChannels:
                         what="the replies say another unit",
                         value=unit,
                         allowed=", ".join(filter(None, said)),
-                        next_step="leave out --unit, or set the device to one; if it is no unit, --ignore its letters",
+                        next_step="leave out --unit, or set the device to one unit; to multiply the number, "
+                        f"--factors {said[-1]}=FACTOR; if it is no unit, --ignore its letters",
                     )
                 )
 
@@ -143,8 +145,13 @@ class ObservedChannels:
 
 def _unit(said: Sequence[str], given: str) -> str:
     """Of a number on the wire: what the person says, else what the replies do; mm where they change between units."""
-    units = [unit for unit in said if unit]
+    units = [unit for unit in said if unit in WIRE_UNITS]
     return given or ("mm" if "mm" in units else units[0] if units else "")
+
+
+def _say(said: Sequence[str]) -> str:
+    units = [unit for unit in said if unit]
+    return f"say {', '.join(units)}, which is none of a channel" if units else "do not say it"
 
 
 def _factor(other: str, unit: str, said: Sequence[str]) -> float | None:

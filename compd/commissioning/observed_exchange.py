@@ -78,7 +78,7 @@ class ObservedExchange:
         return all(len(text) == 2 for text in self.texts(k)) and any(
             0 < other < len(self.columns)
             and set(self.texts((k + other) // 2)) == {":"}
-            and all(text[:2].isdigit() for text in self.texts(other))
+            and all(len(text) == 2 and text.isdigit() for text in self.texts(other))
             for other in (k - 2, k + 2)
         )
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.commissioning.unit_words import wire_unit
+from compd.commissioning.unit_words import is_wire_unit
 from compd.errors import CompdError, Problem
 
 _SIGNS = ("", "+", "-", " ")
@@ -110,9 +110,7 @@ def varying_word(texts: Sequence[bytes]) -> VaryingWord:
 def exchangeable(varying: VaryingWord, tables: Sequence[Sequence[str]] = ()) -> bool:
     """Whether the words may stand for each other: signs, units, or words of one of the tables."""
     words = set(varying.words)
-    return (
-        words <= set(_SIGNS) or all(wire_unit(word) for word in words) or any(words <= set(table) for table in tables)
-    )
+    return words <= set(_SIGNS) or all(map(is_wire_unit, words)) or any(words <= set(table) for table in tables)
 
 
 def _exponents(*parts: ReplyPart) -> bool:

@@ -7,7 +7,7 @@ from compd.commissioning.number_converter import number_converter, skipped_conve
 from compd.commissioning.observed_channels import ObservedChannels
 from compd.commissioning.observed_exchange import ObservedExchange
 from compd.commissioning.reply_columns import ReplyColumn, VaryingWord, varying_word
-from compd.commissioning.unit_words import wire_unit
+from compd.commissioning.unit_words import is_wire_unit, wire_unit
 from compd.units import unit_factor
 
 
@@ -45,7 +45,7 @@ def _text(exchange: ObservedExchange, k: int, channels: ObservedChannels, answer
     owner = _owner(exchange, k, varying, channels)
     if owner is not None and words != {""}:
         table = next((table for table in answers.factors if words <= set(factor_words(table))), "")
-        if not table and len(words) > 1 and all(map(wire_unit, words)):
+        if not table and len(words) > 1 and all(map(is_wire_unit, words)):
             unit = channels.unit(exchange, owner)
             table = "|".join(f"{word}={unit_factor(wire_unit(word), unit):.12g}" for word in sorted(words))
         if table:

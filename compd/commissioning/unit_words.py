@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 
-from compd.units import unit_named
+from compd.units import KNOWN_UNITS, unit_factor, unit_named
 
-# Those of `compd.units` that a description may give a channel, and others, which count in exactly these letters.
-_LENGTHS = ("mm", "um", "nm", "inch")
+# What a channel of a description may have on the wire, and a reply may say.
+WIRE_UNITS = ("mm", "um", "nm", "inch", "mil", "degC", "degF", "kN", "hPa", "mbar", "kPa", "Pa", "pct")
+# In exactly these letters; a single one is as often a state or a side, but for the metre.
 _EXACT = {
-    **{name: name for name in ("mil", "degC", "degF", "kN", "hPa", "mbar", "kPa", "Pa")},
+    **{name: name for name in (*KNOWN_UNITS, "mil", "m") if len(name) > 1 or name == "m"},
     **{"\xb0C": "degC", "\xb0F": "degF", "%RH": "pct"},
 }
 _BEGINS = re.compile(r" *([A-Za-z\xb5\xb0%]+|\")(?![A-Za-z\xb5])")
@@ -17,11 +18,15 @@ _ENDS = re.compile(r"(?<![A-Za-z\xb5])([A-Za-z\xb5\xb0%]+|\") *$")
 
 
 def wire_unit(word: str) -> str:
-    """The unit of a channel that a word is; "" if it is none, as a single letter never is."""
-    if len(word) == 1 and word != '"':
-        return ""
-    length = unit_named(_latin(word))
-    return length if length in _LENGTHS else _EXACT.get(_latin(word), "")
+    """The unit that a word is, also one that no channel has (mV); "" if it is none."""
+    word = _latin(word)
+    length = "" if len(word) == 1 and word.isalpha() else unit_named(word)
+    return length if unit_factor(length, "mm") else _EXACT.get(word, "")
+
+
+def is_wire_unit(word: str) -> bool:
+    """Whether a word is a unit that a channel may have on the wire."""
+    return wire_unit(word) in WIRE_UNITS
 
 
 def unit_behind(text: str) -> tuple[str, str]:

@@ -325,7 +325,7 @@ def test_learn_live(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
             "--out",
             r"\x02",
             "--timeout",
-            "0.1",
+            "0.3",
             "--replies",
             "3",
             answers="\n\n\n",

@@ -145,6 +145,24 @@ OBSERVED: dict[str, tuple[list[bytes], dict[str, Any], str, list[str]]] = {
         "%{L=-1|R=1}%08.3f",
         ["-12.3", "-12.4", "-0.5"],
     ),
+    "metres by their factor": (
+        [b"+1.5 m\r", b"+2.5 m\r", b"-1.0 m\r"],
+        {"factors": ("m=1000",)},
+        "%+4.1f %{m=1000}",
+        ["1500", "2500", "-1000"],
+    ),
+    "a decimal comma and exponents": (
+        [b"+1,5E-3\r", b"+2,5E-2\r", b"-1,0E+0\r"],
+        {},
+        "%+7.1e",
+        ["0.0015", "0.025", "-1"],
+    ),
+    "an address that is no clock": (
+        [b"12:012.300\r", b"12:100.500\r", b"12:003.100\r"],
+        {"plain": True},
+        "12:%7.3f",
+        ["12.3", "100.5", "3.1"],
+    ),
     "a glued address": (
         [b"12012.300\r", b"12000.500\r", b"12003.100\r"],
         {"constants": ("12",)},
@@ -204,6 +222,11 @@ QUESTIONS: dict[str, tuple[list[bytes], str, str]] = {
     "commas between thousands": ([b"1,234.567\r", b"2,034.567\r", b"1,234.500\r"], "groups of three", "--names"),
     "whole": ([b"12345\r", b"00345\r", b"30001\r"], "is a whole number", "--decimals 3"),
     "a counter": ([b"17 +1.230\r", b"18 -2.300\r", b"19 +0.500\r"], "counters, a clock, a status", "--names=-,c2"),
+    "a sign behind a unit": ([b"12.300 mm -\r", b"12.400 mm -\r", b"00.500 mm -\r"], "is it the sign?", "--ignore=-"),
+    "a comma and other lengths": ([b"+1,5\r", b"+12,25\r", b"-0,125\r"], "a decimal comma?", "--decimal-mark ,"),
+    "another unit": ([b"+1.5 mV\r", b"+2.5 mV\r", b"-1.0 mV\r"], "the replies say another unit", "mV=FACTOR"),
+    "metres": ([b"+1.5 m\r", b"+2.5 m\r", b"-1.0 m\r"], "the replies say another unit", "m=FACTOR"),
+    "a date": ([b"2026-11-23 1.23\r", b"2026-11-24 1.24\r", b"2026-11-25 9.87\r"], "a clock", "--names=-,-,c3"),
     "a checksum": ([b"+012.300q\r", b"-002.300Z\r", b"+000.001!\r"], "none of sum8, negative_sum8", "--skip-end 1"),
 }  # fmt: skip
 
