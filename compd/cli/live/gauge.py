@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -273,7 +274,9 @@ def _listed(text: str) -> tuple[str, ...]:
 
 
 def _between_captures(done: int, wanted: int) -> None:
-    typer.prompt(f"{done} of {wanted} captured; move the gauge, then Enter", default="", show_default=False)
+    typer.echo(f"{done} of {wanted} captured; move the gauge, then Enter: ", nl=False)
+    sys.stdin.readline()  # at its end, as without a terminal, nobody is waited for
+    typer.echo()
 
 
 def _port(

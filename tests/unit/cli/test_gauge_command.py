@@ -25,6 +25,7 @@ from compd.lines import open_line
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
+from tests.unit.commissioning.test_capture import talker
 
 RUNNER = CliRunner()
 MAP = "channels=[{name: a, function: 4, address: 0, type: int16, unit: mm}]"
@@ -309,27 +310,28 @@ def test_a_range_that_is_none() -> None:
         run_gauge("learn", "x", "--range", "wide")
 
 
-def test_learn_live(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The simulated display stands still: its replies do not differ, and that is said. They are kept."""
-    with pytest.raises(CompdError, match="too few that differ"):
-        run_gauge(
-            "learn",
-            "--unit",
-            "mm",
-            "--port",
-            scale,
-            "--baud",
-            "115200",
-            "--format",
-            "8N1",
-            "--out",
-            r"\x02",
-            "--timeout",
-            "0.3",
-            "--replies",
-            "3",
-            answers="\n\n\n",
+def test_replies_of_a_live_gauge_are_kept_where_questions_are_left(scale: str) -> None:
+    """The simulated display stands still: its replies do not differ, and that is said. Nobody presses Enter."""
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--timeout", "0.3")
+    result = RUNNER.invoke(gauge_cli.gauge, ["learn", *port, *LEARN, "--out", r"\x02", "--replies", "3"])
+    assert isinstance(result.exception, CompdError)
+    assert "too few that differ" in str(result.exception)
+    kept = re.search(r"the replies are kept: compd gauge learn (\S+)", result.output)
+    assert kept is not None
+    captured = read_capture(Path(kept[1]))
+    Path(kept[1]).unlink()
+    assert [(request, len(reply)) for request, reply in captured] == 3 * [(b"\x02", 17)]
+
+
+def test_learn_a_device_that_speaks_unasked(tmp_path: Path) -> None:
+    written = tmp_path / "gauge.yaml"
+    with talker(0.02) as port:
+        code, _ = run_gauge(
+            "learn", "--port", port, "--baud", "9600", "--format", "8N1", *LEARN, "--to", str(written), answers=6 * "\n"
         )
+        assert code == 0
+        code, output = run_gauge("watch", str(written), "--polls", "5")
+    assert (code, "faults: none" in output) == (0, True)
 
 
 def test_driver_test_prints_every_case_and_fails_by_exit_code(tmp_path: Path) -> None:
