@@ -22,6 +22,7 @@ OTHER_DECIMALS = 4
 # What comparators write behind a value beyond or within its tolerance (Heidenhain ND 281, Mahr C1202: M).
 JUDGEMENTS = "<>= "
 _SIGN_LETTERS = {"L": "R", "R": "L", "l": "r", "r": "l"}
+STATUS = "a status: capture good replies alone, or name the others by --error"
 BY_HAND = "or write the description by hand: docs/how-to/describe-a-gauge.md"
 
 
@@ -53,7 +54,7 @@ def text_questions(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> 
     if k == len(columns) - 1 and not varying.behind:
         length = len(varying.words[0])
         steps.append(f"a checksum: it is none of {', '.join(CHECKSUMS)}; --skip-end {length} skips it unchecked")
-    steps.append(f"a status: capture good replies alone, or name the others by --error; {BY_HAND}")
+    steps.append(f"{STATUS}; {BY_HAND}")
     yield _question(
         column[0].start + len(varying.before),
         "varies beside a number: is it a sign, a unit, a side, a status or a checksum?",
@@ -75,6 +76,13 @@ def _constant_sign(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> 
             f"if so, --factors={_table({sign, '+', '-'}, {'+': 1, '-': -1})!r}; if not, --ignore={sign}",
         )
     letter = text[-1:]
+    if letter == "(" and letter not in known and k < len(columns) - 1:
+        yield _question(
+            columns[k][0].start,
+            "a number in parentheses: does that mean minus?",
+            [f"({columns[k + 1][0].text.decode()})"],
+            "if so, --factors '(=-1'; if not, --ignore='('",
+        )
     if k == len(columns) - 1 or letter not in _SIGN_LETTERS or text[-2:-1].isalpha() or letter in known:
         return
     if any(re.match(rb" *[+-]", part.text) for part in columns[k + 1]):
@@ -96,6 +104,21 @@ def number_questions(
     texts = [part.text.strip().decode("ascii") for part in column]
     start = column[0].start
     if any("e" in text.lower() for text in texts):
+        mantissas = [re.split("[eE]", text)[0].lstrip("+- ") for text in texts]
+        if not answers.plain and any(len(mantissa.partition(mark)[0]) > 1 for mantissa in mantissas):
+            yield _question(
+                start,
+                "has an exponent and several digits before the point: is an address or a status glued to it?",
+                texts[:3],
+                f"--constant with the digits of an address; if all are measured, --plain; {STATUS}; {BY_HAND}",
+            )
+        if not answers.plain and any(re.search(r"[eE][+-]?\d{4}", text) for text in texts):
+            yield _question(
+                start,
+                "has four or more digits of its exponent: are the last ones a checksum?",
+                texts[:3],
+                "if so, --skip-end 2 for two of them; if not, --plain",
+            )
         return
     nines = re.compile(rf"[+-]? *9{{3,}}{re.escape(mark)}?9*|[+-]? *9+{re.escape(mark)}99+")
     if code := next((text for text in texts if nines.fullmatch(text)), None):
@@ -124,17 +147,32 @@ def number_questions(
                 texts[:3],
                 f"--decimals {places} if the display shows so many; --decimals {places - 2} where it shows two less",
             )
+    yield from _glued(texts, start, mark, answers)
+
+
+def _glued(texts: Sequence[str], start: int, mark: str, answers: Answers) -> Iterator[Problem]:
+    """Digits in front that never change, or of which the first alone does: an address, a status, or measured?"""
+    if answers.plain:
+        return
     whole = [text.partition(mark)[0] for text in texts]
     alike = "".join(
         seen[0] for seen in itertools.takewhile(lambda seen: len(set(seen)) == 1, zip(*whole, strict=False))
     )
-    if not answers.plain and min(map(len, whole)) > 1 and alike.isdigit() and alike.strip("0"):
+    shortest = min(map(len, whole))
+    if shortest > 1 and alike.isdigit() and alike.strip("0"):
         yield _question(
             start,
             f"begins with {alike} in every reply: is an address or a status glued to it?",
             texts[:3],
             f"if so, --constant with the digits that are no part of the number, such as {alike[:2]}; if not, --plain, "
             "or capture again where the first digits differ, also near zero",
+        )
+    elif shortest > 2 and all(map(str.isdigit, whole)) and not alike and len({text[1] for text in whole}) == 1:
+        yield _question(
+            start,
+            "its first digit changes and its second never does: is a status glued to it?",
+            texts[:3],
+            f"if not, --plain, or capture again where the second digit differs; {STATUS}; {BY_HAND}",
         )
 
 

@@ -127,9 +127,10 @@ def _common(texts: Sequence[str]) -> str:
 
 def _number_pattern(mark: str) -> re.Pattern[bytes]:
     point = re.escape(mark)
+    before = r"\d*" if mark == "." else r"\d+"  # .5 is a number, and ,5 the next one of a list
     return re.compile(
         rf" *[+-]? *\d+(?:{point}\d+)?[eE][+-]\d+| *[+-]? *\d+{point}\d+[eE]\d+"
-        rf"| *[+-]? *\d*{point}\d+| *[+-] *\d+|\d+".encode()
+        rf"| *[+-]? *{before}{point}\d+| *[+-] *\d+|\d+".encode()
     )
 
 
