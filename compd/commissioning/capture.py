@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from compd.clock import MonotonicClock
 from compd.commissioning.open_gauge import open_tapped_stream
@@ -13,14 +15,24 @@ from compd.gauge import LineFault, Quality
 from compd.lines.stream import StreamLine
 
 LONGEST_REPLY = 1024
+# What ends the lines of devices: CR, LF, ETX, EOT.
+LINE_ENDS = b"\r\n\x03\x04"
 
 
-def read_capture(path: Path) -> tuple[bytes, list[bytes]]:
-    """The request and the replies of a capture: lines of `>` (sent) or `<` (received), then hex or quoted text.
+class CapturedReply(NamedTuple):
+    """A request, b"" where the device spoke unasked, and what came after it."""
 
-    `#` begins a comment. CompdError names file and line of what cannot be read, and of a second kind of request.
+    request: bytes
+    reply: bytes
+
+
+def read_capture(path: Path) -> list[CapturedReply]:
+    """The replies of a capture: lines of `>` (sent) or `<` (received), then hex or quoted text.
+
+    Each reply belongs to the last request before it. `#` begins a comment. CompdError names file and line of what
+    cannot be read.
     """
-    request, replies = b"", []
+    request, captured = b"", []
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except OSError as error:
@@ -29,22 +41,23 @@ def read_capture(path: Path) -> tuple[bytes, list[bytes]]:
         text = line.strip()
         if not text or text.startswith("#"):
             continue
-        direction, data = text[0], _bytes_of_line(f"{path}:{number}", text)
-        if direction == "<":
-            replies.append(data)
-        elif request and data != request:
-            raise CompdError(
-                Problem(
-                    where=f"{path}:{number}",
-                    what="another request than before",
-                    value=repr(data),
-                    allowed=repr(request),
-                    next_step="learn one request at a time",
-                )
-            )
-        else:
+        data = _bytes_of_line(f"{path}:{number}", text)
+        if text[0] == ">":
             request = data
-    return request, replies
+        else:
+            captured.append(CapturedReply(request, data))
+    return captured
+
+
+def saved_capture(captured: Sequence[CapturedReply]) -> Path:
+    """A new file, among the system's temporary ones, that `read_capture` reads as `captured`."""
+    lines = []
+    for request, reply in captured:
+        lines += [f"> {request.hex(' ')}"] if request else []
+        lines.append(f"< {reply.hex(' ')}")
+    with tempfile.NamedTemporaryFile("w", prefix="compd-capture-", suffix=".txt", delete=False) as file:
+        file.write("\n".join([*lines, ""]))
+    return Path(file.name)
 
 
 def _bytes_of_line(where: str, text: str) -> bytes:
@@ -79,46 +92,46 @@ def capture_live(
     wanted: int,
     between: Callable[[int, int], None],
     show: Callable[[str], None],
-) -> tuple[bytes, list[bytes]]:
-    """The request and `wanted` replies, captured on the wire: everything until silence is one reply.
+) -> list[CapturedReply]:
+    """`wanted` replies, captured on the wire.
 
-    out : the request with escapes; "" for a device that speaks unasked, where a reply is what comes between two
-        silences.
+    out : the request with escapes: everything until silence is its reply. "" for a device that speaks unasked, whose
+        whole lines are replies, each the first that begins after `between`.
     between : called between two captures with (captured so far, wanted): the person moves the gauge meanwhile.
     show : called with a line of text for all bytes that pass.
     Raises CompdError when nothing comes.
     """
     request = unescaped(out)
-    replies: list[bytes] = []
+    captured: list[CapturedReply] = []
 
     def show_bytes(direction: str, data: bytes) -> None:
         show(f"{direction} {data.hex(' ')}   {data!r}")
 
-    line = open_tapped_stream(settings, MonotonicClock(), show_bytes)
     try:
-        while len(replies) < wanted:
-            replies.append(_reply_until_silence(line, request))
-            if len(replies) < wanted:
-                between(len(replies), wanted)
+        line = open_tapped_stream(settings, MonotonicClock(), show_bytes)
+        try:
+            while len(captured) < wanted:
+                reply = _reply_until_silence(line, request) if request else _line_unasked(line)
+                captured.append(CapturedReply(request, reply))
+                if len(captured) < wanted:
+                    between(len(captured), wanted)
+        finally:
+            line.close()
     except LineFault as fault:
+        unasked = "--timeout longer than the period of a device that speaks unasked, or --out with the request it wants"
         raise CompdError(
             Problem(
                 where=str(getattr(settings, "port", settings)),
-                what=f"reply {len(replies) + 1}: {fault}",
-                next_step="check port, baud, format, request and its terminator",
+                what=f"reply {len(captured) + 1}: {fault}",
+                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {unasked}"),
             )
         ) from fault
-    finally:
-        line.close()
-    return request, replies
+    return captured
 
 
 def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
     """What comes after a request, until the line is quiet. Raises LineFault: TIMEOUT when nothing does."""
-    if request:
-        line.send(request)
-    else:
-        line.drain()
+    line.send(request)
     reply = b""
     while len(reply) < LONGEST_REPLY:
         try:
@@ -127,4 +140,28 @@ def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
             if fault.quality is not Quality.TIMEOUT or not reply:
                 raise
             return reply
-    raise LineFault(Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes")
+    raise LineFault(Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: if it speaks unasked, leave out --out")
+
+
+def _line_unasked(line: StreamLine) -> bytes:
+    """The first whole line of a device that speaks unasked: up to its terminator, or between two silences.
+
+    Raises LineFault: TIMEOUT when nothing comes, MISMATCH for bytes without an end.
+    """
+    line.listen()
+    text, from_its_beginning = b"", False
+    for _ in range(2 * LONGEST_REPLY):
+        try:
+            byte = line.receive(1)
+        except LineFault as fault:
+            if fault.quality is not Quality.TIMEOUT or (from_its_beginning and not text):
+                raise
+            byte = b""
+        if byte and (not text or byte in LINE_ENDS or text[-1:] not in LINE_ENDS):
+            text += byte
+            continue
+        # a byte behind a terminator, or a silence: what came before is a line
+        if from_its_beginning:
+            return text
+        text, from_its_beginning = byte, True
+    raise LineFault(Quality.MISMATCH, f"no end of a line within {2 * LONGEST_REPLY} bytes")

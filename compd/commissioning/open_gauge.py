@@ -1,4 +1,4 @@
-"""The gauge that a command means, its line with every byte shown, and polling it as the daemon does."""
+"""The gauge that a driver's name means, its line with every byte shown, and polling it as the daemon does."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from compd.clock import Clock
-from compd.configuration import load as load_configuration
 from compd.configuration.lines import (
     LineSettings,
     ModbusAsciiLine,
@@ -21,6 +20,7 @@ from compd.configuration.lines import (
     TcpLine,
     powered,
 )
+from compd.configuration.section import separate_errors
 from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, Quality, Reading, bad
@@ -57,28 +57,6 @@ class GaugeTarget:
     line: LineSettings
 
 
-def gauge_of_configuration(path: Path, name: str | None) -> GaugeTarget:
-    """The gauge `name` of the configuration `path`; ConfigurationError when it has none of that name."""
-    configuration = load_configuration(path)
-    if name is None or name not in configuration.gauges:
-        raise ConfigurationError(
-            Problem(
-                where=f"{path} gauges",
-                what="no such gauge" if name else "name one of its gauges",
-                value=name or "",
-                allowed=", ".join(configuration.gauges),
-            )
-        )
-    options = configuration.gauges[name]
-    on_line = [
-        configuration.drivers[other](other_options)
-        for other, other_options in configuration.gauges.items()
-        if other_options.line == options.line
-    ]
-    line = powered(configuration.lines[options.line], on_line)
-    return GaugeTarget(name, configuration.drivers[name](options), line)
-
-
 def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]) -> GaugeTarget:
     """A gauge without a configuration: its driver's name, a port, and options as KEY=VALUE (VALUE in YAML).
 
@@ -96,7 +74,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
                     what=detail["msg"],
                     next_step="`--set KEY=VALUE` for each option that the driver needs",
                 )
-                for detail in error.errors(include_url=False)
+                for detail in separate_errors(error)
             ]
         ) from error
     return GaugeTarget(driver, gauge, powered(line_settings(port, kind.line_kind == "registers"), [gauge]))
@@ -174,7 +152,7 @@ def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
                     what=detail["msg"],
                     value=str(detail["input"]) if detail["loc"] else "",
                 )
-                for detail in error.errors()
+                for detail in separate_errors(error)
             ]
         ) from error
 

@@ -252,7 +252,7 @@ def examine(path: Path) -> Examined:
         else:
             sections[name] = None
             problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
-    gauges, drivers = _gauges(document, problems)
+    gauges, drivers = gauges_of(document, problems)
     part = {
         name: sections[name] if sections[name] is not None else readable(kind, document.value((name,)))
         for name, kind in SECTIONS.items()
@@ -282,7 +282,9 @@ def examine(path: Path) -> Examined:
     return Examined(document, configuration, problems, warnings, sections["geometry"], sections["wiring"])
 
 
-def _gauges(document: Document, problems: list[Problem]) -> tuple[dict[str, GaugeOptions], dict[str, type[Gauge[Any]]]]:
+def gauges_of(
+    document: Document, problems: list[Problem]
+) -> tuple[dict[str, GaugeOptions], dict[str, type[Gauge[Any]]]]:
     """Each gauge's options, checked by its own driver's model, and its driver; the problems of a faulty one are noted.
 
     A gauge with faulty options is not among the options.

@@ -128,7 +128,18 @@ def validation_problems(error: ValidationError, document: Document, location: Lo
 
     kind : the type that was validated; its models name the keys that are allowed beside an unknown one.
     """
-    return [_problem(detail, document, location, kind) for detail in error.errors(include_url=False)]
+    return [_problem(detail, document, location, kind) for detail in separate_errors(error)]
+
+
+def separate_errors(error: ValidationError) -> list[ErrorDetails]:
+    """What pydantic found, without what only follows from it: a list with a faulty item counts as too short, too."""
+    details = error.errors(include_url=False)
+    places = [detail["loc"] for detail in details]
+    return [
+        detail
+        for detail in details
+        if not any(len(place) > len(detail["loc"]) and place[: len(detail["loc"])] == detail["loc"] for place in places)
+    ]
 
 
 def unknown_key(document: Document, location: Location, allowed: Sequence[str]) -> Problem:

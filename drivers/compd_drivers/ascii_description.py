@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self, cast
 
 from pydantic import Field, model_validator
 
 from compd.escapes import unescape
+from compd.lines.checksums import CHECKSUMS, ChecksumField, ChecksumKind
 from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.number_form import DecimalMark
@@ -16,6 +18,9 @@ from compd_drivers.reply_format import ReplyFormat
 # An error form that fits more than this share of so many values of all kinds leaves no value.
 NEARLY_EVERY = 0.9
 SAMPLED_VALUES = 200
+# Converters, as people write them where there are none. A request of an ADAM module begins with % and digits.
+_REQUEST_PATTERN = re.compile(r"%%|%(?P<digits>[0#]?)(?P<skip>\d*)(?:\.(?P<behind>\d+))?<(?P<checksum>\w+)>|%\(\w+\)")
+_WORD_PATTERN = re.compile(r"%%|%[*?(]|%[+ ]?[0-9.]*[fdexcs]\b")
 
 
 class AsciiChannel(MeasuredChannel):
@@ -79,13 +84,27 @@ class SerialAsciiOptions(ExchangeOptions):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        problems = [*self._request_problems()]
+        problems = [*self._request_problems(), *self._literal_problems()]
         if not problems:
             description = Description.of(self)
             problems += [*self._number_problems(description), *self._length_problems(description)]
         if problems:
             raise ValueError("; ".join(problems))
         return self
+
+    def _literal_problems(self) -> Iterator[str]:
+        """What looks like a pattern where every character stands for itself."""
+        exchanges: list[ValueRequest | Exchange] = [*self.requests, *self.init, *([self.echo] if self.echo else [])]
+        for text in (self.out, *(exchange.out for exchange in exchanges)):
+            if match := _REQUEST_PATTERN.search(text):
+                yield f"{match[0]!r} in `out` {text!r}: a request is sent as it stands; write {_what_it_means(match)}"
+        for channel in self.channels:
+            for word in channel.instead:
+                if match := _WORD_PATTERN.search(word):
+                    yield (
+                        f"{match[0]!r} in `instead` of channel {channel.name}: its words are literal, not patterns; "
+                        "write each word that may come, or a form under `errors`"
+                    )
 
     def _request_problems(self) -> Iterator[str]:
         if bool(self.in_) == bool(self.requests):
@@ -178,6 +197,21 @@ class Description(NamedTuple):
     def lengths(self) -> tuple[int | None, ...]:
         """Of every reply the device may give."""
         return tuple(form.length for form in (*(poll.reply for poll in self.polls), *(form for form, _ in self.errors)))
+
+
+def _what_it_means(match: re.Match[str]) -> str:
+    """What has to stand in a request in place of a converter."""
+    if match[0] == "%%":
+        return "a single %"
+    if match["checksum"] not in CHECKSUMS:
+        return "the characters themselves"
+    kind, digits = cast(ChecksumKind, match["checksum"]), cast(Literal["", "0", "#"], match["digits"])
+    field = ChecksumField("", kind, int(match["skip"] or 0), int(match["behind"] or 0), digits)
+    try:
+        checksum = field.of(unescape(match.string[: match.start()]))
+    except ValueError:
+        return "its digits"
+    return repr(checksum.decode() if digits else "".join(f"\\x{byte:02x}" for byte in checksum)).replace("\\\\", "\\")
 
 
 def _format(text: str, mark: DecimalMark, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:

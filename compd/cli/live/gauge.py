@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,9 +18,14 @@ if TYPE_CHECKING:
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
 
-TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
-NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
-Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, or host:port.")]
+TargetArgument = Annotated[
+    str,
+    typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
+]
+NameArgument = Annotated[str | None, typer.Argument(help="With a file of several gauges: which of them.")]
+Port = Annotated[
+    str, typer.Option(help="/dev/serial/by-id/..., pyserial URL, or host:port, where no file names the line.")
+]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
     str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
@@ -78,8 +84,9 @@ def scan(
         bool, typer.Option("--probe", help="Ask every port with each preset's read request. SENDS BYTES to all ports.")
     ] = False,
 ) -> None:
-    """Find serial ports; with --probe, look which preset gets an answer."""
-    from compd.commissioning.scan import probe_ports, serial_ports
+    """Find serial ports; with --probe, look which presets fit what answers."""
+    from compd.commissioning.probe import announcements, preset_candidates
+    from compd.commissioning.scan import serial_ports
 
     ports = serial_ports()
     if not ports:
@@ -96,8 +103,10 @@ def scan(
         "is no gauge may take it for a command."
     )
     typer.confirm("Is nothing dangerous connected?", abort=True)
-    for port, candidate, outcome in probe_ports(ports):
-        typer.echo(f"{port.path}: {candidate.name} at {candidate.baud} {candidate.format}: {outcome}")
+    candidates = preset_candidates()
+    for port in ports:
+        for text in announcements(port.path, candidates):
+            typer.echo(f"{port.path}: {text}")
 
 
 @gauge.command()
@@ -167,7 +176,6 @@ def watch(
 
 @gauge.command()
 def learn(
-    unit: Annotated[str, typer.Option(help="Unit of the numbers on the wire: mm, um, inch, degC ...")],
     capture: Annotated[
         Path | None, typer.Argument(help='File of lines `> 3F 0D` and `< 2B 31 ...` (hex), or > "?\\r" (text).')
     ] = None,
@@ -178,51 +186,97 @@ def learn(
     line_keys: LineKeys = None,
     out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
     replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
-    names: Annotated[str, typer.Option(help="Names of the channels, with commas between.")] = "",
+    unit: Annotated[
+        str,
+        typer.Option(help="Unit of the numbers on the wire, where they do not say it: mm, um ...; or mm,inch."),
+    ] = "",
+    names: Annotated[str, typer.Option(help="Names of the numbers, with commas between; - skips one: a,-,b.")] = "",
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option("--range", help="LOWEST,HIGHEST that the sensor can deliver, in mm (degC ...), or unknown."),
+    ] = None,
     error: Annotated[
         list[str] | None, typer.Option(help="An error reply and its quality: 'ERR0=sensor_fault'.")
+    ] = None,
+    factors: Annotated[
+        list[str] | None,
+        typer.Option(help="Words beside a number that multiply it, a unit or a sign: 'mm=1|um=0.001', '+=1|-=-1'."),
     ] = None,
     ignore: Annotated[
         str, typer.Option(help="Letters and signs that vary beside a number and do not touch its value: 'UGLE'.")
     ] = "",
-    decimals: Annotated[
-        int | None, typer.Option(min=1, help="Decimals that the display shows, where more digits follow.")
+    constant: Annotated[
+        list[str] | None, typer.Option(help="Digits in front of a number that are no part of it, an address: 12.")
     ] = None,
-    to: Annotated[Path | None, typer.Option(help="Write the description there as well.")] = None,
+    decimals: Annotated[
+        int | None,
+        typer.Option(min=0, help="Decimals that the display shows, where more digits follow or no point is sent."),
+    ] = None,
+    decimal_mark: Annotated[str, typer.Option(help="Where replies leave it open: , or .")] = "",
+    skip_end: Annotated[int, typer.Option(min=0, help="Skip so many characters at the end of every reply.")] = 0,
+    plain: Annotated[bool, typer.Option("--plain", help="Every digit belongs to its number.")] = False,
+    to: Annotated[Path | None, typer.Option(help="Write the gauge and its line there, for `read` and `watch`.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Write a `serial_ascii` description from a few replies of a gauge that no preset knows."""
-    from compd.commissioning.capture import capture_live, read_capture
+    """Write a `serial_ascii` description from a few replies of a gauge that no preset knows.
+
+    What the replies leave open is asked, each question with the option that answers it.
+    """
+    from compd.commissioning.answers import Answers, error_reply, range_of
+    from compd.commissioning.capture import capture_live, read_capture, saved_capture
     from compd.commissioning.describe import learn_gauge
+    from compd.commissioning.gauge_file import LEARNED_GAUGE, gauge_file_text
     from compd.commissioning.open_gauge import byte_line_settings
+    from compd.commissioning.read_back import rounds
+    from compd.commissioning.reply_columns import DescriptionError
     from compd.output_file import check_replaceable
 
     if to is not None:
-        check_replaceable(to, (b"learned_gauge:",), "a description of a gauge", overwrite)
-    if capture is not None:
-        request, captured = read_capture(capture)
-    elif port:
-        settings = byte_line_settings(_port(port, baud, format_, timeout_s, line_keys))
-        request, captured = capture_live(settings, out, replies, _between_captures, typer.echo)
-    else:
+        check_replaceable(to, (f"{LEARNED_GAUGE}:".encode(),), "a description of a gauge", overwrite)
+    if capture is None and not port:
         raise typer.BadParameter("name a capture file, or a --port")
-    errors = {}
-    for assignment in error or []:
-        reply_text, _, quality = assignment.partition("=")
-        errors[reply_text.encode("latin-1")] = quality
-    channels = [name.strip() for name in names.split(",") if name.strip()]
-    description, values = learn_gauge(request, captured, unit, channels, errors, ignore, decimals)
-    for reply, value in zip(captured, values, strict=True):
-        typer.echo(f"# {reply!r} -> {value}")
+    answers = Answers(
+        units=_listed(unit),
+        names=_listed(names),
+        ranges=tuple(map(range_of, ranges or ())),
+        errors=dict(map(error_reply, error or ())),
+        ignored=ignore,
+        factors=tuple(factors or ()),
+        constants=tuple(constant or ()),
+        decimals=decimals,
+        decimal_mark=decimal_mark,
+        skipped_end=skip_end,
+        plain=plain,
+    )
+    settings = byte_line_settings(_port(port, baud, format_, timeout_s, line_keys)) if port else None
+    if capture is not None:
+        captured = read_capture(capture)
+    elif settings is not None:
+        captured = capture_live(settings, out, replies, _between_captures, typer.echo)
+    try:
+        description, values = learn_gauge(captured, answers)
+    except DescriptionError:
+        if capture is None:
+            typer.echo(f"# the replies are kept: compd gauge learn {saved_capture(captured)} ... takes them again")
+        raise
+    for replies_together, value in zip(rounds(captured), values, strict=True):
+        typer.echo(f"# {', '.join(map(repr, replies_together.values()))} -> {value}")
     for note in description.notes:
         typer.echo(f"# note: {note}")
-    typer.echo(description.as_yaml())
+    text = gauge_file_text(description.options, settings)
+    typer.echo(text)
     if to is not None:
-        to.write_text(description.as_yaml(), encoding="utf-8")
+        to.write_text(text, encoding="utf-8")
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def _between_captures(done: int, wanted: int) -> None:
-    typer.prompt(f"{done} of {wanted} captured; move the gauge, then Enter", default="", show_default=False)
+    typer.echo(f"{done} of {wanted} captured; move the gauge, then Enter: ", nl=False)
+    sys.stdin.readline()  # at its end, as without a terminal, nobody is waited for
+    typer.echo()
 
 
 def _port(
@@ -234,10 +288,11 @@ def _port(
 
 
 def _target(target: str, name: str | None, port: PortArguments, assignments: Sequence[str] | None) -> GaugeTarget:
-    from compd.commissioning.open_gauge import gauge_of_configuration, gauge_of_driver
+    from compd.commissioning.gauge_file import gauge_of_file
+    from compd.commissioning.open_gauge import gauge_of_driver
 
     if target.endswith((".yaml", ".yml")):
-        return gauge_of_configuration(Path(target), name)
+        return gauge_of_file(Path(target), name, port)
     if not port.port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
     return gauge_of_driver(target, port, assignments or ())

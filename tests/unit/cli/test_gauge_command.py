@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import yaml
 from typer.testing import CliRunner
 
 from compd.cli.live import driver as driver_cli
 from compd.cli.live import gauge as gauge_cli
+from compd.clock import MonotonicClock
 from compd.commissioning.capture import read_capture
-from compd.commissioning.scan import PresetCandidate, preset_candidates, probe_port, serial_ports
+from compd.commissioning.open_gauge import open_tapped_line
+from compd.commissioning.probe import PresetCandidate, preset_candidates, probe_port
+from compd.commissioning.scan import serial_ports
+from compd.configuration import load as load_machine
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError
+from compd.lines import open_line
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
+from tests.unit.commissioning.test_capture import talker
 
 RUNNER = CliRunner()
 MAP = "channels=[{name: a, function: 4, address: 0, type: int16, unit: mm}]"
@@ -59,7 +65,21 @@ def run_gauge(*arguments: str, answers: str | None = None) -> tuple[int, str]:
 def test_list_names_every_driver() -> None:
     code, output = run_gauge("list")
     assert code == 0
-    assert all(name[:12] in output for name in names(GAUGES))
+    assert all(name in output for name in names(GAUGES))
+
+
+def test_names_are_whole_at_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, output = run_gauge("list")
+    assert max(map(len, output.splitlines()[:-1])) <= 80
+    assert all(re.search(rf"^[│ ]*{name}[│ ]", output, re.MULTILINE) for name in names(GAUGES))
+
+
+def test_an_error_in_a_list_of_options_is_said_once(scale: str) -> None:
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--set", "unit=1")
+    with pytest.raises(CompdError) as caught:
+        run_gauge("read", "modbus", *port, "--set", MAP.replace("unit: mm", "unit: ells"))
+    assert [problem.where for problem in caught.value.problems] == ["--set channels.0.unit"]
 
 
 def test_show_has_every_key_of_a_description_down_to_the_last() -> None:
@@ -202,9 +222,19 @@ def test_scan_and_probe(scale: str, tmp_path: Path) -> None:
     assert str(by_id / "usb-Scale_1") in {port.path for port in serial_ports(by_id)}
     nd28x = load(GAUGES, "heidenhain_nd28x", "x")
     candidate = PresetCandidate("nd", nd28x(nd28x.Options(driver="nd", line="x")), 115200, "8N1")
-    assert probe_port(scale, candidate) == "position 1.25 mm"
-    assert "line_lost" in probe_port(str(tmp_path / "nothing"), candidate)
+    assert str(probe_port(scale, candidate)) == "position 1.25 mm"
+    assert "line_lost" in str(probe_port(str(tmp_path / "nothing"), candidate))
     assert {"heidenhain_nd28x", "sylvac_optors", "adam_4017p"} <= {candidate.name for candidate in preset_candidates()}
+
+
+def test_read_waits_for_the_same_silence_as_the_daemon(scale: str) -> None:
+    """3.5 characters at 9600 baud are 3.6 ms: a request that follows a byte sooner would be seen on the wire."""
+    settings = SerialLine(kind="serial", port=scale, baud=9600, format="8N1", timeout_s=0.5)
+    tapped = open_tapped_line(settings, MonotonicClock(), lambda direction, data: None)
+    tapped.close()
+    line = open_line(settings, MonotonicClock())
+    line.close()
+    assert vars(tapped)["_gap_s"] == vars(line)["_gap_s"] == pytest.approx(3.5 * 10 / 9600)
 
 
 def test_scan_without_probe_sends_nothing() -> None:
@@ -212,44 +242,96 @@ def test_scan_without_probe_sends_nothing() -> None:
     assert code == 0
 
 
-def test_learn_from_a_file_gives_a_usable_gauge(tmp_path: Path) -> None:
+LEARN = ("--unit", "mm", "--range", "unknown")
+
+
+def test_what_learn_writes_is_what_read_and_watch_take(scale: str, tmp_path: Path) -> None:
+    """A whole description, out of a file of replies and with the port of the gauge."""
     capture = tmp_path / "capture.txt"
-    capture.write_text(
-        '# an unknown gauge\n> "?\\r"\n< 2B 31 2E 32 33 0D\n> "?\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n< "ERR0\\r"\n'
-    )
-    assert read_capture(capture) == (b"?\r", [b"+1.23\r", b"-0.50\r", b"+0.01\r", b"ERR0\r"])
-    written = tmp_path / "gauge.yaml"
-    code, output = run_gauge(
-        "learn", str(capture), "--unit", "um", "--error", "ERR0=sensor_fault", "--to", str(written)
-    )
+    replies = [f'< "{sign}{number:10.4f}    \\r\\n"\n' for sign, number in (("+", 12.3456), ("-", 0.5), ("+", 1.2))]
+    capture.write_text("".join(['# a scale display\n> "\\x02"\n', *replies]))
+    written, port = tmp_path / "gauge.yaml", ("--port", scale, "--baud", "115200", "--format", "8N1")
+    code, output = run_gauge("learn", str(capture), "--unit", "mm", "--range=-20,20", *port, "--to", str(written))
     assert code == 0
-    assert "sensor_fault" in output
-    options = yaml.safe_load(written.read_text())["learned_gauge"]
-    driver = load(GAUGES, "serial_ascii", "x")
-    assert driver(driver.Options.model_validate(options)).channels[0].unit == "mm"
+    assert written.read_text() in output
+    code, output = run_gauge("read", str(written))
+    assert (code, "learned_gauge.value: 1.250000 mm" in output) == (0, True)
+    code, output = run_gauge("watch", str(written), "learned_gauge", "--polls", "3")
+    assert (code, "faults: none" in output) == (0, True)
+    run_gauge("learn", str(capture), "--unit", "mm", "--range=-1,1", *port, "--to", str(written), "--overwrite")
+    code, output = run_gauge("read", str(written))
+    assert (code, "over_range" in output) == (1, True)
 
 
-def test_learn_live(scale: str) -> None:
-    """The simulated display stands still: its replies do not differ, and that is said."""
-    with pytest.raises(CompdError, match="too few that differ"):
-        run_gauge(
-            "learn",
-            "--unit",
-            "mm",
-            "--port",
-            scale,
-            "--baud",
-            "115200",
-            "--format",
-            "8N1",
-            "--out",
-            r"\x02",
-            "--timeout",
-            "0.1",
-            "--replies",
-            "3",
-            answers="\n\n\n",
+def test_a_learned_gauge_is_pasted_into_a_machine(tmp_path: Path) -> None:
+    capture = tmp_path / "capture.txt"
+    capture.write_text('> "?\\r"\n< "+1.23\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n')
+    written, machine = tmp_path / "gauge.yaml", tmp_path / "machine.yaml"
+    port = ("--port", "/dev/serial/by-id/dial", "--baud", "9600", "--format", "7E2")
+    run_gauge("learn", str(capture), *LEARN, *port, "--to", str(written))
+    lines, gauges = written.read_text().removeprefix("lines:\n").split("gauges:\n")
+    shipped = (ROOT / "config" / "tripod-cmm.yaml").read_text()
+    pasted = shipped.replace("\nlines:\n", "\nlines:\n" + lines).replace("\ngauges:\n", "\ngauges:\n" + gauges)
+    machine.write_text(pasted)
+    configuration = load_machine(machine)
+    assert configuration.gauges["learned_gauge"].line == "learned_line"
+    assert configuration.lines["learned_line"].model_dump()["format"] == "7E2"
+
+
+def test_a_file_of_gauges_without_their_line_takes_it_from_the_command_line(scale: str, tmp_path: Path) -> None:
+    file = tmp_path / "gauges.yaml"
+    file.write_text(
+        "gauges:\n  a: {driver: heidenhain_nd28x, line: x}\n  b: {driver: heidenhain_nd28x, line: x, unt: mm}\n"
+    )
+    with pytest.raises(CompdError, match=r"gauges.yaml:3 gauges.b.unt: unknown key"):
+        run_gauge("read", str(file), "a")
+    file.write_text(file.read_text().replace("unt", "unit"))
+    with pytest.raises(CompdError, match=r"gauges.yaml:2 gauges.a.line: the file has no line of this name"):
+        run_gauge("read", str(file), "a")
+    with pytest.raises(CompdError, match="name one of its gauges"):
+        run_gauge("read", str(file))
+    code, output = run_gauge("read", str(file), "a", "--port", scale, "--baud", "115200", "--format", "8N1")
+    assert (code, "a.position: 1.250000 mm" in output) == (0, True)
+
+
+def test_an_error_reply_on_the_command_line(tmp_path: Path) -> None:
+    capture = tmp_path / "capture.txt"
+    capture.write_text('> "?\\r"\n< 2B 31 2E 32 33 0D\n> "?\\r"\n< "-0.50\\r"\n< "+0.01\\r"\n< "\\x15E=0\\r"\n')
+    assert read_capture(capture)[-1] == (b"?\r", b"\x15E=0\r")
+    code, output = run_gauge("learn", str(capture), *LEARN, "--error", r"\x15E=0=sensor_fault")
+    assert code == 0
+    assert "-> sensor_fault" in output
+    with pytest.raises(CompdError, match="--error: has no reply"):
+        run_gauge("learn", str(capture), *LEARN, "--error", "sensor_fault")
+
+
+def test_a_range_that_is_none() -> None:
+    with pytest.raises(CompdError, match="--range: is no range"):
+        run_gauge("learn", "x", "--range", "wide")
+
+
+def test_replies_of_a_live_gauge_are_kept_where_questions_are_left(scale: str) -> None:
+    """The simulated display stands still: its replies do not differ, and that is said. Nobody presses Enter."""
+    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--timeout", "0.3")
+    result = RUNNER.invoke(gauge_cli.gauge, ["learn", *port, *LEARN, "--out", r"\x02", "--replies", "3"])
+    assert isinstance(result.exception, CompdError)
+    assert "too few that differ" in str(result.exception)
+    kept = re.search(r"the replies are kept: compd gauge learn (\S+)", result.output)
+    assert kept is not None
+    captured = read_capture(Path(kept[1]))
+    Path(kept[1]).unlink()
+    assert [(request, len(reply)) for request, reply in captured] == 3 * [(b"\x02", 17)]
+
+
+def test_learn_a_device_that_speaks_unasked(tmp_path: Path) -> None:
+    written = tmp_path / "gauge.yaml"
+    with talker(0.02) as port:
+        code, _ = run_gauge(
+            "learn", "--port", port, "--baud", "9600", "--format", "8N1", *LEARN, "--to", str(written), answers=6 * "\n"
         )
+        assert code == 0
+        code, output = run_gauge("watch", str(written), "--polls", "5")
+    assert (code, "faults: none" in output) == (0, True)
 
 
 def test_driver_test_prints_every_case_and_fails_by_exit_code(tmp_path: Path) -> None:

@@ -98,3 +98,37 @@ def test_the_examples_in_the_drivers_text_are_descriptions() -> None:
     for block in blocks:
         (options,) = yaml.safe_load(block).values()
         SerialAscii(SerialAscii.Options.model_validate(options))
+
+
+@pytest.mark.parametrize(
+    ("out", "written"),
+    [
+        ("#01%0<sum8>", "write '84'"),
+        ("#01%01<sum8>", "write '61'"),
+        (r"M1\r%<xor8>", r"write '\x71'"),
+        ("50%%", "write a single %"),
+        ("M%(a)", "write the characters themselves"),
+    ],
+)
+def test_a_converter_in_a_request_is_noticed(out: str, written: str) -> None:
+    """0x23 + 0x30 + 0x31 = 0x84; M, 1 and CR: 0x4D ^ 0x31 ^ 0x0D = 0x71."""
+    for options in ({"out": out, "in": "%f"}, {"out": "", "requests": [{"out": out, "in": "%f"}]}):
+        with pytest.raises(ValidationError, match="is sent as it stands") as caught:
+            gauge(**options)
+        assert written in str(caught.value)
+
+
+def test_a_percent_sign_in_a_request_is_sent() -> None:
+    gauge(**{"out": "%0102", "in": "%f"})
+
+
+@pytest.mark.parametrize("word", ["F%*6c", "ERR%d", "%%", "%*[E]"])
+def test_a_pattern_in_place_of_a_number_is_noticed(word: str) -> None:
+    with pytest.raises(ValidationError, match="its words are literal, not patterns"):
+        gauge(**{"in": "%+08.3f", "channels": [{**CHANNEL, "instead": {word: "sensor_fault"}}]})
+
+
+def test_a_percent_sign_in_place_of_a_number_is_literal() -> None:
+    device = gauge(**{"in": "%+08.3f", "channels": [{**CHANNEL, "instead": {"% % ": "sensor_fault"}}]})
+    (reading,) = poll(device, b"% % \r\n")
+    assert reading.quality is Quality.SENSOR_FAULT

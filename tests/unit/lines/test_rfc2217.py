@@ -19,8 +19,8 @@ from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.live.acquisition.acquisition import Acquisition
+from tests.support.ascii_gauge import gauge
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
-from tests.unit.drivers.test_serial_ascii import gauge
 
 # pyserial's client names its thread in a way that Python has given up, and leaves its socket to the garbage collector
 # where the server has gone.
