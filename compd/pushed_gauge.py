@@ -64,7 +64,7 @@ class PushedLine(Protocol):
     def subscribe(self, addresses: Sequence[str]) -> None:
         """Want what these addresses send, from now on. One that is refused sends a message that says so.
 
-        Raises LineFault (LINE_LOST) where nobody answers.
+        Called again, it asks for those that were refused. Raises LineFault (LINE_LOST) where nobody answers.
         """
         ...
 

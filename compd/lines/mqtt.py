@@ -112,7 +112,9 @@ class MqttLine:
             raise
 
     def subscribe(self, addresses: Sequence[str]) -> None:
-        """Subscribe to topics. One that the broker refuses sends a message with DEVICE_ERROR.
+        """Subscribe to topics, but for those that were subscribed to before.
+
+        One that the broker refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
         Raises LineFault (LINE_LOST) where the broker does not answer.
         """
@@ -126,6 +128,7 @@ class MqttLine:
         self._work_until(lambda: number in self._granted, "has not confirmed the subscription")
         for topic, code in zip(topics, self._granted.pop(number), strict=False):
             if code.is_failure:
+                self._wanted.discard(topic)
                 text = f"{self._where} refuses the topic {topic}: {code}"
                 self._came.append(Message(topic, b"", self._arrival(), math.nan, Quality.DEVICE_ERROR, text))
 

@@ -23,8 +23,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeVar
 
-from asyncua import Client, ua
+from asyncua import ua
+from asyncua.client import Client
 from asyncua.crypto import security_policies
+from asyncua.ua.attribute_ids import AttributeIds
+from asyncua.ua.status_codes import StatusCodes
 from asyncua.ua.ua_binary import nodeid_to_binary
 from asyncua.ua.uaerrors import UaError, UaStatusCodeError
 
@@ -44,9 +47,9 @@ LIFETIME_S = 30.0
 # So many keep-alives may be missing in a row, and the timeout be over, before the server is taken for lost.
 MISSED_KEEP_ALIVES = 3
 NOT_FILTERED = (
-    ua.StatusCodes.BadMonitoredItemFilterUnsupported,
-    ua.StatusCodes.BadMonitoredItemFilterInvalid,
-    ua.StatusCodes.BadFilterNotAllowed,
+    StatusCodes.BadMonitoredItemFilterUnsupported,
+    StatusCodes.BadMonitoredItemFilterInvalid,
+    StatusCodes.BadFilterNotAllowed,
 )
 _NAMESPACE = "nsu="
 ResultT = TypeVar("ResultT")
@@ -124,7 +127,9 @@ class OpcUaLine:
             raise
 
     def subscribe(self, addresses: Sequence[str]) -> None:
-        """Subscribe to nodes, by the text of their ids. One that the server refuses sends a message with DEVICE_ERROR.
+        """Subscribe to nodes, by the text of their ids, but for those that were subscribed to before.
+
+        One that the server refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
         Raises LineFault (LINE_LOST) where the server does not answer.
         """
@@ -237,7 +242,7 @@ class OpcUaLine:
                 QueueSize=1,  # the newest counts
                 DiscardOldest=True,
             )
-            wanted = ua.ReadValueId(NodeId=node_id, AttributeId=ua.AttributeIds.Value)
+            wanted = ua.ReadValueId(NodeId=node_id, AttributeId=AttributeIds.Value)
             items.append(ua.MonitoredItemCreateRequest(wanted, ua.MonitoringMode.Reporting, parameters))
         request = ua.CreateMonitoredItemsParameters(self._subscription, ua.TimestampsToReturn.Source, items)
         results = await self._client.uaclient.create_monitored_items(request)
@@ -247,7 +252,7 @@ class OpcUaLine:
         arrival = Arrival(self._clock.monotonic(), self._utc())
         detail = f"{self._settings.endpoint} has no values of {node}: {why}"
         self._came.append(Message(node, None, arrival, math.nan, Quality.DEVICE_ERROR, detail))
-        self._sampling_s.setdefault(node, math.nan)
+        self._sampling_s.pop(node, None)
         self._news.set()
 
     async def _note_loss(self, error: Exception) -> None:
@@ -293,7 +298,7 @@ async def _end_tasks() -> None:
 
 
 def _message(node: str, value: ua.DataValue, arrival: Arrival) -> Message:
-    quality, detail = quality_of(value.StatusCode.value if value.StatusCode is not None else ua.StatusCodes.Good)
+    quality, detail = quality_of(value.StatusCode.value if value.StatusCode is not None else StatusCodes.Good)
     payload: Any = value.Value.Value if value.Value is not None else None
     return Message(node, payload, arrival, _utc_s(value.SourceTimestamp), quality, detail)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from asyncua import ua
+from asyncua.ua.status_codes import StatusCodes
 
 from compd.gauge import Quality
 
@@ -22,22 +23,22 @@ INFO_TYPE, IS_DATA_VALUE = 0x0C00, 0x0400
 LIMIT, AT_LOW, AT_HIGH, CONSTANT = 0x0300, 0x0100, 0x0200, 0x0300
 
 _QUALITIES: Mapping[int, Quality] = {
-    ua.StatusCodes.GoodLocalOverride: Quality.SENSOR_FAULT,
-    ua.StatusCodes.GoodNoData: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainLastUsableValue: Quality.STALE,
-    ua.StatusCodes.UncertainNoCommunicationLastUsableValue: Quality.STALE,
-    ua.StatusCodes.UncertainSubstituteValue: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainSensorNotAccurate: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainSensorCalibration: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainSubNormal: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainSimulatedValue: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainTransducerInManual: Quality.SENSOR_FAULT,
-    ua.StatusCodes.UncertainEngineeringUnitsExceeded: Quality.OVER_RANGE,
-    ua.StatusCodes.UncertainOverRange: Quality.OVER_RANGE,
-    ua.StatusCodes.UncertainUnderRange: Quality.UNDER_RANGE,
-    ua.StatusCodes.BadSensorFailure: Quality.SENSOR_FAULT,
-    ua.StatusCodes.BadNotConnected: Quality.SENSOR_FAULT,
-    ua.StatusCodes.BadNoData: Quality.SENSOR_FAULT,
+    StatusCodes.GoodLocalOverride: Quality.SENSOR_FAULT,
+    StatusCodes.GoodNoData: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainLastUsableValue: Quality.STALE,
+    StatusCodes.UncertainNoCommunicationLastUsableValue: Quality.STALE,
+    StatusCodes.UncertainSubstituteValue: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainSensorNotAccurate: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainSensorCalibration: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainSubNormal: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainSimulatedValue: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainTransducerInManual: Quality.SENSOR_FAULT,
+    StatusCodes.UncertainEngineeringUnitsExceeded: Quality.OVER_RANGE,
+    StatusCodes.UncertainOverRange: Quality.OVER_RANGE,
+    StatusCodes.UncertainUnderRange: Quality.UNDER_RANGE,
+    StatusCodes.BadSensorFailure: Quality.SENSOR_FAULT,
+    StatusCodes.BadNotConnected: Quality.SENSOR_FAULT,
+    StatusCodes.BadNoData: Quality.SENSOR_FAULT,
 }
 _AT_A_LIMIT: Mapping[int, tuple[Quality, str]] = {
     AT_LOW: (Quality.UNDER_RANGE, "at its low limit"),
@@ -51,7 +52,7 @@ def quality_of(code: int) -> tuple[Quality, str]:
     sub_code = code & SUB_CODE
     severity = code >> SEVERITY_SHIFT
     quality = _QUALITIES.get(sub_code, Quality.OK if severity == GOOD else Quality.DEVICE_ERROR)
-    detail = ua.StatusCode(sub_code).name
+    detail = ua.StatusCode(ua.UInt32(sub_code)).name
     limit = _AT_A_LIMIT.get(code & LIMIT) if code & INFO_TYPE == IS_DATA_VALUE else None
     if limit is not None:
         detail = f"{detail}, {limit[1]}"

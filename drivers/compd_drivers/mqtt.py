@@ -75,6 +75,13 @@ class MqttChannel(MeasuredChannel):
         return topic
 
 
+    @model_validator(mode="after")
+    def _is_a_document(self) -> Self:
+        if not self.value and (self.time is not None or self.status is not None):
+            raise ValueError("`time` and `status` stand in a document: `value` says where the number is in it")
+        return self
+
+
 class MqttOptions(PushedGaugeOptions):
     """Options of an MQTT gauge."""
 

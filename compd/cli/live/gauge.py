@@ -19,7 +19,7 @@ gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and desc
 
 TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
 NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
-Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, or host:port.")]
+Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port.")]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
     str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
@@ -145,7 +145,7 @@ def watch(
     assignments: Set = None,
     polls: Annotated[int | None, typer.Option(min=1, help="Stop after so many polls; Ctrl-C if left out.")] = None,
 ) -> None:
-    """Poll one gauge as fast as its line goes: values, rate, age, noise and faults."""
+    """Poll one gauge as fast as its line goes, or listen to it: values, rate, age, noise and faults."""
     from rich.console import Console
     from rich.live import Live
 

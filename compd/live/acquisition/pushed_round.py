@@ -15,6 +15,8 @@ from compd.pushed_gauge import Heard, Message, PushedGauge, PushedLine
 
 log = structlog.get_logger()
 
+# A node or topic that was refused may be there later: it is asked for again after so long, s.
+SUBSCRIBE_EVERY_S = 2.0
 # The thread looks so often, s, whether it is to end.
 LONGEST_WAIT_S = 0.1
 
@@ -46,6 +48,7 @@ class PushedRound:
         """`stale_after_s`: by gauge, age (s) from which its readings are not used."""
         self._clock = clock
         self._line: PushedLine | None = None
+        self._subscribe_s = -math.inf  # when what was refused is asked for again
         self._listeners = [
             _Listener(gauge, gauge.driver, place, address, stale_after_s[gauge.name])
             for gauge in gauges
@@ -56,11 +59,14 @@ class PushedRound:
 
     def take(self, line: PushedLine) -> bool:
         """Publish what has come, or comes soon; whether anything did. Raises LineFault (LINE_LOST)."""
-        if line is not self._line:
+        now_s = self._clock.monotonic()
+        if line is not self._line or now_s >= self._subscribe_s:
             line.subscribe([listener.address for listener in self._listeners])
+            self._subscribe_s = now_s + SUBSCRIBE_EVERY_S
+        if line is not self._line:
             self._line = line
             for listener in self._listeners:
-                listener.heard_s, listener.quality = self._clock.monotonic(), Quality.NEVER_READ
+                listener.heard_s, listener.quality = now_s, Quality.NEVER_READ
         messages = line.messages(LONGEST_WAIT_S)
         for message in messages:
             self._publish(message)

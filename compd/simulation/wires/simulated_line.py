@@ -18,7 +18,7 @@ from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.lines import LineSettings, SerialPortSettings
+from compd.configuration.lines import PolledLine, SerialPortSettings
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
 from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
@@ -109,7 +109,7 @@ class SimulatedLine:
     def __init__(
         self,
         name: str,
-        settings: LineSettings,
+        settings: PolledLine,
         devices: Sequence[SimulatedByteDevice] | Sequence[SimulatedRegisterDevice],
         directory: Path,
         clock: Clock | None = None,

@@ -194,6 +194,13 @@ def test_a_node_that_is_missing_is_named_and_the_others_go_on(server: OpcUaServe
         latest.wait_for("j.a", Quality.DEVICE_ERROR)
 
 
+def test_a_node_that_comes_later_is_read(server: OpcUaServer) -> None:
+    with acquiring(line_to(server), {"g": probe("ns=2;s=later")}, stale_after_s=30.0) as (_, latest):
+        latest.wait_for("g.a", Quality.DEVICE_ERROR)
+        server.write("later", 1.5)
+        assert latest.wait_for("g.a", OK).value == 1.5
+
+
 def test_a_node_by_the_name_of_its_namespace(server: OpcUaServer) -> None:
     server.write("a", 1.5)
     with acquiring(line_to(server), {"g": probe(f"nsu={NAMESPACE};s=a")}, stale_after_s=30.0) as (_, latest):
