@@ -74,7 +74,6 @@ class MqttChannel(MeasuredChannel):
             raise ValueError("a gauge has one topic, without the wildcards + and #")
         return topic
 
-
     @model_validator(mode="after")
     def _is_a_document(self) -> Self:
         if not self.value and (self.time is not None or self.status is not None):
@@ -108,6 +107,19 @@ class Mqtt(PushedGauge):
 
     Options: ClassVar[type[GaugeOptions]] = MqttOptions
     line_kind: ClassVar[LineKind] = "topics"
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "channels": [
+            {
+                "name": "value",
+                "topic": "cell/joint_1",
+                "value": "/probe/um",
+                "time": "/t",
+                "status": {"at": "/probe/state", "ok": ["ok"]},
+                "unit": "um",
+                "range": [-1, 1],
+            }
+        ]
+    }
     silence_hint = "is it published at all, and may this user read it?"
 
     def __init__(self, options: MqttOptions) -> None:

@@ -14,7 +14,7 @@ range `over_range` or `under_range`, most others `device_error`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -51,6 +51,11 @@ class OpcUa(PushedGauge):
 
     Options: ClassVar[type[GaugeOptions]] = OpcUaOptions
     line_kind: ClassVar[LineKind] = "nodes"
+    sample_options: ClassVar[Mapping[str, Any]] = {
+        "channels": [
+            {"name": "value", "node": "nsu=http://maker.example/probes;s=Probe1", "unit": "um", "range": [-1, 1]}
+        ]
+    }
     silence_hint = "where the server sends only what changes, write `unchanged: holds` on the line"
 
     def __init__(self, options: OpcUaOptions) -> None:

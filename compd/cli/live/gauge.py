@@ -19,7 +19,9 @@ gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and desc
 
 TargetArgument = Annotated[str, typer.Argument(help="A driver's name, or a machine's configuration (.yaml).")]
 NameArgument = Annotated[str | None, typer.Argument(help="With a configuration: the gauge in it.")]
-Port = Annotated[str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port.")]
+Port = Annotated[
+    str, typer.Option(help="With a driver: /dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port.")
+]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
     str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")

@@ -36,7 +36,9 @@ class OpcUaNodes(SimulatedPushedLine):
             free.bind((LOOPBACK, 0))
             self._port: int = free.getsockname()[1]
         self._loop = asyncio.new_event_loop()
-        self._loop_thread = threading.Thread(target=self._loop.run_forever, name=f"simulated {name} server", daemon=True)
+        self._loop_thread = threading.Thread(
+            target=self._loop.run_forever, name=f"simulated {name} server", daemon=True
+        )
         self._server: Server | None = None
         self._node_ids: dict[str, ua.NodeId] = {}
 

@@ -21,8 +21,8 @@ from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.wires.live_world import LiveWorld
-from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.pushed_line import SimulatedPushedLine
+from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
 from compd.simulation.wires.tcp_port import ANY, claimed_port

@@ -163,9 +163,7 @@ def test_an_old_value_is_stale_however_it_comes(broker: Broker, device: Publishe
         assert not any(r.ok for _, r in latest.history)
 
 
-def test_a_clock_that_is_ahead_gives_way_to_the_arrival_and_is_named(
-    broker: Broker, device: Publisher
-) -> None:
+def test_a_clock_that_is_ahead_gives_way_to_the_arrival_and_is_named(broker: Broker, device: Publisher) -> None:
     with capture_logs() as logs, listening(broker, device, timed()) as (_, latest):
         for value in (1.5, 1.6):
             since, before_s = latest.now, time.monotonic()

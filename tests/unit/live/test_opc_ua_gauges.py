@@ -186,7 +186,12 @@ def test_out_of_order_values_change_nothing(server: OpcUaServer) -> None:
 
 def test_a_node_that_is_missing_is_named_and_the_others_go_on(server: OpcUaServer) -> None:
     server.write("a", 1.5)
-    gauges = {"g": probe(), "h": probe("ns=2;s=absent"), "i": probe("nsu=http://nobody/;s=a"), "j": probe("i=99999999999")}
+    gauges = {
+        "g": probe(),
+        "h": probe("ns=2;s=absent"),
+        "i": probe("nsu=http://nobody/;s=a"),
+        "j": probe("i=99999999999"),
+    }
     with acquiring(line_to(server), gauges, stale_after_s=30.0) as (_, latest):
         assert latest.wait_for("g.a", OK).value == 1.5
         assert "BadNodeIdUnknown" in latest.wait_for("h.a", Quality.DEVICE_ERROR).detail
