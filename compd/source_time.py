@@ -3,9 +3,9 @@
     source    t = arrived - (calendar time of arrival - calendar time of the source), at most `arrived`
     arrival   t = the earliest time that the protocol allows, where it allows one; else `arrived`
 
-The device's clock and this computer's must agree for the first (NTP, PTP). A time in the future shows that they do not:
-the arrival counts then, and a note says so. A time in the past is believed, however old the value is by it: a value that
-was held up on its way looks exactly like one of a clock that is slow.
+The device's clock and this computer's must agree for the first (NTP, PTP). A time in the future shows that they do
+not: the arrival counts then, and a note says so. A time in the past is believed, however old the value is by it: one
+that was held up on its way looks exactly like one of a clock that is slow.
 
 Where only the arrival is known, nothing tells a value that was held up from a new one, but for the period in which they
 come: after a pause of more than `LATE` periods, all that comes within the next period may be old.
@@ -110,8 +110,8 @@ class SourceTime:
             raise AgeUnknownError("was kept from before, without a time that counts: nobody knows how old it is")
         if arrival.arrived_s < self._held_up_until_s:
             raise AgeUnknownError(
-                f"came after a pause of more than {LATE:g} periods of {self._period_s:g} s, without a time that counts: "
-                "it may have been held up"
+                f"came after a pause of more than {LATE:g} periods of {self._period_s:g} s, without a time "
+                "that counts: it may have been held up"
             )
         if math.isnan(arrival.earliest_s):
             return MeasurementTime(arrival.arrived_s, 0.0, note)

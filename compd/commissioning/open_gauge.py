@@ -251,7 +251,7 @@ class TappedPushedLine:
 
 
 def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
-    """The line as the daemon opens it, with its bytes shown (those of Modbus TCP, OPC UA and MQTT stay in libraries)."""
+    """The line as the daemon opens it, with its bytes shown (but for Modbus TCP, OPC UA and MQTT)."""
     return open_line(settings, clock, lambda port: TappedPort(port, listener))
 
 

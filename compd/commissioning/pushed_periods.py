@@ -1,4 +1,4 @@
-"""How often gauges that speak by themselves are to have a new value, as the configuration says, and whether that does."""
+"""How often gauges that speak by themselves are to have a new value, and whether that is often enough."""
 
 from __future__ import annotations
 

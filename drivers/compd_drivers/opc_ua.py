@@ -3,13 +3,13 @@
     gauges:
       joint_1: {driver: opc_ua, line: plc, channels: [{name: value, node: "ns=2;s=Probe1", unit: um}]}
 
-A node is named by its id, with the index of its namespace (`ns=2;s=Probe1`), or with its name, which stays the same when
-the server is configured anew (`nsu=http://maker.example/probes;s=Probe1`). The value is any number of OPC UA, or, with
-`index`, an entry of an array of numbers. Text, true and an array without `index` are `mismatch`.
+A node is named by its id, with the index of its namespace (`ns=2;s=Probe1`), or with its name, which stays the same
+when the server is configured anew (`nsu=http://maker.example/probes;s=Probe1`). The value is any number of OPC UA, or,
+with `index`, an entry of an array of numbers. Text, true and an array without `index` are `mismatch`.
 
 A value counts where its status is Good. The others have qualities (`compd.lines.opc_ua_status`) and the name of the
-status as their detail: BadSensorFailure is `sensor_fault`, UncertainLastUsableValue `stale`, a value at the limit of its
-range `over_range` or `under_range`, most others `device_error`.
+status as their detail: BadSensorFailure is `sensor_fault`, UncertainLastUsableValue `stale`, a value at the limit of
+its range `over_range` or `under_range`, most others `device_error`.
 """
 
 from __future__ import annotations

@@ -26,7 +26,9 @@ logging.getLogger("asyncua").setLevel(logging.CRITICAL)
 class OneUser(UserManager):
     """compd, with its password, and nobody else."""
 
-    def get_user(self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None) -> User | None:  # fmt: skip
+    def get_user(
+        self, iserver: Any, username: str | None = None, password: str | None = None, certificate: Any = None
+    ) -> User | None:
         return User(role=UserRole.User) if (username, password) == ("compd", "open sesame") else None
 
 

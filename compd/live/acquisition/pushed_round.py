@@ -1,4 +1,4 @@
-"""What a line's thread does with devices that speak by themselves: it waits, publishes what comes, and notes silence."""
+"""A line's thread and devices that speak by themselves: it waits, publishes what comes, and notes silence."""
 
 from __future__ import annotations
 
@@ -101,8 +101,8 @@ class PushedRound:
         note = heard[-1].note
         if bool(note) != self._noted.get(gauge.name, False):
             self._noted[gauge.name] = bool(note)
-            log_clock = log.warning if note else log.info
-            log_clock("clock of a source", gauge=gauge.name, detail=note or "agrees with this computer's again")
+            log_change = log.warning if note else log.info
+            log_change("clock of a source", gauge=gauge.name, detail=note or "agrees with this computer's again")
 
     def _note_silence(self) -> None:
         now_s = self._clock.monotonic()

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from asyncua import ua
-from asyncua.server import Server
+from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 
 from compd.clock import Clock
@@ -81,7 +81,8 @@ class OpcUaNodes(SimulatedPushedLine):
 
     async def _write(self, values: Mapping[str, Any], utc_s: float) -> None:
         assert self._server is not None
-        when = datetime.fromtimestamp(utc_s, UTC).replace(tzinfo=None)
+        now = datetime.fromtimestamp(utc_s, UTC)
+        when = ua.DateTime(now.year, now.month, now.day, now.hour, now.minute, now.second, now.microsecond)
         for node, value in values.items():
             status = ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure if is_off(value) else StatusCodes.Good))
             number = ua.Variant(value, ua.VariantType.Double)

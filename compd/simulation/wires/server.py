@@ -48,8 +48,8 @@ class Simulation:
         """directory : existing, for ports, sockets, state and the daemon's configuration.
 
         broker : host and port of the MQTT broker to which lines of kind mqtt publish.
-        Raises CompdError for such a line without a broker, PluginError for a driver without a simulated device, ConfigurationError where `directory` holds the
-        machine's own configuration.
+        Raises CompdError for such a line without a broker, PluginError for a driver without a simulated device,
+        ConfigurationError where `directory` holds the machine's own configuration.
         """
         daemon_path(configuration, directory)
         self.configuration = configuration

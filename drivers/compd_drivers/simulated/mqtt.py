@@ -50,20 +50,17 @@ def _put(document: Any, pointer: str, value: Any) -> None:
     *path, last = [token.replace("~1", "/").replace("~0", "~") for token in pointer.split("/")[1:]]
     place = document
     for token, after in zip(path, [*path, last][1:], strict=True):
-        place = _entry(place, token, [] if after.isdigit() else {})
+        if _get(place, token) is None:
+            _set(place, token, [] if after.isdigit() else {})
+        place = _get(place, token)
     _set(place, last, value)
 
 
-def _entry(place: Any, token: str, empty: Any) -> Any:
-    """What stands at `token`; `empty` if nothing does."""
+def _get(place: Any, token: str) -> Any:
+    """What stands at `token`; None if nothing does."""
     if isinstance(place, list):
-        there = place[int(token)] if int(token) < len(place) else None
-    else:
-        there = place.get(token)
-    if there is None:
-        there = empty
-        _set(place, token, there)
-    return there
+        return place[int(token)] if int(token) < len(place) else None
+    return place.get(token)
 
 
 def _set(place: Any, token: str, value: Any) -> None:

@@ -1,4 +1,4 @@
-"""The MQTT line with a real broker: what comes, when, and what happens when the broker refuses, dies or stands still."""
+"""The MQTT line with a real broker: what comes, when, and a broker that refuses, dies or stands still."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_one_that_is_no_broker_is_a_lost_line() -> None:
         settings = SETTINGS.validate_python(
             {"kind": "mqtt", "host": "127.0.0.1", "port": silent.getsockname()[1], "timeout_s": 0.1}
         )
-        with pytest.raises(LineFault, match="has not accepted the connection within 0.1 s"):
+        with pytest.raises(LineFault, match=r"has not accepted the connection within 0.1 s"):
             open_line(settings, MonotonicClock())
 
 
@@ -178,7 +178,7 @@ def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
     secret.write_text("open sesame\n")
     settings = f"allow_anonymous false\npassword_file {passwords}\nacl_file {rules}"
     with running_broker(tmp_path, settings) as broker:
-        with pytest.raises(LineFault, match="(?i)not authori[sz]ed") as caught, line_to(broker):
+        with pytest.raises(LineFault, match=r"(?i)not authori[sz]ed") as caught, line_to(broker):
             pass
         assert caught.value.quality is Quality.LINE_LOST
         login = {"user": "compd", "password_file": str(secret)}

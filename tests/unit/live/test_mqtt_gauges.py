@@ -233,19 +233,17 @@ def test_two_topics_of_one_gauge_do_not_wait_for_each_other(broker: Broker, devi
 
 
 def test_channels_out_of_one_document(broker: Broker, device: Publisher) -> None:
-    both = gauge(
-        "mqtt",
-        channels=[
-            {"name": "a", "topic": "all", "value": "/probes/0/x~1y", "time": "/t", "time_format": "unix_s", "unit": "mm"},
-            {"name": "b", "topic": "all", "value": "/probes/1/x~1y", "time": "/t", "time_format": "unix_s", "unit": "mm",
-             "status": {"at": "/state", "ok": ["ok"]}},
-        ],
-    )  # fmt: skip
+    document = {"topic": "all", "time": "/t", "time_format": "unix_s", "unit": "mm"}
+    channels = [
+        {"name": "a", "value": "/probes/0/x~1y", **document},
+        {"name": "b", "value": "/probes/1/x~1y", "status": {"at": "/state", "ok": ["ok"]}, **document},
+    ]
+    both = gauge("mqtt", channels=channels)
     with listening(broker, device, both) as (_, latest):
-        document = {"t": time.time(), "probes": [{"x/y": 1.0}, {"x/y": 2}], "state": "ok"}
-        device.publish("all", json.dumps(document))
+        sent = {"t": time.time(), "probes": [{"x/y": 1.0}, {"x/y": 2}], "state": "ok"}
+        device.publish("all", json.dumps(sent))
         assert (latest.wait_for("g.a", OK).value, latest.wait_for("g.b", OK).value) == (1.0, 2.0)
-        device.publish("all", json.dumps({**document, "t": time.time(), "state": "warming up"}))
+        device.publish("all", json.dumps({**sent, "t": time.time(), "state": "warming up"}))
         assert "warming up" in latest.wait_for("g.b", Quality.DEVICE_ERROR).detail
 
 
