@@ -306,11 +306,14 @@ class GaugeOptions(BaseModel):
     )
 
 
-LineT = TypeVar("LineT", ByteLine, RegisterLine)
+LineT = TypeVar("LineT")
+LineKind = Literal["bytes", "registers", "nodes", "topics"]
 
 
 class Gauge(ABC, Generic[LineT]):
     """Base of all drivers: one device on a line, `class MyGauge(Gauge[ByteLine])` or `Gauge[RegisterLine]`.
+
+    A device that speaks by itself has a driver derived from `compd.pushed_gauge.PushedGauge`.
 
     One object serves one device, from one thread. `channels` and `read` must be implemented; the class variables are
     set where their defaults do not fit.
@@ -318,7 +321,7 @@ class Gauge(ABC, Generic[LineT]):
     Attributes
     ----------
     Options : the model of the gauge's keys in the configuration, `GaugeOptions` or derived from it.
-    line_kind : "bytes" for a `ByteLine`, "registers" for a `RegisterLine`.
+    line_kind : "bytes" for a `ByteLine`, "registers" for a `RegisterLine`, "nodes" of OPC UA, "topics" of MQTT.
     integrity : "checksum" where the driver itself checks one (a Modbus line does it for its drivers); "format" where
         only the shape of a reply tells damage.
     sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver; None where
@@ -331,7 +334,7 @@ class Gauge(ABC, Generic[LineT]):
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
-    line_kind: ClassVar[Literal["bytes", "registers"]] = "bytes"
+    line_kind: ClassVar[LineKind] = "bytes"
     integrity: ClassVar[Literal["checksum", "format"]] = "format"
     sample_options: ClassVar[Mapping[str, Any] | None] = None
     sample_range: ClassVar[tuple[float, float] | None] = None
@@ -388,7 +391,7 @@ class Gauge(ABC, Generic[LineT]):
 
 def replies_tell_whose(gauges: Sequence[Gauge[Any]]) -> bool:
     """Whether every reply on a line with these gauges says whose it is: no identity is the beginning of another."""
-    if len(gauges) < 2 or all(gauge.line_kind == "registers" for gauge in gauges):
+    if len(gauges) < 2 or all(gauge.line_kind != "bytes" for gauge in gauges):
         return True
     identities = [gauge.reply_identity for gauge in gauges]
     return not any(

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
+from compd.pushed_gauge import PushedGauge
 
 GIVEN_BY_THE_CONFIGURATION = ("driver", "line")  # needed by every gauge, of no interest in a list
 
@@ -64,6 +65,11 @@ def catalogue() -> list[CatalogueEntry]:
             )
         )
     return entries
+
+
+def polled_drivers() -> list[str]:
+    """Names of the drivers whose devices are asked, and do not speak by themselves, sorted."""
+    return [name for name in names(GAUGES) if not issubclass(load(GAUGES, name, name), PushedGauge)]
 
 
 def driver_description(name: str) -> DriverDescription:

@@ -13,8 +13,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from compd.commissioning.line_budget import LineBudget
+from compd.commissioning.pushed_periods import longest_period_s
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
+from compd.configuration.lines import CARRIES
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 from compd.live.acquisition.acquisition import FASTEST_ROUND_S
@@ -39,9 +41,15 @@ class FeignedJump(NamedTuple):
 def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[FeignedJump]:
     """For every gauge that measures a length, in the order of the file."""
     poll_s = {budget.name: _poll_s(budget) for budget in budgets}
+    gauges = configuration.gauge_objects()
     measures = measured_lengths(configuration)
     return [
-        _jump(gauge, measures[gauge], poll_s[options.line], options)
+        _jump(
+            gauge,
+            measures[gauge],
+            poll_s.get(options.line, longest_period_s(configuration.lines[options.line], gauges[gauge])),
+            options,
+        )
         for gauge, options in configuration.gauges.items()
         if gauge in measures
     ]
@@ -100,7 +108,7 @@ def reply_warnings(configuration: Configuration) -> list[Problem]:
             next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
         )
         for line, settings in configuration.lines.items()
-        if not settings.kind.startswith("modbus")
+        if CARRIES[settings.kind] == "bytes"
         and (
             unnamed := _without_identity(
                 {name: gauges[name].reply_identity for name, on in configuration.gauges.items() if on.line == line}

@@ -21,7 +21,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from compd.configuration import Configuration
-from compd.configuration.lines import LineSettings, ModbusAsciiLine, ModbusRtuLine, SerialPortSettings
+from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, PolledLine, SerialPortSettings
+from compd.configuration.pushed_lines import PushedLineSettings
 from compd.configuration.round_trigger import BROADCAST, WRITE_REGISTERS, TriggerBytes
 from compd.errors import Problem
 from compd.gauge import replies_tell_whose
@@ -78,7 +79,7 @@ def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = No
     return Pace(character_s, quiet_s, max(quiet_s, turnaround_s or 0.0))
 
 
-def pace(line: LineSettings, turnaround_s: float | None = None) -> Pace:
+def pace(line: PolledLine, turnaround_s: float | None = None) -> Pace:
     """A configured line's pace. Behind socket:// the device server's baud rate counts: it is the configured one."""
     if isinstance(line, SerialPortSettings):
         serial = serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
@@ -97,7 +98,7 @@ class LineBudget:
     """
 
     name: str
-    line: LineSettings
+    line: PolledLine
     gauges: int
     exchanges: int
     bytes: int
@@ -127,7 +128,7 @@ class LineBudget:
 
 
 def budget_of_line(
-    name: str, line: LineSettings, gauges: Mapping[str, Traffic | None], tells_whose: bool = True
+    name: str, line: PolledLine, gauges: Mapping[str, Traffic | None], tells_whose: bool = True
 ) -> LineBudget:
     """The budget of one line; `gauges`: name -> traffic per poll as (bytes sent, bytes received), None = unknown.
 
@@ -158,7 +159,7 @@ def budget_of_line(
     )
 
 
-def _trigger_s(line: LineSettings, line_pace: Pace) -> float:
+def _trigger_s(line: PolledLine, line_pace: Pace) -> float:
     """What a round trigger takes with its settling time, s; over TCP, and to one slave alone, with its confirmation."""
     trigger = line.round_trigger
     if trigger is None:
@@ -188,10 +189,12 @@ def _silence_s(line_pace: Pace, traffic: Traffic) -> float:
 
 
 def line_budgets(configuration: Configuration) -> list[LineBudget]:
-    """The budget of every line that a gauge hangs on."""
+    """The budget of every line that polls a gauge."""
     gauges = configuration.gauge_objects()
     budgets = []
     for name, line in configuration.lines.items():
+        if isinstance(line, PushedLineSettings):
+            continue
         if on_line := {gauge: gauges[gauge] for gauge in _gauges_on(configuration, name)}:
             traffic = {gauge: driver.traffic() for gauge, driver in on_line.items()}
             budgets.append(budget_of_line(name, line, traffic, replies_tell_whose(list(on_line.values()))))

@@ -20,18 +20,22 @@ from compd.configuration.lines import (
     TcpLine,
     powered,
 )
+from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
 from compd.configuration.section import separate_errors
 from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
-from compd.gauge import Gauge, LineFault, Quality, Reading, bad
+from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
 from compd.lines import Line, open_line, open_stream
 from compd.lines.echo import explained
 from compd.lines.port import Port
 from compd.lines.stream import StreamLine
 from compd.live.acquisition.round_trigger import read_latched
 from compd.plugins import GAUGES, load
+from compd.pushed_gauge import Message, PushedLine
 
-SettingsT = TypeVar("SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusAsciiLine, ModbusTcpLine)
+SettingsT = TypeVar(
+    "SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusAsciiLine, ModbusTcpLine, OpcUaLine, MqttLine
+)
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,8 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
                 for detail in separate_errors(error)
             ]
         ) from error
+    if kind.line_kind in ("nodes", "topics"):
+        return GaugeTarget(driver, gauge, pushed_line_settings(port, kind.line_kind))
     return GaugeTarget(driver, gauge, powered(line_settings(port, kind.line_kind == "registers"), [gauge]))
 
 
@@ -101,6 +107,22 @@ def byte_line_settings(port: PortArguments) -> SerialLine | TcpLine:
     if address := _tcp_address(port.port):
         return _validated(TcpLine, kind="tcp", **_tcp_settings(address, port))
     return _validated(SerialLine, **{"kind": "serial", **_serial_settings(port)})
+
+
+def pushed_line_settings(port: PortArguments, line_kind: LineKind) -> OpcUaLine | MqttLine:
+    """Settings of a line to an OPC UA server, opc.tcp://host:port/path, or to an MQTT broker, host:port.
+
+    Raises ConfigurationError for another port.
+    """
+    keys = {"timeout_s": port.timeout_s, **_assigned("--line", port.keys, "user=compd")}
+    if line_kind == "nodes":
+        return _validated(OpcUaLine, kind="opc_ua", endpoint=port.port, **keys)
+    address = _tcp_address(port.port)
+    if address is None:
+        raise ConfigurationError(
+            Problem(where="--port", what="is no broker", value=port.port, allowed="host:port, such as 192.168.1.9:1883")
+        )
+    return _validated(MqttLine, kind="mqtt", host=address[0], port=address[1], **keys)
 
 
 def _assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
@@ -189,8 +211,26 @@ class TappedPort:
         self._port.close()
 
 
+class TappedPushedLine:
+    """A line that speaks by itself, of which every message is shown to a listener."""
+
+    def __init__(self, line: PushedLine, listener: ByteListener) -> None:
+        self._line = line
+        self._listener = listener
+
+    def subscribe(self, addresses: Sequence[str]) -> None:
+        self._line.subscribe(addresses)
+
+    def messages(self, timeout_s: float | None = None) -> Sequence[Message]:
+        messages = self._line.messages(timeout_s)
+        for message in messages:
+            sent = message.payload if isinstance(message.payload, bytes) else str(message.payload).encode()
+            self._listener("<", message.address.encode() + b" " + sent)
+        return messages
+
+
 def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
-    """The line as the daemon opens it, with its bytes shown (those of Modbus TCP stay inside pymodbus)."""
+    """The line as the daemon opens it, with its bytes shown (but for Modbus TCP, OPC UA and MQTT)."""
     return open_line(settings, clock, lambda port: TappedPort(port, listener))
 
 
@@ -203,8 +243,10 @@ def open_tapped_stream(
 
 def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Sequence[Reading]:
     """One poll on a line that is opened for it and closed again, with its bytes shown. Raises LineFault."""
-    line = open_tapped_line(target.line, clock, listener)
+    line: Any = open_tapped_line(target.line, clock, listener)
     try:
+        if isinstance(target.line, PushedLineSettings):
+            return target.gauge.read(TappedPushedLine(line, listener))
         return read_latched(target.gauge, line, target.line.round_trigger)
     except LineFault as fault:
         raise explained(fault, line) from fault

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from typing import NamedTuple
 
 from compd.configuration.document import Location
+from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
+from compd.number_text import join_words
+
+
+class _Library(NamedTuple):
+    """A package that is not installed with compd, and the extra that installs it."""
+
+    package: str
+    extra: str
+
+
+LIBRARIES: Mapping[str, _Library] = {"opc_ua": _Library("asyncua", "opcua"), "mqtt": _Library("paho", "mqtt")}
 
 
 def line_problems(sections: Sections) -> Iterator[Problem]:
     """Every contradiction between lines, and between a line and its gauges, as far as they could be read."""
     yield from _port_problems(sections)
     yield from _kind_problems(sections)
+    yield from _library_problems(sections)
     yield from _signal_problems(sections)
     yield from _power_problems(sections)
     yield from _process_problems(sections)
@@ -24,7 +38,7 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
     line_of_port: dict[str, str] = {}
     for name, line in sections.lines.items():
         port = getattr(line, "port", None)
-        if port is None or getattr(line, "kind", None) is None:
+        if port is None or getattr(line, "kind", None) in (None, "mqtt"):  # a broker takes many connections
             continue
         if line.kind in ("tcp", "modbus_tcp"):
             port = f"{line.host}:{port}"
@@ -61,13 +75,26 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
         kind = getattr(sections.lines.get(line_name), "kind", None)
         if kind is None or name not in sections.drivers:
             continue
-        carries: Literal["bytes", "registers"] = "registers" if kind.startswith("modbus") else "bytes"
-        if carries != sections.drivers[name].line_kind:
+        needed = sections.drivers[name].line_kind
+        if needed != CARRIES[kind]:
             yield Problem(
                 where=sections.document.where(location),
-                what=f"driver {options['driver']} needs a line that carries {sections.drivers[name].line_kind}",
+                what=f"driver {options['driver']} needs a line that carries {needed}",
                 value=f"{line_name} (kind {kind})",
-                allowed="kind modbus_rtu, modbus_ascii or modbus_tcp" if carries == "bytes" else "kind serial or tcp",
+                allowed="kind " + join_words([kind for kind, carries in CARRIES.items() if carries == needed], "or"),
+            )
+
+
+def _library_problems(sections: Sections) -> Iterator[Problem]:
+    """A line whose kind needs a library that is not installed."""
+    for name, line in sections.lines.items():
+        library = LIBRARIES.get(getattr(line, "kind", ""))
+        if library is not None and find_spec(library.package) is None:
+            yield Problem(
+                where=sections.document.where(("lines", name, "kind")),
+                what=f"needs the package {library.package}, which is not installed",
+                value=line.kind,
+                next_step=f"pip install 'compd[{library.extra}]'",
             )
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
+from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.configuration.section import Positive, Section, Text, refusal
-from compd.gauge import Gauge
+from compd.gauge import Gauge, LineKind
 
-AnyLine = TypeVar("AnyLine", bound="_LineSettings")
+AnyLine = TypeVar("AnyLine", bound="_LineSettings | PushedLineSettings")
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 
@@ -138,6 +139,15 @@ def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
     return line.model_copy(update=needs)
 
 
-LineSettings = Annotated[
-    SerialLine | TcpLine | ModbusRtuLine | ModbusAsciiLine | ModbusTcpLine, Field(discriminator="kind")
-]
+PolledLine = SerialLine | TcpLine | ModbusRtuLine | ModbusAsciiLine | ModbusTcpLine
+LineSettings = Annotated[PolledLine | OpcUaLine | MqttLine, Field(discriminator="kind")]
+# What each kind of line carries, as `Gauge.line_kind` has it.
+CARRIES: Mapping[str, LineKind] = {
+    "serial": "bytes",
+    "tcp": "bytes",
+    "modbus_rtu": "registers",
+    "modbus_ascii": "registers",
+    "modbus_tcp": "registers",
+    "opc_ua": "nodes",
+    "mqtt": "topics",
+}

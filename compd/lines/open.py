@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 from compd.clock import Clock
+from compd.gauge import LineFault, Quality
 from compd.lines.control_lines import ControlLines, Rs485Settings
 from compd.lines.modbus_ascii import AsciiMaster
 from compd.lines.modbus_rtu import RtuMaster, gap_s
@@ -13,7 +14,12 @@ from compd.lines.modbus_tcp import ModbusTcp
 from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import StreamLine
 
-Line = StreamLine | RtuMaster | AsciiMaster | ModbusTcp
+if TYPE_CHECKING:  # their libraries need not be installed
+    from compd.lines.mqtt import MqttLine, MqttSettings
+    from compd.lines.opc_ua import OpcUaLine, OpcUaSettings
+
+PolledLine = StreamLine | RtuMaster | AsciiMaster | ModbusTcp
+Line: TypeAlias = "PolledLine | MqttLine | OpcUaLine"
 WrapPort = Callable[[Port], Port]
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
@@ -97,14 +103,22 @@ class ModbusTcpSettings(_Address, Protocol):
 StreamSettings = SerialSettings | ModbusSerialSettings | TcpSettings
 
 
-def open_line(settings: StreamSettings | ModbusTcpSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> Line:
+def open_line(
+    settings: StreamSettings | ModbusTcpSettings | OpcUaSettings | MqttSettings,
+    clock: Clock,
+    wrap_port: WrapPort = _unchanged,
+) -> Line:
     """Open a line of the settings' kind. After a LineFault with LINE_LOST, `close()` it and open a new one.
 
-    wrap_port : as in `open_stream`; the port of Modbus TCP is within pymodbus and stays as it is.
+    wrap_port : as in `open_stream`; the ports of Modbus TCP, OPC UA and MQTT are within their libraries and stay as
+        they are.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
-    if settings.kind == "modbus_tcp":
-        return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock, settings.pause_s)
+    match settings.kind:
+        case "modbus_tcp":
+            return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock, settings.pause_s)
+        case "opc_ua" | "mqtt":
+            return _open_pushed_line(settings, clock)
     stream = open_stream(settings, clock, wrap_port)
     match settings.kind:
         case "modbus_rtu":
@@ -112,6 +126,21 @@ def open_line(settings: StreamSettings | ModbusTcpSettings, clock: Clock, wrap_p
         case "modbus_ascii":
             return AsciiMaster(stream, settings.ask_one_more)
     return stream
+
+
+def _open_pushed_line(settings: OpcUaSettings | MqttSettings, clock: Clock) -> MqttLine | OpcUaLine:
+    try:
+        if settings.kind == "opc_ua":
+            from compd.lines.opc_ua import OpcUaLine
+
+            return OpcUaLine(settings, clock)
+        from compd.lines.mqtt import MqttLine
+
+        return MqttLine(settings, clock)
+    except ImportError as error:
+        extra = settings.kind.replace("_", "")
+        text = f"{error.name} is not installed: pip install 'compd[{extra}]'"
+        raise LineFault(Quality.LINE_LOST, text) from error
 
 
 def open_stream(settings: StreamSettings, clock: Clock, wrap_port: WrapPort = _unchanged) -> StreamLine:

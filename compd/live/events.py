@@ -81,6 +81,8 @@ EVENTS: tuple[Event, ...] = (
           "the quality of a gauge has changed; a warning unless it is `ok` again"),
     Event("driver_failed", "driver failed", "error", ("gauge",),
           "a driver has raised an exception, for the first time; its traceback follows"),
+    Event("source_clock", "clock of a source", "warning", ("gauge", "detail"),
+          "the time that a device sends is in the future, so that the time of arrival counts; or it is right again"),
     Event("line_open", "line is open", "info", ("line",), "a line has been opened, also after it was lost"),
     Event("line_lost", "line is lost", "warning", ("line", "detail"), "a port is gone, or the other end has closed"),
     Event("line_failed", "line failed", "error", ("line",),

@@ -20,9 +20,9 @@ a class, or a {term("preset")}: a description in a YAML file that the drivers `s
 the plug to the number, for a gauge that is here and for one that is not.
 
 Drivers for bytes need a line of kind `serial` or `tcp`, drivers for registers one of kind `modbus_rtu`, `modbus_ascii`
-or `modbus_tcp`; see [lines](#configuration-lines). In the descriptions, (M) stands for what was read in a maker's
-manual, (C) for what was read in public code, (P) for what is only plausible. A length is delivered in mm, whatever the
-device shows.
+or `modbus_tcp`, for nodes `opc_ua`, for topics `mqtt`; see [lines](#configuration-lines). In the descriptions, (M)
+stands for what was read in a maker's manual, (C) for what was read in public code, (P) for what is only plausible. A
+length is delivered in mm, whatever the device shows.
 """
 QUALITIES = """\
 A reading has a value, or a reason why not: its quality. These are the words in `compd gauge watch`, in the messages

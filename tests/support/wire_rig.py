@@ -99,15 +99,26 @@ class WatchedLatest(Latest):
 
     def wait_for(self, channel: str, quality: Quality, after: int = 0) -> Reading:
         """The first reading of `channel` with `quality` since history entry `after`."""
+        return self._wait(channel, lambda reading: reading.quality is quality, after, str(quality))
+
+    def wait_for_value(self, channel: str, value: float, after: int = 0) -> Reading:
+        """The first good reading of `channel` with this value since history entry `after`."""
+        return self._wait(channel, lambda reading: reading.ok and reading.value == value, after, str(value))
+
+    def wait_for_any(self, channel: str, after: int = 0) -> Reading:
+        """The first reading of `channel` since history entry `after`."""
+        return self._wait(channel, lambda _: True, after, "heard")
+
+    def _wait(self, channel: str, is_wanted: Callable[[Reading], bool], after: int, what: str) -> Reading:
         readings: list[Reading] = []
 
         def there() -> bool:
-            readings.extend(r for name, r in self.history[after:] if name == channel and r.quality is quality)
+            readings.extend(r for name, r in self.history[after:] if name == channel and is_wanted(r))
             return bool(readings)
 
         with self._changed:
             arrived = self._changed.wait_for(there, PATIENCE_S)
-        assert arrived, f"{channel} never became {quality}: {self.snapshot(0.0).readings[self.index[channel]]}"
+        assert arrived, f"{channel} never became {what}: {self.snapshot(0.0).readings[self.index[channel]]}"
         return readings[0]
 
     @property

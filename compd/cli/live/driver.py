@@ -36,16 +36,16 @@ def try_on_wires(
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
+    from compd.commissioning.catalogue import polled_drivers
     from compd.commissioning.conformance.report import driver_under_test
     from compd.errors import PluginError
-    from compd.plugins import GAUGES, names
 
     chosen = _read_options(options) if options else None
     if name is not None:
         failed = _try(driver_under_test(name, chosen, simulator), quick)
     else:
         failed = 0
-        for installed in names(GAUGES):
+        for installed in polled_drivers():
             try:
                 driver = driver_under_test(installed)
             except PluginError as error:

@@ -24,7 +24,10 @@ TargetArgument = Annotated[
 ]
 NameArgument = Annotated[str | None, typer.Argument(help="With a file of several gauges: which of them.")]
 Port = Annotated[
-    str, typer.Option(help="/dev/serial/by-id/..., pyserial URL, or host:port, where no file names the line.")
+    str,
+    typer.Option(
+        help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, where no file names the line."
+    ),
 ]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
@@ -154,7 +157,7 @@ def watch(
     assignments: Set = None,
     polls: Annotated[int | None, typer.Option(min=1, help="Stop after so many polls; Ctrl-C if left out.")] = None,
 ) -> None:
-    """Poll one gauge as fast as its line goes: values, rate, age, noise and faults."""
+    """Poll one gauge as fast as its line goes, or listen to it: values, rate, age, noise and faults."""
     from rich.console import Console
     from rich.live import Live
 

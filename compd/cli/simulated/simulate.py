@@ -49,6 +49,9 @@ def simulate(
         Path | None,
         typer.Option(help="After machine zero go through these rows, as `compd plan --out` has written them."),
     ] = None,
+    broker: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="The MQTT broker to which lines of kind mqtt publish.")
+    ] = None,
 ) -> None:
     """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol.
 
@@ -101,7 +104,7 @@ def simulate(
         if directory is None:
             directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="compd-")))
         directory.mkdir(parents=True, exist_ok=True)
-        simulation = Simulation(configuration, world, directory.resolve(), clock)
+        simulation = Simulation(configuration, world, directory.resolve(), clock, _address(broker))
         stack.callback(simulation.stop)
         daemon = simulation.start()
         if sized:
@@ -117,6 +120,15 @@ def simulate(
                 if not done and simulation.truth().get("plan", {}).get("done"):
                     console.print(f"The plan is done: {plan}, {len(rows)} rows. It stands still; Ctrl-C ends.")
                     done = True
+
+
+def _address(broker: str | None) -> tuple[str, int] | None:
+    if broker is None:
+        return None
+    host, _, port = broker.rpartition(":")
+    if not host or not port.isdigit():
+        raise typer.BadParameter(f"{broker} is not HOST:PORT, such as 127.0.0.1:1884", param_hint="--broker")
+    return host, int(port)
 
 
 def _hidden(configuration: Configuration, seed: int, numbers: Sequence[int], texts: Sequence[str]) -> list[SizedCause]:

@@ -107,6 +107,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
     """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
     from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
     from compd.commissioning.line_budget import budget_warnings, line_budgets
+    from compd.commissioning.pushed_periods import period_warnings
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
@@ -114,6 +115,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
     _print_jumps(jumps)
     return [
         *budget_warnings(configuration, budgets),
+        *period_warnings(configuration),
         *jump_warnings(configuration, jumps),
         *reply_warnings(configuration),
     ]

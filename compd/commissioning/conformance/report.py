@@ -19,6 +19,7 @@ from compd.commissioning.conformance.wire import CHARACTER_BITS, Kind, RealWire
 from compd.errors import PluginError, Problem
 from compd.gauge import Gauge, Quality
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
+from compd.pushed_gauge import PushedGauge
 
 SLOWEST_BAUD = 1200  # of every device in the shipped table
 SLOW_TIMEOUT_S = 0.3
@@ -81,6 +82,14 @@ def driver_under_test(
     Raises PluginError when there is no driver, no simulated device, or no options.
     """
     gauge = load(GAUGES, name, f"driver {name}")
+    if issubclass(gauge, PushedGauge):
+        raise PluginError(
+            Problem(
+                where=f"driver {name}",
+                what="its device speaks by itself: there are no requests whose replies could be damaged",
+                next_step="try it with `compd gauge read` on a server or broker of yours",
+            )
+        )
     device = load(SIMULATED_GAUGES, simulator or name, f"simulated device of {name}")
     chosen = (gauge.sample_options if options is None else options) or {}
     try:

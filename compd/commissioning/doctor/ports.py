@@ -7,9 +7,11 @@ import os
 import socket
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from compd.commissioning.doctor.finding import Computer, Finding, advice, fault, good, unknown
 from compd.configuration.lines import LineSettings, ModbusTcpLine, TcpLine
+from compd.configuration.pushed_lines import MqttLine, OpcUaLine
 
 _BY_ID, _BY_PATH = "/dev/serial/by-id", "/dev/serial/by-path"
 # Their other end is held by another program as a matter of course.
@@ -24,7 +26,10 @@ def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_
     shared = _shared_names(computer)
     for name, line in lines.items():
         subject = f"line {name}"
-        if isinstance(line, TcpLine | ModbusTcpLine):
+        if isinstance(line, OpcUaLine):
+            address = urlsplit(line.endpoint)
+            yield _network_finding(subject, address.hostname or "", address.port or 0, daemon_runs)
+        elif isinstance(line, TcpLine | ModbusTcpLine | MqttLine):
             yield _network_finding(subject, line.host, line.port, daemon_runs)
         elif "://" in line.port:
             yield unknown(subject, f"{line.port} is looked at only by opening it")

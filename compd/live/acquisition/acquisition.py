@@ -1,4 +1,4 @@
-"""The threads that poll the gauges, one per line, and put their readings into `Latest`.
+"""The threads that poll the gauges, or listen to them, one per line, and put their readings into `Latest`.
 
 A lost line is closed, and opened again after a waiting time that doubles with every failure. A gauge that does not
 answer rests for a shorter time, so that an absent unit does not slow the others on its line. No line waits for
@@ -18,11 +18,13 @@ import structlog
 
 from compd.clock import Clock
 from compd.configuration.lines import LineSettings
+from compd.configuration.pushed_lines import PushedLineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
 from compd.lines.echo import explained
 from compd.lines.stream import shown
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import send_trigger
@@ -106,10 +108,13 @@ class LineThread:
             for gauge, driver in gauges
         ]
         self._settings = settings
+        speaks = isinstance(settings, PushedLineSettings)
+        self._pushed = PushedRound(self.gauges, stale_after_s, clock) if speaks else None
+        self._poll_every_s = 0.0 if isinstance(settings, PushedLineSettings) else settings.poll_every_s
         self._clock = clock
         self._opener = opener
         self._trigger = settings.round_trigger
-        self._line: OpenLine | None = None
+        self._line: Any = None  # an OpenLine; of another kind for each driver
         self._order = ReplyOrder([driver for _, driver in gauges], settings.timeout_s)
         self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the time from request to reply, s
         self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
@@ -155,7 +160,10 @@ class LineThread:
                 self._line = self._opener(self._settings, self._clock)
                 self._mark_open()
                 while not self._stop.is_set():
-                    self._round(self._line)
+                    if self._pushed is None:
+                        self._round(self._line)
+                    elif self._pushed.take(self._line):
+                        self._back_off.succeeded()
             except LineFault as fault:  # LINE_LOST alone: `_faults_of` handles every other fault
                 self._mark_lost(fault.detail)
             except MemoryError:  # it is the whole process that has none left
@@ -208,7 +216,7 @@ class LineThread:
         self._publish_waiting(line)
         end_s = self._clock.monotonic()
         self.round_s = end_s - start_s
-        next_s = start_s + max(self._settings.poll_every_s, FASTEST_ROUND_S)
+        next_s = start_s + max(self._poll_every_s, FASTEST_ROUND_S)
         wake_s = max(next_s, min((gauge.rests_until_s for gauge in self.gauges), default=next_s))
         if wake_s > end_s:
             self._clock.wait(self._stop, wake_s - end_s)

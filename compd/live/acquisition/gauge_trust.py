@@ -21,6 +21,7 @@ class GaugeTrust:
         self._first: Sequence[Reading | None] = ()
         self._shortest_s = math.inf
         self._window_s = 0.0
+        self._surprising: dict[int, Reading] = {}  # by place: came unasked, and waits for the next
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
         """The readings of one poll by `ask`, or of a second one where a length is not where its last readings lead.
@@ -59,8 +60,28 @@ class GaugeTrust:
             judged.append(reading)
         return judged
 
+    def hear(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
+        """A reading of the channel number `place` that came unasked, as it may be published.
+
+        Nobody can ask again: where a length is not where its last readings lead, the next reading is the second answer.
+        window_s : by how much later than its time it may have been measured, s.
+        """
+        channel = self._channels[place]
+        if channel is None:
+            return reading
+        if not reading.ok:
+            self._surprising.pop(place, None)
+            channel.fail(reading.quality, now_s)
+            return reading
+        window_s += WINDOW_S
+        first = self._surprising.pop(place, None)
+        if first is None and channel.surprises(Sample(reading.value, reading.time_s, window_s)):
+            self._surprising[place] = reading
+        return channel.judge(reading, window_s, first)
+
     def fail(self, quality: Quality, now_s: float) -> None:
         """Note that a poll has failed as a whole."""
+        self._surprising.clear()
         for channel in self._channels:
             if channel is not None:
                 channel.fail(quality, now_s)

@@ -14,6 +14,7 @@ from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.round_trigger import stamped
 from compd.live.memory.latest import LONGEST_DETAIL, Latest
+from compd.pushed_gauge import Heard
 
 log = structlog.get_logger()
 
@@ -92,6 +93,7 @@ class PolledGauge:
         self._slots = [latest.index[channel] for channel in channels]
         self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
         self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
+        self._heard = list(self._published)  # the newest of each channel, where they come unasked
         self._logged = Quality.NEVER_READ
 
     def read(self, line: Any, latched_s: float | None = None) -> Sequence[Reading]:
@@ -109,21 +111,44 @@ class PolledGauge:
         if len(readings) != len(self._slots):
             raise ValueError(f"{len(readings)} readings for {len(self._slots)} channels")
         for reading in readings:
-            if not reading.time_s <= now_s + AHEAD_S:
-                raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
-            if reading.ok and not math.isfinite(reading.value):
-                raise ValueError(f"{reading.value} given as ok")
+            _check(reading, now_s)
         readings = self._trust.judge(readings, now_s)
-        faulty = next((reading for reading in reversed(readings) if not reading.ok), None)
         for place, reading in enumerate(readings):
             self._publish_unless_kept(place, reading, now_s)
+        self._count(readings, readings, now_s)
+
+    def hear(self, heard: Sequence[Heard], now_s: float) -> None:
+        """Publish what its device has sent unasked, for some of its channels, and count it as a poll.
+
+        A value that is too old to be used when it comes is stale. Raises ValueError as `put` does.
+        """
+        if not heard:
+            return
+        for each in heard:
+            _check(each.reading, now_s)
+        judged = []
+        for each in heard:
+            reading = self._trust.hear(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
+            self._heard[each.place] = reading
+            self._publish_unless_kept(each.place, reading, now_s)
+            judged.append(reading)
+        self._count(judged, self._heard, now_s)
+
+    def _if_young(self, reading: Reading, now_s: float) -> Reading:
+        age_s = now_s - reading.time_s
+        if not reading.ok or age_s <= self._stale_after_s:
+            return reading
+        return bad(reading.time_s, Quality.STALE, f"measured {age_s:.3g} s ago by the clock of its source")
+
+    def _count(self, readings: Sequence[Reading], all_readings: Sequence[Reading], now_s: float) -> None:
+        """Count a poll that gave `readings`; `all_readings` are the newest of all channels."""
+        faulty = next((reading for reading in reversed(all_readings) if not reading.ok), None)
         self.polls += 1
         if faulty is None:
             self.ok += 1
             self.last_ok_s = now_s
-        else:
-            for quality in {reading.quality for reading in readings} - {Quality.OK}:
-                self.faults[quality] += 1
+        for quality in {reading.quality for reading in readings} - {Quality.OK}:
+            self.faults[quality] += 1
         self.failures = 0
         self._back_off.succeeded()
         self._note(faulty.quality if faulty else Quality.OK, faulty.detail if faulty else "")
@@ -153,7 +178,8 @@ class PolledGauge:
         self._trust.fail(quality, now_s)
         self.faults[quality] += 1
         for place in range(len(self._slots)):
-            self._publish(place, bad(now_s, quality, detail))
+            self._heard[place] = bad(now_s, quality, detail)
+            self._publish(place, self._heard[place])
         self._note(quality, detail)
         self._log_change()
 
@@ -204,3 +230,11 @@ class PolledGauge:
         if not math.isnan(self.last_ok_s):
             status["last_ok_s"] = self.last_ok_s
         return status
+
+
+def _check(reading: Reading, now_s: float) -> None:
+    """Raises ValueError for a reading that cannot be: a defect of the driver."""
+    if not reading.time_s <= now_s + AHEAD_S:
+        raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
+    if reading.ok and not math.isfinite(reading.value):
+        raise ValueError(f"{reading.value} given as ok")

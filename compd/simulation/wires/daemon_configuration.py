@@ -16,8 +16,8 @@ from compd.output_file import check_replaceable
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
-# What a pty does not have, and a simulated line does not do.
-NOT_SIMULATED = ("dtr", "rts", "rs485", "echo")
+# What a pty does not have, and a simulated line does not do; nor does anybody log in to a simulated machine.
+NOT_SIMULATED = ("dtr", "rts", "rs485", "echo", "security", "tls", "user", "password_file", "client_id")
 Port = str | tuple[str, int]
 
 
@@ -53,7 +53,7 @@ def daemon_configuration(
         for key in NOT_SIMULATED:
             line.pop(key, None)
         if isinstance(port, str):
-            line["port"] = port
+            line["endpoint" if "endpoint" in line else "port"] = port
         else:
             line["host"], line["port"] = port
     sockets = data["sockets"]

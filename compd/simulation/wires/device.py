@@ -7,7 +7,7 @@ It is written from the device's manual, not from the driver; the two share no co
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 # Present value at the device's sensor by channel name, in the channel's unit; nan: the sensor is off.
@@ -55,3 +55,24 @@ class SimulatedRegisterDevice(ABC):
     def write(self, function: int, address: int, values: Sequence[int]) -> bool:
         """Take what is written by function 5 (0 or 1), 6 or 16; False for an illegal address."""
         return False
+
+
+class SimulatedPushedDevice(ABC):
+    """A device that speaks by itself; its line sends what it says.
+
+    period_s : how often it has something to say, s; None: as the line does.
+    """
+
+    period_s: float | None = None
+
+    def __init__(self, options: Any, sense: Sense) -> None:
+        """options : the gauge's validated options from the configuration. sense : see `Sense`."""
+        self.options = options
+        self.sense = sense
+
+    @abstractmethod
+    def say(self, utc_s: float) -> Mapping[str, Any]:
+        """Its values now, by topic or node: the payload (bytes); a number, nan for a sensor that is off, or a list.
+
+        utc_s : calendar time, s since 1970.
+        """

@@ -12,6 +12,7 @@ import numpy as np
 
 from compd.clock import Clock
 from compd.configuration import Configuration
+from compd.configuration.lines import LineSettings
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER
@@ -20,6 +21,7 @@ from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.wires.live_world import LiveWorld
+from compd.simulation.wires.pushed_line import SimulatedPushedLine
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
@@ -35,11 +37,19 @@ INTERFEROMETER_SEED = 18
 class Simulation:
     """A configured machine, simulated on real ports. Access to the world is serialised by a lock."""
 
-    def __init__(self, configuration: Configuration, world: World, directory: Path, clock: Clock) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        world: World,
+        directory: Path,
+        clock: Clock,
+        broker: tuple[str, int] | None = None,
+    ) -> None:
         """directory : existing, for ports, sockets, state and the daemon's configuration.
 
-        Raises PluginError for a driver without a simulated device, ConfigurationError where `directory` holds the
-        machine's own configuration.
+        broker : host and port of the MQTT broker to which lines of kind mqtt publish.
+        Raises CompdError for such a line without a broker, PluginError for a driver without a simulated device,
+        ConfigurationError where `directory` holds the machine's own configuration.
         """
         daemon_path(configuration, directory)
         self.configuration = configuration
@@ -55,18 +65,8 @@ class Simulation:
         sensing = Sensing(configuration, self._live)
         self._ports_directory = directory / PORTS
         self._own = SimulationDirectory(directory, configuration.path.name)
-        self.lines: Mapping[str, SimulatedLine] = {
-            name: SimulatedLine(
-                name,
-                settings,
-                [
-                    self._device(gauge, sensing)
-                    for gauge in configuration.gauges
-                    if configuration.gauges[gauge].line == name
-                ],
-                self._ports_directory,
-            )
-            for name, settings in configuration.lines.items()
+        self.lines: Mapping[str, SimulatedLine | SimulatedPushedLine] = {
+            name: self._line(name, settings, sensing, broker) for name, settings in configuration.lines.items()
         }
         self._handlers: Mapping[str, Handler] = {
             "TRUTH": lambda _: self.truth(),
@@ -115,6 +115,22 @@ class Simulation:
         self._live.start()
         while not self._clock.wait(self._stop, STEP_S):
             self._live.step()
+
+    def _line(
+        self, name: str, settings: LineSettings, sensing: Sensing, broker: tuple[str, int] | None
+    ) -> SimulatedLine | SimulatedPushedLine:
+        gauges = [gauge for gauge, options in self.configuration.gauges.items() if options.line == name]
+        devices = [self._device(gauge, sensing) for gauge in gauges]
+        match settings.kind:
+            case "opc_ua":
+                from compd.simulation.wires.opc_ua_server import OpcUaNodes
+
+                return OpcUaNodes(name, devices)
+            case "mqtt":
+                from compd.simulation.wires.mqtt_publisher import MqttPublisher
+
+                return MqttPublisher(name, devices, broker)
+        return SimulatedLine(name, settings, devices, self._ports_directory)
 
     def _device(self, gauge: str, sensing: Sensing) -> Any:
         driver = self.configuration.gauges[gauge].driver

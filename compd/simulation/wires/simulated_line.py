@@ -18,7 +18,7 @@ from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.lines import LineSettings, SerialPortSettings
+from compd.configuration.lines import PolledLine, SerialPortSettings
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
 from compd.simulation.wires.latch import Latch, TriggeredDevices
@@ -111,7 +111,7 @@ class SimulatedLine:
     def __init__(
         self,
         name: str,
-        settings: LineSettings,
+        settings: PolledLine,
         devices: Sequence[SimulatedByteDevice] | Sequence[SimulatedRegisterDevice],
         directory: Path,
         clock: Clock | None = None,

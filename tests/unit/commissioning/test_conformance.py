@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from compd.commissioning.catalogue import polled_drivers
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.cases import CaseResult, Subject, run_case
 from compd.commissioning.conformance.faults import Fault
@@ -20,10 +21,9 @@ from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.lines.modbus_rtu import RtuMaster
-from compd.plugins import GAUGES, names
 from compd.simulation.wires.device import SimulatedByteDevice
 
-NAMES = names(GAUGES)
+NAMES = polled_drivers()
 
 
 def failures(results: Sequence[tuple[str, CaseResult]]) -> list[str]:

@@ -13,7 +13,8 @@ from tests.support.paths import TESTS
 from tests.support.transcripts import check_simulated_device, gauge_of, parse, replay_transcript
 
 FILES = sorted((TESTS / "transcripts").glob("*.txt"))
-GENERIC = {"modbus"}  # its map is tried in tests of its own; the presets on it have transcripts
+# Their maps are tried in tests of their own; the presets on modbus have transcripts, mqtt and opc_ua real other ends.
+GENERIC = {"modbus", "mqtt", "opc_ua"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

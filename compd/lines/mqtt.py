@@ -1,0 +1,234 @@
+"""MQTT, by paho-mqtt: what a broker sends of the topics that were subscribed to.
+
+All of it happens in the thread of the line, in `subscribe` and `messages`: no other thread touches it. The session is
+clean and the quality of service 0, so that a broker neither keeps values for this client nor sends them twice. A broker
+that says nothing for `keep_alive_s` is asked whether it is there (PINGREQ), and is lost if it does not answer.
+
+A message that wakes the thread has arrived just then. One that was there already has arrived at some time since the
+socket was seen empty, and that time counts: a thread that cannot keep up has old values, not new ones.
+
+Source: MQTT 3.1.1 (OASIS), chapters 3.1 to 3.3 (CONNECT, CONNACK, PUBLISH), 3.8 and 3.9 (SUBSCRIBE, SUBACK).
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import ssl
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from compd.clock import Clock
+from compd.gauge import LineFault, Quality
+from compd.pushed_gauge import Message
+from compd.source_time import Arrival
+
+# How long is waited for the network before paho looks whether the broker is still there, s.
+SLICE_S = 0.1
+# Of one call of `messages`: more waits in the socket meanwhile.
+MOST_MESSAGES = 1000
+LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
+
+
+class TlsSettings(Protocol):
+    """TLS to the broker: see `compd.configuration.pushed_lines.MqttTls`."""
+
+    @property
+    def ca_file(self) -> str | None: ...
+    @property
+    def certificate(self) -> str | None: ...
+    @property
+    def private_key(self) -> str | None: ...
+
+
+class MqttSettings(Protocol):
+    """The keys of an MQTT line in the configuration."""
+
+    @property
+    def kind(self) -> Literal["mqtt"]: ...
+    @property
+    def timeout_s(self) -> float: ...
+    @property
+    def host(self) -> str: ...
+    @property
+    def port(self) -> int: ...
+    @property
+    def client_id(self) -> str | None: ...
+    @property
+    def keep_alive_s(self) -> int: ...
+    @property
+    def user(self) -> str | None: ...
+    @property
+    def password_file(self) -> str | None: ...
+    @property
+    def tls(self) -> TlsSettings | None: ...
+
+
+class MqttLine:
+    """A `PushedLine` over MQTT. Used by one thread."""
+
+    last_request_s = -math.inf  # nobody asks
+    unexpected_bytes = 0
+    request_came_back = False
+
+    def __init__(self, settings: MqttSettings, clock: Clock, utc: Callable[[], float] = time.time) -> None:
+        """Connect within `settings.timeout_s`. `utc`: the calendar clock, s since 1970.
+
+        Raises LineFault (LINE_LOST) when the broker cannot be reached, or refuses.
+        """
+        self._where = f"{settings.host}:{settings.port}"
+        self._timeout_s = settings.timeout_s
+        self._clock = clock
+        self._utc = utc
+        self._came: deque[Message] = deque()
+        self._wanted: set[str] = set()
+        self._answer: ReasonCode | None = None  # to CONNECT
+        self._granted: dict[int, Sequence[ReasonCode]] = {}  # by number of the SUBSCRIBE
+        self._why_lost = ""
+        self._empty_s = clock.monotonic()  # what is read now has arrived at this time at the earliest
+        self._client = Client(CallbackAPIVersion.VERSION2, client_id=settings.client_id or "", clean_session=True)
+        self._client.on_connect = self._connected
+        self._client.on_disconnect = self._disconnected
+        self._client.on_subscribe = self._subscribed
+        self._client.on_message = self._heard
+        self._client.connect_timeout = settings.timeout_s
+        try:
+            self._log_in(settings)
+            self._client.connect(settings.host, settings.port, settings.keep_alive_s)
+            self._work_until(lambda: self._answer is not None, "has not accepted the connection")
+        except (OSError, ValueError) as error:
+            self.close()
+            raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}: {error}") from error
+        except LineFault:
+            self.close()
+            raise
+
+    def subscribe(self, addresses: Sequence[str]) -> None:
+        """Subscribe to topics, but for those that were subscribed to before.
+
+        One that the broker refuses sends a message with DEVICE_ERROR, and may be asked for again.
+
+        Raises LineFault (LINE_LOST) where the broker does not answer.
+        """
+        topics = [topic for topic in dict.fromkeys(addresses) if topic not in self._wanted]
+        if not topics:
+            return
+        self._wanted.update(topics)
+        error, number = self._client.subscribe([(topic, 0) for topic in topics])
+        if error is not MQTTErrorCode.MQTT_ERR_SUCCESS or number is None:
+            raise self._lost(error)
+        self._work_until(lambda: number in self._granted, "has not confirmed the subscription")
+        for topic, code in zip(topics, self._granted.pop(number), strict=False):
+            if code.is_failure:
+                self._wanted.discard(topic)
+                text = f"{self._where} refuses the topic {topic}: {code}"
+                self._came.append(Message(topic, b"", self._arrival(), math.nan, Quality.DEVICE_ERROR, text))
+
+    def messages(self, timeout_s: float | None = None) -> Sequence[Message]:
+        """See `PushedLine`. The source's time, if there is one, is in the payload. Raises LineFault (LINE_LOST)."""
+        deadline_s = self._clock.monotonic() + (self._timeout_s if timeout_s is None else timeout_s)
+        while not self._came and self._work(deadline_s):
+            pass
+        count = len(self._came)
+        while count < MOST_MESSAGES:
+            self._work(-math.inf)
+            if len(self._came) == count:
+                break
+            count = len(self._came)
+        came = list(self._came)
+        self._came.clear()
+        return came
+
+    def drain(self, quiet_s: float | None = None) -> bytes:
+        """Nothing: no message belongs to a request."""
+        return b""
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._client.on_disconnect = None
+        self._client.disconnect()
+
+    def _log_in(self, settings: MqttSettings) -> None:
+        """Raises OSError or ValueError for files that cannot be used."""
+        if settings.user is not None:
+            password = None
+            if settings.password_file is not None:
+                password = Path(settings.password_file).read_text(encoding="utf-8").rstrip("\r\n")
+                if len(password.encode()) > LONGEST_PASSWORD:
+                    raise ValueError(f"{settings.password_file} is too long for a password")
+            self._client.username_pw_set(settings.user, password)
+        if settings.tls is not None:
+            context = ssl.create_default_context(cafile=settings.tls.ca_file)
+            if settings.tls.certificate is not None:
+                context.load_cert_chain(settings.tls.certificate, settings.tls.private_key)
+            self._client.tls_set_context(context)
+
+    def _work_until(self, done: Callable[[], bool], what: str) -> None:
+        """Raises LineFault (LINE_LOST) where it is not done within the timeout: the broker `what`."""
+        deadline_s = self._clock.monotonic() + self._timeout_s
+        while not done():
+            if not self._work(deadline_s):
+                raise LineFault(Quality.LINE_LOST, f"{self._where} {what} within {self._timeout_s:g} s")
+
+    def _work(self, deadline_s: float) -> bool:
+        """Send and receive what is there, or comes before the monotonic `deadline_s` (s); whether there is time left.
+
+        Raises LineFault (LINE_LOST).
+        """
+        left_s = deadline_s - self._clock.monotonic()
+        if not self._has_data(0.0):
+            self._empty_s = self._clock.monotonic()
+            if self._has_data(min(max(left_s, 0.0), SLICE_S)):
+                self._empty_s = self._clock.monotonic()
+        error = self._client.loop(0.0)
+        if error is not MQTTErrorCode.MQTT_ERR_SUCCESS:
+            raise self._lost(error)
+        return left_s > 0
+
+    def _has_data(self, wait_s: float) -> bool:
+        """Whether there is something to read, or comes within `wait_s` (s)."""
+        connection = self._client.socket()
+        if connection is None:
+            return True  # paho says what is wrong
+        if isinstance(connection, ssl.SSLSocket) and connection.pending():
+            return True
+        try:
+            return bool(select.select([connection], [], [], wait_s)[0])
+        except (OSError, ValueError):
+            return True
+
+    def _lost(self, error: MQTTErrorCode) -> LineFault:
+        if self._answer is not None and self._answer.is_failure:
+            return LineFault(Quality.LINE_LOST, f"{self._where} refuses: {self._answer}")
+        reason = self._why_lost or error.name.removeprefix("MQTT_ERR_").replace("_", " ").lower()
+        return LineFault(Quality.LINE_LOST, f"{self._where} is gone: {reason}")
+
+    def _arrival(self, kept: bool = False) -> Arrival:
+        passed_s = self._clock.monotonic() - self._empty_s
+        return Arrival(self._empty_s, self._utc() - passed_s, kept=kept)
+
+    def _connected(
+        self, _client: Client, _data: Any, _flags: ConnectFlags, code: ReasonCode, _properties: Properties | None
+    ) -> None:
+        self._answer = code
+
+    def _disconnected(
+        self, _client: Client, _data: Any, _flags: DisconnectFlags, code: ReasonCode, _properties: Properties | None
+    ) -> None:
+        self._why_lost = str(code)
+
+    def _subscribed(
+        self, _client: Client, _data: Any, number: int, codes: list[ReasonCode], _properties: Properties | None
+    ) -> None:
+        self._granted[number] = codes
+
+    def _heard(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
+        self._came.append(Message(message.topic, message.payload, self._arrival(message.retain)))

@@ -1,0 +1,60 @@
+"""The simulated machine's gauges as publishers on the topics of an MQTT broker, which a person names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion
+
+from compd.clock import Clock
+from compd.errors import CompdError, Problem
+from compd.simulation.wires.device import SimulatedPushedDevice
+from compd.simulation.wires.pushed_line import SimulatedPushedLine
+
+
+class MqttPublisher(SimulatedPushedLine):
+    """Publishes to a broker; never to that of the machine's own configuration, where real programs may listen."""
+
+    def __init__(
+        self,
+        name: str,
+        devices: Sequence[SimulatedPushedDevice],
+        broker: tuple[str, int] | None,
+        clock: Clock | None = None,
+    ) -> None:
+        """`broker`: host and port. Raises CompdError where there is none."""
+        super().__init__(name, devices, clock)
+        if broker is None:
+            raise CompdError(
+                Problem(
+                    where=f"lines.{name}",
+                    what="the simulated machine does not publish to the real machine's broker",
+                    next_step="start one, for instance `mosquitto -p 1884`, and name it: --broker 127.0.0.1:1884",
+                )
+            )
+        self._broker = broker
+        self._client = Client(CallbackAPIVersion.VERSION2)
+
+    @property
+    def port(self) -> tuple[str, int]:
+        return self._broker
+
+    def plug_in(self) -> None:
+        try:
+            self._client.connect(*self._broker)
+        except OSError as error:
+            where = f"--broker {self._broker[0]}:{self._broker[1]}"
+            raise CompdError(
+                Problem(where=where, what=f"no MQTT broker answers: {error}", next_step="start it, or name another")
+            ) from error
+        self._client.loop_start()  # which connects again by itself
+
+    def pull_out(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def send(self, values: Mapping[str, Any], utc_s: float) -> None:
+        for topic, payload in values.items():
+            self._client.publish(topic, payload)

@@ -1,0 +1,41 @@
+"""What the tests of lines that speak by themselves share: the line's thread with its gauges, and their readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from compd.clock import MonotonicClock
+from compd.gauge import Gauge
+from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition.reading_trust import ReadingTrust
+from compd.plugins import GAUGES, load
+from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+
+STALE_AFTER_S = 0.5
+
+
+def gauge(driver: str, **options: Any) -> Gauge[Any]:
+    kind = load(GAUGES, driver, driver)
+    return kind(kind.Options.model_validate({"driver": driver, "line": "l", **options}))  # type: ignore[no-any-return]
+
+
+@contextmanager
+def acquiring(
+    line: Mapping[str, Any],
+    gauges: Mapping[str, Gauge[Any]],
+    trust: Mapping[str, ReadingTrust] | None = None,
+    stale_after_s: float = STALE_AFTER_S,
+) -> Iterator[tuple[Acquisition, WatchedLatest]]:
+    """The line `l` with its thread, and its gauges' readings."""
+    channels: Sequence[str] = [f"{name}.{channel.name}" for name, each in gauges.items() for channel in each.channels]
+    latest = WatchedLatest(channels)
+    settings = SETTINGS.validate_python({"timeout_s": PATIENCE_S, "back_off_s": [0.05, 0.2], **line})
+    lines = {"l": (settings, list(gauges.items()))}
+    acquisition = Acquisition(lines, dict.fromkeys(gauges, stale_after_s), latest, MonotonicClock(), trust=trust or {})
+    acquisition.start()
+    try:
+        yield acquisition, latest
+    finally:
+        assert acquisition.stop(PATIENCE_S)

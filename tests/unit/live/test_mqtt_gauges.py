@@ -1,0 +1,289 @@
+"""MQTT from a real broker to the slots of the readings: the same qualities as from polled lines, and honest times."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from structlog.testing import capture_logs
+
+from compd.gauge import Gauge, Quality
+from compd.live.acquisition.possible_motion import MotionLimits
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
+from compd.live.memory.trust_memory import TrustMemory
+from tests.support.mosquitto import Broker, Publisher, needs_mosquitto, publisher, running_broker
+from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
+
+pytestmark = needs_mosquitto
+OK = Quality.OK
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator[Broker]:
+    with running_broker(tmp_path) as started:
+        yield started
+
+
+@pytest.fixture
+def device(broker: Broker) -> Iterator[Publisher]:
+    with publisher(broker) as connected:
+        yield connected
+
+
+def line_to(broker: Broker) -> dict[str, Any]:
+    return {"kind": "mqtt", "host": "127.0.0.1", "port": broker.port, "keep_alive_s": 1}
+
+
+def plain(**keys: Any) -> Gauge[Any]:
+    channel = {"name": "a", "topic": "a", "unit": "mm", **keys}
+    return gauge("mqtt", period_s=60.0, channels=[channel])
+
+
+def timed(**keys: Any) -> Gauge[Any]:
+    return plain(value="/v", time="/t", **keys)
+
+
+def payload(value: Any, age_s: float = 0.0) -> str:
+    when = datetime.fromtimestamp(time.time() - age_s, UTC)
+    return json.dumps({"v": value, "t": when.isoformat()})
+
+
+@contextmanager
+def listening(broker: Broker, device: Publisher, measured: Gauge[Any], **keys: Any) -> Iterator[tuple[Any, Any]]:
+    """The line's thread with one gauge, subscribed: it has heard what the broker had kept, which is no value."""
+    for topic in measured.addresses:  # type: ignore[attr-defined]
+        device.publish(topic, "null", retain=True)
+    with acquiring(line_to(broker), {"g": measured}, **keys) as (acquisition, latest):
+        for channel in latest.channels:
+            latest.wait_for_any(channel)
+        yield acquisition, latest
+
+
+def gauge_status(acquisition: Any) -> dict[str, Any]:
+    return acquisition.status()["l"]["gauges"]["g"]  # type: ignore[no-any-return]
+
+
+def test_a_plain_number_is_read_in_its_unit(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, plain(unit="um", range=[-1, 1])) as (acquisition, latest):
+        for text, value in (("12.5", 0.0125), ("-3e1\n", -0.03)):
+            since, before_s = latest.now, time.monotonic()
+            device.publish("a", text)
+            reading = latest.wait_for("g.a", OK, since)
+            assert reading.value == pytest.approx(value)
+            assert before_s <= reading.time_s <= time.monotonic()
+        device.publish("a", "1234.5")
+        latest.wait_for("g.a", Quality.OVER_RANGE)
+        assert acquisition.status()["l"]["state"] == "open"
+
+
+@pytest.mark.parametrize(
+    ("sent", "quality"),
+    [
+        ("nan", Quality.NOT_FINITE),
+        ("-Infinity", Quality.NOT_FINITE),
+        ("1e999", Quality.NOT_FINITE),
+        ("", Quality.MISMATCH),
+        ("offline", Quality.MISMATCH),
+        ("12,5", Quality.MISMATCH),
+        ("1_000", Quality.MISMATCH),
+        ("0x10", Quality.MISMATCH),
+        ("12.5 mm", Quality.MISMATCH),
+        ('{"v": 1}', Quality.MISMATCH),
+        ("\u0661\u0662", Quality.MISMATCH),  # Arabic digits, which Python's float takes
+    ],
+)
+def test_a_payload_that_is_no_number_has_a_name_and_no_value(
+    broker: Broker, device: Publisher, sent: str, quality: Quality
+) -> None:
+    with listening(broker, device, plain()) as (_, latest):
+        since = latest.now
+        device.publish("a", sent)
+        assert math.isnan(latest.wait_for("g.a", quality, since).value)
+
+
+@pytest.mark.parametrize(
+    ("document", "quality"),
+    [
+        ({"v": None}, Quality.SENSOR_FAULT),
+        ({"v": "1.5"}, Quality.MISMATCH),
+        ({"v": True}, Quality.MISMATCH),
+        ({"v": [1.5]}, Quality.MISMATCH),
+        ({"w": 1.5}, Quality.MISMATCH),
+        ({"v": math.nan}, Quality.NOT_FINITE),
+        ({"v": 10**400}, Quality.NOT_FINITE),
+    ],
+)
+def test_a_document_without_a_number_at_its_path(
+    broker: Broker, device: Publisher, document: dict[str, Any], quality: Quality
+) -> None:
+    with listening(broker, device, timed()) as (_, latest):
+        since = latest.now
+        device.publish("a", json.dumps({"t": datetime.now(UTC).isoformat(), **document}))
+        assert math.isnan(latest.wait_for("g.a", quality, since).value)
+
+
+@pytest.mark.parametrize(
+    "when", [None, "2026-11-23T18:00:00", "now", 12, "", "1970-01-01T00:00:05Z", "9999-12-31T23:59:59Z", True]
+)
+def test_a_value_without_a_time_is_never_used(broker: Broker, device: Publisher, when: Any) -> None:
+    with listening(broker, device, timed()) as (_, latest):
+        since = latest.now
+        device.publish("a", json.dumps({"v": 1.5} if when is None else {"v": 1.5, "t": when}))
+        assert "no time" in (detail := latest.wait_for("g.a", Quality.MISMATCH, since).detail) or "nothing at" in detail
+
+
+def test_the_time_is_that_of_the_source(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (_, latest):
+        since, now_s = latest.now, time.monotonic()
+        device.publish("a", payload(1.5, age_s=0.2))
+        assert latest.wait_for("g.a", OK, since).time_s == pytest.approx(now_s - 0.2, abs=0.1)
+
+
+@pytest.mark.parametrize(("form", "unit_s"), [("unix_s", 1), ("unix_ms", 1e-3), ("unix_us", 1e-6), ("unix_ns", 1e-9)])
+def test_times_as_numbers(broker: Broker, device: Publisher, form: str, unit_s: float) -> None:
+    with listening(broker, device, timed(time_format=form)) as (_, latest):
+        since, now_s, utc_s = latest.now, time.monotonic(), time.time()
+        device.publish("a", json.dumps({"v": 1.5, "t": (utc_s - 0.1) / unit_s}))
+        assert latest.wait_for("g.a", OK, since).time_s == pytest.approx(now_s - 0.1, abs=0.1)
+
+
+def test_an_old_value_is_stale_however_it_comes(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (acquisition, latest):
+        device.publish("a", payload(1.5, age_s=3600))
+        reading = latest.wait_for("g.a", Quality.STALE)
+        assert "measured 3.6e+03 s ago" in reading.detail
+        assert gauge_status(acquisition)["quality"] == "stale"
+        assert not any(r.ok for _, r in latest.history)
+
+
+def test_a_clock_that_is_ahead_gives_way_to_the_arrival_and_is_named(broker: Broker, device: Publisher) -> None:
+    with capture_logs() as logs, listening(broker, device, timed()) as (_, latest):
+        for value in (1.5, 1.6):
+            since, before_s = latest.now, time.monotonic()
+            device.publish("a", payload(value, age_s=-3600))
+            reading = latest.wait_for("g.a", OK, since)
+            assert before_s <= reading.time_s <= time.monotonic(), "never in the future"
+    clocks = [entry for entry in logs if entry["event"] == "clock of a source"]
+    assert len(clocks) == 1, "once, not with every value"
+    assert "3.6e+03 s ahead" in clocks[0]["detail"]
+
+
+def test_out_of_order_and_repeated_values_change_nothing(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (acquisition, latest):
+        newest = payload(1.5, age_s=0.05)
+        device.publish("a", newest)
+        kept = latest.wait_for("g.a", OK)
+        device.publish("a", payload(99.0, age_s=0.2))  # was under way for longer
+        device.publish("a", newest)  # a second copy
+        since = latest.now
+        device.publish("a", payload(1.7))
+        assert latest.wait_for("g.a", OK, since).value == 1.7
+        assert {r.value for _, r in latest.history if r.ok} == {1.5, 1.7}
+        assert kept.value == 1.5
+        assert gauge_status(acquisition)["faults"]["mismatch"] >= 1, "the late one is counted"
+
+
+def test_what_the_broker_kept_is_not_now(broker: Broker, device: Publisher) -> None:
+    device.publish("a", "1.5", retain=True)
+    with acquiring(line_to(broker), {"g": plain()}) as (_, latest):
+        assert "nobody knows how old" in latest.wait_for("g.a", Quality.STALE).detail
+        since = latest.now
+        device.publish("a", "1.6", retain=True)
+        assert latest.wait_for("g.a", OK, since).value == 1.6
+    device.publish("a", payload(1.5, age_s=0.1), retain=True)
+    with acquiring(line_to(broker), {"g": timed()}) as (_, latest):
+        assert latest.wait_for("g.a", OK).value == 1.5, "its own time says that it is new"
+
+
+def test_silence_becomes_a_timeout_while_the_connection_is_up(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (acquisition, latest):
+        device.publish("a", payload(1.5))
+        latest.wait_for("g.a", OK)
+        reading = latest.wait_for("g.a", Quality.TIMEOUT)
+        assert f"nothing new on a for {STALE_AFTER_S:g} s" in reading.detail
+        assert acquisition.status()["l"]["state"] == "open"
+        since = latest.now
+        device.publish("a", payload(1.6))
+        assert latest.wait_for("g.a", OK, since).value == 1.6
+
+
+def test_two_topics_of_one_gauge_do_not_wait_for_each_other(broker: Broker, device: Publisher) -> None:
+    both = gauge(
+        "mqtt",
+        channels=[{"name": n, "topic": n, "value": "/v", "time": "/t", "unit": "mm"} for n in ("a", "b")],
+    )
+    with listening(broker, device, both) as (_, latest):
+        device.publish("a", payload(1.0))
+        assert latest.wait_for("g.a", OK).value == 1.0
+        device.publish("b", payload(2.0))
+        assert latest.wait_for("g.b", OK).value == 2.0
+        since = latest.now
+        while not any(n == "g.a" and r.quality is Quality.TIMEOUT for n, r in latest.history[since:]):
+            published = latest.now
+            device.publish("b", payload(2.0))
+            latest.wait_for_any("g.b", published)
+        assert not any(n == "g.b" and not r.ok for n, r in latest.history[since:]), "b is not silent"
+
+
+def test_channels_out_of_one_document(broker: Broker, device: Publisher) -> None:
+    document = {"topic": "all", "time": "/t", "time_format": "unix_s", "unit": "mm"}
+    channels = [
+        {"name": "a", "value": "/probes/0/x~1y", **document},
+        {"name": "b", "value": "/probes/1/x~1y", "status": {"at": "/state", "ok": ["ok"]}, **document},
+    ]
+    both = gauge("mqtt", channels=channels)
+    with listening(broker, device, both) as (_, latest):
+        sent = {"t": time.time(), "probes": [{"x/y": 1.0}, {"x/y": 2}], "state": "ok"}
+        device.publish("all", json.dumps(sent))
+        assert (latest.wait_for("g.a", OK).value, latest.wait_for("g.b", OK).value) == (1.0, 2.0)
+        device.publish("all", json.dumps({**sent, "t": time.time(), "state": "warming up"}))
+        assert "warming up" in latest.wait_for("g.b", Quality.DEVICE_ERROR).detail
+
+
+def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (acquisition, latest):
+        device.publish("a", payload(1.5))
+        latest.wait_for("g.a", OK)
+        since = latest.now
+        broker.kill()
+        assert math.isnan(latest.wait_for("g.a", Quality.LINE_LOST, since).value)
+        assert acquisition.status()["l"]["state"] == "lost"
+        broker.start()
+        with publisher(broker) as again:
+            again.publish("a", payload(1.6), retain=True)  # kept for a line that is not there yet
+            assert latest.wait_for("g.a", OK, since).value == 1.6
+        assert acquisition.status()["l"]["state"] == "open"
+
+
+def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -> None:
+    with listening(broker, device, timed()) as (_, latest):
+        device.publish("a", payload(1.5))
+        latest.wait_for("g.a", OK)
+        since = latest.now
+        broker.pause()
+        assert "Keep alive" in latest.wait_for("g.a", Quality.LINE_LOST, since).detail
+        broker.go_on()
+
+
+def test_one_damaged_length_is_not_believed_and_two_that_agree_are(broker: Broker, device: Publisher) -> None:
+    memory = TrustMemory(["g.a"], [0.001])
+    judge = ReadingTrust(memory, "g.a", TrustSettings(MotionLimits(acceleration=1.0), False, stale_after_s=30.0))
+    with listening(broker, device, timed(), trust={"g.a": judge}, stale_after_s=30.0) as (_, latest):
+        for value in (1.0, 1.0, 1.0):
+            device.publish("a", payload(value))
+        latest.wait_for("g.a", OK)
+        device.publish("a", payload(5.0))  # damaged on its way: nobody can ask again
+        device.publish("a", payload(1.0001))
+        device.publish("a", payload(1.0002))
+        latest.wait_for_value("g.a", 1.0002)
+        assert 5.0 not in {r.value for _, r in latest.history}
+        device.publish("a", payload(5.0))
+        device.publish("a", payload(5.0))
+        assert "jumped by 4.000 mm" in latest.wait_for("g.a", Quality.DISTRUSTED).detail
