@@ -1,0 +1,139 @@
+"""What the device under test would send if its sensors had other values: by that a number is right, wrong or neither.
+
+A number is right if the device, with its sensor at that number, would have sent what it sent: no more than the last digit
+of the device lies between them. A number out of a damaged reply that is not right is either the driver's fault, or the
+device would itself have sent these very bytes for it: then nobody can know that they are damaged.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from compd.commissioning.conformance.peer import Exchange, Peer, SensorValues
+
+# Of a digit: so far from the values that the device shows alike a number may be. A driver that is off by a digit is out.
+SLACK_DIGITS = 0.25
+ROUNDING = 1e-9  # of the value or the range: floating point
+NEAR = 1e-6  # of the value or the range: two values so near are not those of another channel, or beyond an end
+BISECTIONS = 14
+SMALLEST_STEP = 1e-10  # of the range: where the search for a digit begins
+BEYOND = 1e3  # times the value or the range: a device that shows the same so far away shows no more than its end
+_LEADING = re.compile(rb"(?<![\d.,])([+-]?)([ 0]+)(?=\d)")
+CONTROL = frozenset(b"\r\n\t\x02\x03\x04\x06\x15\x1b")
+
+
+def is_text(reply: bytes) -> bool:
+    """Whether a reply is made of characters that can be printed, and of what frames them."""
+    return bool(reply) and all(0x20 <= byte < 0x7F or byte in CONTROL for byte in reply)
+
+
+class DeviceReplies:
+    """The device's replies as a function of its sensors' values.
+
+    digit : by channel, the smallest step of the device that was seen so far, in the channel's unit.
+    """
+
+    def __init__(self, peer: Peer, sensors: SensorValues) -> None:
+        self.digit: dict[str, float] = {}
+        self._peer = peer
+        self._sensors = sensors
+        self._lengths: dict[bytes, set[int]] = {}  # of replies with values, by request
+
+    def learn(self, exchanges: Sequence[Exchange]) -> None:
+        """Remember how long the replies of a poll without faults are."""
+        for exchange in exchanges:
+            self._lengths.setdefault(exchange.request, set()).add(len(exchange.reply))
+
+    def at(self, exchanges: Sequence[Exchange], **values: float) -> tuple[bytes, ...] | None:
+        """The replies of these exchanges with other values of some channels; None where the simulated device fails."""
+        try:
+            return self._peer.would_answer((e.request for e in exchanges), {**self._sensors.values, **values})
+        except Exception:  # noqa: BLE001  a simulated device is anybody's code: it may have no form for such a value
+            return None
+
+    def is_right(self, channel: str, number: float, exchanges: Sequence[Exchange]) -> bool:
+        """Whether `number` is what the device shows for the present value of `channel`, to its last digit."""
+        value = self._sensors.values[channel]
+        if abs(number - value) <= self._rounding(channel) + self.digit.get(channel, 0.0) / 2:
+            return True
+        if not exchanges or not math.isfinite(value):
+            return False
+        shown = self.at(exchanges)
+        if shown is not None and shown == self.at(exchanges, **{channel: number}):
+            near = abs(number - value) <= NEAR * self._scale(channel)
+            return near or bool(self.channels_shown(exchanges, [channel]))
+        lowest, highest = self.interval(channel, exchanges)
+        if not math.isfinite(lowest) and not math.isfinite(highest):
+            return False
+        slack = SLACK_DIGITS * (highest - lowest) if math.isfinite(highest - lowest) else 0.0
+        return lowest - slack <= number <= highest + slack
+
+    def could_be(self, numbers: Mapping[str, float], exchanges: Sequence[Exchange]) -> bool:
+        """Whether the device would send what was delivered if its sensors had these values."""
+        for nudge in (0.0, SLACK_DIGITS, -SLACK_DIGITS):  # a device that cuts its last digit shows a number just below
+            values = {
+                name: number + math.copysign(nudge * self.digit.get(name, 0.0), number)
+                for name, number in numbers.items()
+            }
+            replies = self.at(exchanges, **values)
+            if replies is not None and all(
+                self._alike(exchange.delivered, reply, exchange.request)
+                for exchange, reply in zip(exchanges, replies, strict=True)
+            ):
+                return True
+        return False
+
+    def interval(self, channel: str, exchanges: Sequence[Exchange]) -> tuple[float, float]:
+        """Lowest and highest value of `channel` that the device shows like the present one; infinite beyond its ends."""
+        value = self._sensors.values[channel]
+        shown = self.at(exchanges)
+        ends = []
+        for direction in (-1.0, 1.0):
+            step = max(self.digit.get(channel, 0.0) / 4, SMALLEST_STEP * self._scale(channel))
+            alike = 0.0
+            while self.at(exchanges, **{channel: value + direction * step}) == shown:
+                alike, step = step, 2 * step
+                if step > BEYOND * self._scale(channel):
+                    alike = math.inf
+                    break
+            for _ in range(BISECTIONS if math.isfinite(alike) else 0):
+                middle = (alike + step) / 2
+                if self.at(exchanges, **{channel: value + direction * middle}) == shown:
+                    alike = middle
+                else:
+                    step = middle
+            ends.append(value + direction * alike)
+        lowest, highest = ends
+        if 0 < highest - lowest < math.inf:
+            self.digit[channel] = min(self.digit.get(channel, math.inf), highest - lowest)
+        return lowest, highest
+
+    def channels_shown(self, exchanges: Sequence[Exchange], channels: Sequence[str]) -> list[str]:
+        """Those of `channels` that the replies depend on."""
+        shown = self.at(exchanges)
+        return [
+            name
+            for name in channels
+            if any(self.at(exchanges, **{name: end}) != shown for end in self._sensors.extents[name])
+        ]
+
+    def _scale(self, channel: str) -> float:
+        return max(abs(self._sensors.values[channel]), *map(abs, self._sensors.extents[channel]))
+
+    def _rounding(self, channel: str) -> float:
+        return ROUNDING * self._scale(channel)
+
+    def _alike(self, delivered: bytes, reply: bytes, request: bytes) -> bool:
+        """Whether two replies are the same but for blanks or zeros before a number."""
+        if delivered == reply:
+            return True
+        if not (is_text(delivered) and is_text(reply)):
+            return False
+        fixed = len(self._lengths.get(request, ())) < 2
+
+        def plain(text: bytes) -> bytes:
+            return _LEADING.sub(lambda match: match[1] + (b"0" * len(match[2]) if fixed else b""), text)
+
+        return plain(delivered) == plain(reply)
