@@ -20,7 +20,7 @@ NEAR = 1e-6  # of the value or the range: two values so near are not those of an
 BISECTIONS = 14
 SMALLEST_STEP = 1e-10  # of the range: where the search for a digit begins
 BEYOND = 1e3  # times the value or the range: a device that shows the same so far away shows no more than its end
-_LEADING = re.compile(rb"(?<![\d.,])([+-]?)([ 0]+)(?=\d)")
+_LEADING = re.compile(rb"(?<!\d)(?<!\d[.,])( *)([+-]?)([ 0]*)(?=\d)")
 CONTROL = frozenset(b"\r\n\t\x02\x03\x04\x06\x15\x1b")
 
 
@@ -60,8 +60,7 @@ class DeviceReplies:
             return True
         if not exchanges or not math.isfinite(value):
             return False
-        shown = self.at(exchanges)
-        if shown is not None and shown == self.at(exchanges, **{channel: number}):
+        if self._shows(exchanges, {channel: number}):
             near = abs(number - value) <= NEAR * self._scale(channel)
             return near or bool(self.channels_shown(exchanges, [channel]))
         lowest, highest = self.interval(channel, exchanges)
@@ -69,6 +68,13 @@ class DeviceReplies:
             return False
         slack = SLACK_DIGITS * (highest - lowest) if math.isfinite(highest - lowest) else 0.0
         return lowest - slack <= number <= highest + slack
+
+    def are_right(self, numbers: Mapping[str, float], exchanges: Sequence[Exchange]) -> bool:
+        """Whether all of `numbers` surely are right, which is known sooner than of each by itself."""
+        values = self._sensors.values
+        far = {k: v for k, v in numbers.items() if not abs(v - values[k]) <= self._rounding(k) + self.digit.get(k, 0) / 2}
+        near = all(abs(v - values[k]) <= NEAR * self._scale(k) for k, v in far.items())
+        return not far or (near and bool(exchanges) and self._shows(exchanges, far))
 
     def could_be(self, numbers: Mapping[str, float], exchanges: Sequence[Exchange]) -> bool:
         """Whether the device would send what was delivered if its sensors had these values."""
@@ -88,19 +94,18 @@ class DeviceReplies:
     def interval(self, channel: str, exchanges: Sequence[Exchange]) -> tuple[float, float]:
         """Lowest and highest value of `channel` that the device shows like the present one; infinite beyond its ends."""
         value = self._sensors.values[channel]
-        shown = self.at(exchanges)
         ends = []
         for direction in (-1.0, 1.0):
             step = max(self.digit.get(channel, 0.0) / 4, SMALLEST_STEP * self._scale(channel))
             alike = 0.0
-            while self.at(exchanges, **{channel: value + direction * step}) == shown:
+            while self._shows(exchanges, {channel: value + direction * step}):
                 alike, step = step, 2 * step
                 if step > BEYOND * self._scale(channel):
                     alike = math.inf
                     break
             for _ in range(BISECTIONS if math.isfinite(alike) else 0):
                 middle = (alike + step) / 2
-                if self.at(exchanges, **{channel: value + direction * middle}) == shown:
+                if self._shows(exchanges, {channel: value + direction * middle}):
                     alike = middle
                 else:
                     step = middle
@@ -112,12 +117,18 @@ class DeviceReplies:
 
     def channels_shown(self, exchanges: Sequence[Exchange], channels: Sequence[str]) -> list[str]:
         """Those of `channels` that the replies depend on."""
-        shown = self.at(exchanges)
         return [
             name
             for name in channels
-            if any(self.at(exchanges, **{name: end}) != shown for end in self._sensors.extents[name])
+            if not all(self._shows(exchanges, {name: end}) for end in self._sensors.extents[name])
         ]
+
+    def _shows(self, exchanges: Sequence[Exchange], values: Mapping[str, float]) -> bool:
+        """Whether the device, with other values of some channels, would have sent what it sent."""
+        replies = self.at(exchanges, **values)
+        return replies is not None and all(
+            reply == exchange.reply for reply, exchange in zip(replies, exchanges, strict=True)
+        )
 
     def _scale(self, channel: str) -> float:
         return max(abs(self._sensors.values[channel]), *map(abs, self._sensors.extents[channel]))
@@ -134,6 +145,6 @@ class DeviceReplies:
         fixed = len(self._lengths.get(request, ())) < 2
 
         def plain(text: bytes) -> bytes:
-            return _LEADING.sub(lambda match: match[1] + (b"0" * len(match[2]) if fixed else b""), text)
+            return _LEADING.sub(lambda m: m[2] + (b"0" * (len(m[1]) + len(m[3])) if fixed else b""), text)
 
         return plain(delivered) == plain(reply)

@@ -25,7 +25,7 @@ LARGEST = 1e7  # in the channel's unit: no gauge shows more
 STEPS_PER_DECADE = (1.0, 2.0, 5.0)
 BISECTIONS = 60  # from one step of a decade to the next, down to the last digit
 MOST_POWERS = 32  # of 2 digits, where counters and signs roll over
-MANY_POLLS = 5000  # a driver that is wrong every thousandth time is wrong five times
+MANY_POLLS = 3000  # a driver that is wrong every thousandth time is wrong three times
 MOST_WITHOUT_VALUE = 0.02  # of them: single numbers that mean something else, such as 85.0 degC of a DS18B20
 SMALL_STEPS = 20
 
