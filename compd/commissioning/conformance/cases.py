@@ -12,6 +12,7 @@ from compd.commissioning.conformance.value_cases import VALUE_CASES
 from compd.commissioning.conformance.waiting_cases import waits
 from compd.commissioning.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
+FIRST_OF_ALL = ("waits, retries", "units and scale")  # a driver that fails in them is tried no further
 CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *REPLY_CASES)
 
 
@@ -28,13 +29,13 @@ def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseRes
             break
         session.settle()
     if fault is not None:
-        yield CaseResult("units and scale", required, fault, "FAIL")
+        yield CaseResult(FIRST_OF_ALL[1], required, fault, "FAIL")
         return
     digits = ", ".join(
         f"{channel.name} {session.replies.digit[channel.name]:.2g} {channel.unit}"
         for channel in session.gauge.channels
     )
-    yield CaseResult("units and scale", required, f"one digit is {digits}", "pass")
+    yield CaseResult(FIRST_OF_ALL[1], required, f"one digit is {digits}", "pass")
     cases = [*CASES, *(CASES_ON_RTU if subject.registers and not subject.over_tcp else ())]
     for case in cases:
         yield run_case(case, session, subject)

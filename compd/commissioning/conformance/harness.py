@@ -122,12 +122,18 @@ class ConformanceSession:
         names = [channel.name for channel in self.gauge.channels]
         if len(set(names)) != len(names):
             return f"channels named twice: {', '.join(sorted({name for name in names if names.count(name) > 1}))}"
+        identity = (self.gauge.reply_identity or "").encode("latin-1")
         for look in range(LOOKS):
             poll = self.poll()
             if not poll.ok:
                 return f"a poll without any fault gave {poll}"
             if self.replies.at(self.exchanges) != self.replies.at(self.exchanges):
                 return "the simulated device answers the same request differently while its sensors stand still"
+            if [channel.name for channel in self.gauge.channels] != names:
+                return f"`channels` were {', '.join(names)}, and are others after {look + 1} polls"
+            for exchange in self.exchanges:
+                if not exchange.reply.startswith(identity):
+                    return f"`reply_identity` is {identity!r}, and a reply is {exchange.reply!r}"
             if look < DIGITS_FROM:
                 for name in names:
                     self.replies.interval(name, self.exchanges)
@@ -209,12 +215,13 @@ class ConformanceSession:
             return wrong, []
         if not wrong and self.exchanges and self.replies.could_be(numbers, self.exchanges):
             return wrong, off
-        return wrong + off, []
+        return off + wrong, []
 
     def _difference(self, channel: Channel, reading: Reading) -> str:
         value = self.sensors.values[channel.name]
         text = f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, the sensor had {value:.9g}"
-        if digit := self.replies.digit.get(channel.name):
+        digit = self.replies.digit.get(channel.name)
+        if digit and math.isfinite(value):
             digits = abs(reading.value - value) / digit
             text += f", {digits:.3g} of the device's digits ({digit:.3g} {channel.unit}) away"
         return text

@@ -182,6 +182,22 @@ def _exchanged_characters(session: ConformanceSession, subject: Subject) -> Case
     return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints)
 
 
+def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """Whole replies whose checksum, wherever one is known in them, is wrong in a single byte."""
+    case = "a wrong checksum"
+    if subject.registers or not subject.exact:
+        return CaseResult(case, "", BY_REGISTERS if subject.registers else IN_VIRTUAL_TIME, "-")
+    complaints: list[str] = []
+    tried = 0
+    for reply in _replies(session):
+        for forgery in reply.text.checksums():
+            complaints += _taken(session, reply, forgery, reply.channels)
+            tried += 1
+    if not tried:
+        return CaseResult(case, "", "its replies have none that is known here", "-")
+    return result_of(case, DAMAGED, f"{tried} of them, no number", complaints)
+
+
 def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     """A second device of the same kind, or one that is set otherwise, answers in place of this one."""
     case = "another unit, or other settings"
@@ -190,8 +206,9 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     complaints: list[str] = []
     undetectable: list[str] = []
     tried = 0
+    identity = (session.gauge.reply_identity or "").encode("latin-1")
     for reply in _replies(session):
-        for forgery in reply.text.addresses():
+        for forgery in [*reply.text.addresses(), *reply.text.identities(identity)]:
             complaints += _taken(session, reply, forgery, reply.channels)
             tried += 1
     requests = [exchange.request for exchange in _good_poll(session)]
@@ -290,6 +307,7 @@ REPLY_CASES: tuple[Case, ...] = (
     _bit_flips,
     _bytes_lost,
     _forged,
+    _wrong_checksums,
     _another_unit,
     _exchanged_characters,
     _errors,

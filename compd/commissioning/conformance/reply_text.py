@@ -118,6 +118,20 @@ class ReplyText:
             return f"{(int(token) + 1) % 10 ** len(token):0{len(token)}d}".encode()
         return bytes([token[0] % 0xFE + 1])
 
+    def checksums(self) -> Iterator[Forgery]:
+        """Replies in which one byte of the checksum is another one."""
+        for place in range(self._check_place.start, self._check_place.stop):
+            byte = self.base[place : place + 1]
+            other = bytes([byte[0] ^ 0x40]) if not self.is_text else (b"0" if byte != b"0" else b"1")
+            reply = self.base[:place] + other + self.base[place + 1 :]
+            yield Forgery(f"byte {place}, of the checksum, is {other!r} in place of {byte!r}", reply)
+
+    def identities(self, identity: bytes) -> Iterator[Forgery]:
+        """Replies in which one byte of what says whose they are is another one."""
+        for place in range(len(identity)):
+            other = bytes([self.base[place] + 1 & 0x7F])
+            yield self._with(slice(place, place + 1), other, f"byte {place}, of `reply_identity`, is {other!r}")
+
     def errors(self) -> Iterator[Forgery]:
         """Error texts in place of the reply: as short as they are, and as long as the reply."""
         end = self.terminator

@@ -46,9 +46,11 @@ def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
         session.sensors.advance()
         session.sensors.values[channel.name] = math.nan
         poll = session.poll(new_values=False)
+        complaints += [f"{channel.name} off: {text}" for text in poll.wrong]
+        if place >= len(poll.readings):
+            continue
         quality = poll.readings[place].quality
         observed.add(str(quality))
-        complaints += [f"{channel.name} off: {text}" for text in poll.wrong]
         if quality not in NO_VALUE | NO_ANSWER:
             complaints.append(f"{channel.name} off: {poll}")
     complaints += complaints_of(session.recover()[1], GOOD)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from random import Random
+
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.case_result import (
     DAMAGED,
     GOOD,
     IN_VIRTUAL_TIME,
     NO_ANSWER,
+    NO_NUMBER,
     Case,
     CaseResult,
     Subject,
     complaints_of,
+    every_reply,
     faulty_polls,
     one_poll_each,
     result_of,
@@ -21,6 +25,8 @@ from compd.gauge import Quality
 
 ENDS_OF_MAPS = (2, 3, 4)  # of them, those with which slaves answer where their registers end
 
+IN_A_ROW = 5  # more than any driver counts before it does something else
+IN_ANY_ORDER = 300
 BY_TCP = "TCP's own checksum keeps it from the driver"
 
 
@@ -132,6 +138,28 @@ def slowest_line(session: ConformanceSession, baud: int) -> CaseResult:
     return result_of(f"the line at {baud} baud", GOOD, "ok", complaints)
 
 
+def _many_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """The same fault several times, then all kinds in any order; a good poll is right in between."""
+    case = "faults in a row, and in any order"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    kinds = (faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5))
+    complaints = []
+    for fault in kinds:
+        for number in range(IN_A_ROW):
+            texts = complaints_of(session.poll(every_reply(fault)), NO_NUMBER | GOOD)
+            complaints += [f"{fault.name}, for the {number + 1}. time: {text}" for text in texts]
+        complaints += complaints_of(session.recover()[1], GOOD)
+    random = Random(0)
+    for _ in range(IN_ANY_ORDER):
+        chosen = [random.choice((*kinds, faults.NONE, faults.doubled(), faults.split(0.5))) for _ in range(2)]
+        texts = complaints_of(session.poll(chosen), NO_NUMBER | GOOD)
+        complaints += [f"{' and '.join(fault.name for fault in chosen)}: {text}" for text in texts]
+    session.settle()
+    complaints += complaints_of(session.recover()[1], GOOD)
+    return result_of(case, NO_NUMBER | GOOD, f"{len(kinds) * IN_A_ROW + IN_ANY_ORDER} of them", complaints)
+
+
 WIRE_CASES: tuple[Case, ...] = (
     _time_stamp,
     _no_reply,
@@ -143,6 +171,7 @@ WIRE_CASES: tuple[Case, ...] = (
     _split,
     _doubled,
     _cut,
+    _many_faults,
     _unplugged,
 )
 CASES_ON_RTU: tuple[Case, ...] = (_end_of_map,)
