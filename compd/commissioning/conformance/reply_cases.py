@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -85,9 +86,10 @@ def _damaged(
 ) -> CaseResult:
     """Replies with small damage: no number that the device would not itself have sent in these very bytes."""
     complaints, after, undetectable = [], [], []
-    for reply_faults in tries:
+    for reply_faults, sign in itertools.product(tries, (1.0, -1.0)):
         name = reply_faults[-1].name
-        poll = session.poll(reply_faults)
+        _advance_on_one_side(session, sign)
+        poll = session.poll(reply_faults, new_values=False)
         delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
         complaints += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
         undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
@@ -97,11 +99,22 @@ def _damaged(
     if subject.checksum:
         complaints += undetectable
     if undetectable and not (after or complaints):
-        text = f"{len(undetectable)} of {len(tries)} give another number that the device could have sent"
+        text = f"{len(undetectable)} of {2 * len(tries)} give another number that the device could have sent"
         return CaseResult(
             case, "no wrong number, with a checksum", f"{text}: not detectable on this wire, {advice}", "-"
         )
-    return result_of(case, DAMAGED | NO_ANSWER | GOOD, f"{len(tries)} of them, no wrong number", after or complaints)
+    return result_of(
+        case, DAMAGED | NO_ANSWER | GOOD, f"{2 * len(tries)} of them, no wrong number", after or complaints
+    )
+
+
+def _advance_on_one_side(session: ConformanceSession, sign: float) -> None:
+    """New values, all of one sign where the device can show them: a lost minus must not go unseen."""
+    session.sensors.advance()
+    for name, value in session.sensors.values.items():
+        lowest, highest = session.sensors.whole.get(name, session.sensors.extents[name])
+        if lowest <= sign * abs(value) <= highest:
+            session.sensors.values[name] = sign * abs(value)
 
 
 def _forged(session: ConformanceSession, subject: Subject) -> CaseResult:
@@ -208,6 +221,8 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     tried = 0
     identity = (session.gauge.reply_identity or "").encode("latin-1")
     for reply in _replies(session):
+        if reply.channels and (other := reply.text.without(identity)):
+            complaints.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
         for forgery in [*reply.text.addresses(), *reply.text.identities(identity)]:
             complaints += _taken(session, reply, forgery, reply.channels)
             tried += 1

@@ -55,6 +55,10 @@ class ReplyText:
     def is_text(self) -> bool:
         return is_text(self.base)
 
+    def without(self, identity: bytes) -> bytes:
+        """A reply that does not begin with `identity`; b"" if all do."""
+        return next((reply for reply in self._alike if not reply.startswith(identity)), b"")
+
     @property
     def terminator(self) -> bytes:
         """The control characters at the end."""

@@ -30,7 +30,6 @@ IN_ANY_ORDER = 300
 BY_TCP = "TCP's own checksum keeps it from the driver"
 
 
-
 def _time_stamp(session: ConformanceSession, _: Subject) -> CaseResult:
     """The harness checks every stamp of every poll; here the reply takes long to come."""
     return faulty_polls(session, "time stamp: when asked, not when answered", GOOD, one_poll_each(faults.late(0.5)))
