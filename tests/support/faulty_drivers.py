@@ -1,7 +1,7 @@
 r"""Drivers that are wrong in one way each, and the devices that they are for; `compd driver test` must find every one.
 
-The devices are of four kinds: a comparator that answers ``?`` CR by ``+01.2345mm`` CR LF, the same behind an address, with
-and without a checksum, two channels in one reply, and registers.
+The devices are of four kinds: a comparator that answers ``?`` CR by ``+01.2345mm`` CR LF, the same behind an address,
+with and without a checksum, two channels in one reply, and registers.
 """
 
 from __future__ import annotations

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from compd.commissioning.conformance.case_result import Case, CaseResult, Subject
+from compd.commissioning.conformance.damage_cases import DAMAGE_CASES
 from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.reply_cases import REPLY_CASES
 from compd.commissioning.conformance.value_cases import VALUE_CASES
 from compd.commissioning.conformance.waiting_cases import WAITING_CASES, waits, waits_after_faults
 from compd.commissioning.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
-CASES: tuple[Case, ...] = (*WAITING_CASES, *VALUE_CASES, *WIRE_CASES, *REPLY_CASES)
+CASES: tuple[Case, ...] = (*WAITING_CASES, *VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
 # A driver that fails in one of these is tried no further: each poll would take its time, or be wrong.
 FIRST_CASES = ("waits", "units and scale", "waits after faults")
 

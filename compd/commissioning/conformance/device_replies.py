@@ -1,8 +1,8 @@
-"""What the device under test would send if its sensors had other values: by that a number is right, wrong or neither.
+"""What the device would send if its sensors had other values: by that a number is right, wrong, or neither.
 
-A number is right if the device, with its sensor at that number, would have sent what it sent: no more than the last digit
-of the device lies between them. A number out of a damaged reply that is not right is either the driver's fault, or the
-device would itself have sent these very bytes for it: then nobody can know that they are damaged.
+A number is right if the device, with its sensor at that number, would have sent what it sent: no more than the last
+digit of the device lies between them. A number out of a damaged reply that is not right is either the driver's fault,
+or the device would itself have sent these very bytes for it: then nobody can know that they are damaged.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 from compd.commissioning.conformance.peer import Exchange, Peer, SensorValues
 
-# Of a digit: so far from the values that the device shows alike a number may be. A driver that is off by a digit is out.
+# Of a digit: so far from the values that the device shows alike a number may be. One that is off by a digit is out.
 SLACK_DIGITS = 0.25
 ROUNDING = 1e-9  # of the value or the range: floating point
 NEAR = 1e-6  # of the value or the range: two values so near are not those of another channel, or beyond an end
@@ -99,7 +99,7 @@ class DeviceReplies:
         return False
 
     def interval(self, channel: str, exchanges: Sequence[Exchange]) -> tuple[float, float]:
-        """Lowest and highest value of `channel` that the device shows like the present one; infinite beyond its ends."""
+        """Lowest and highest value of `channel` that the device shows like the present one; infinite at its ends."""
         value = self._sensors.values[channel]
         ends = []
         for direction in (-1.0, 1.0):
@@ -144,7 +144,7 @@ class DeviceReplies:
         return ROUNDING * self._scale(channel)
 
     def _alike(self, delivered: bytes, reply: bytes, request: bytes) -> bool:
-        """Whether two replies are the same but for blanks or zeros before a number, and the sign of an exponent of 0."""
+        """Whether two replies are the same, but for what stands before a number, and the sign of an exponent of 0."""
         if delivered == reply:
             return True
         if not (is_text(delivered) and is_text(reply)):

@@ -1,4 +1,4 @@
-"""Options of a gauge with one of them changed: another unit of the same kind, or a device that somebody has set otherwise."""
+"""Options of a gauge with one of them changed: another unit of its kind, or a device that was set otherwise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from compd.gauge import GaugeOptions
 
 
 def other_settings(options: GaugeOptions) -> Iterator[tuple[str, GaugeOptions]]:
-    """What was changed ("address=2") and the options, for each value that is a number, a digit, a choice or a switch."""
+    """What was changed ("address=2") and the options; for whole numbers, digits, choices and switches."""
     for name, field in type(options).model_fields.items():
         if name in GaugeOptions.model_fields:
             continue

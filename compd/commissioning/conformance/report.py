@@ -107,7 +107,8 @@ def driver_under_test(
 def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
     """Every case on every kind of wire, as they come: (wire, result).
 
-    A driver that waits by itself, or is wrong without any fault, is tried no further. First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; on each kind once at SLOWEST_BAUD.
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
+    in one of FIRST_CASES is tried no further.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         for wire, result in _cases_on("virtual time", driver.virtual(), driver.subject(False, True)):
