@@ -89,6 +89,7 @@ class Modbus(Gauge[RegisterLine]):
                 "scale": 1e-6,
                 "unit": "mm",
                 "invalid": [2147483647],
+                "under_range": [-2147483648],
             },
         ],
     }

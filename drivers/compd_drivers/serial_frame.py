@@ -192,9 +192,16 @@ class SerialFrame(Gauge[ByteLine]):
                 "type": "int32",
                 "byte_order": "big",
                 "unit": "nm",
-                "invalid": {2147483647: "sensor_fault"},
+                "invalid": {2147483647: "sensor_fault", -2147483648: "under_range"},
             },
-            {"name": "b", "at": 6, "type": "int16", "unit": "um", "scale": 0.1, "invalid": {-32768: "sensor_fault"}},
+            {
+                "name": "b",
+                "at": 6,
+                "type": "int16",
+                "unit": "um",
+                "scale": 0.1,
+                "invalid": {-32768: "sensor_fault", 32767: "over_range"},
+            },
         ],
     }
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.conformance.cases import CaseResult
+    from compd.commissioning.conformance.case_result import CaseResult
     from compd.commissioning.conformance.report import DriverUnderTest
 
 driver = typer.Typer(no_args_is_help=True, help="Try gauge drivers.")

@@ -90,15 +90,29 @@ def flipped(bit: int) -> Fault:
     return Fault(f"bit {bit} turned", act)
 
 
+def lost(place: int, count: int = 1) -> Fault:
+    """`count` bytes from `place` on never come; both count through the reply."""
+
+    def act(reply: bytes, _: float) -> Sequence[Piece]:
+        return [Piece(0.0, reply[:place] + reply[place + count :])]
+
+    return Fault(f"{count} byte{'s' * (count != 1)} lost from byte {place} on", act)
+
+
+def repeated(place: int) -> Fault:
+    """The byte at `place` comes twice."""
+    return Fault(f"byte {place} twice", lambda reply, _: [Piece(0.0, reply[: place + 1] + reply[place:])])
+
+
 def replaced(data: bytes) -> Fault:
     """Other bytes in place of the reply."""
     return Fault(f"{data!r} in its place", lambda reply, _: [Piece(0.0, data)])
 
 
-Forgery = Literal["unit", "function", "length", "transaction"]
+ForgedPart = Literal["unit", "function", "length", "transaction"]
 
 
-def forged(what: Forgery, over_tcp: bool) -> Fault:
+def forged(what: ForgedPart, over_tcp: bool) -> Fault:
     """A whole Modbus reply, checksum right, to something else than what was asked."""
 
     def act(reply: bytes, _: float) -> Sequence[Piece]:
@@ -129,7 +143,7 @@ def refused(code: int, over_tcp: bool) -> Fault:
     return Fault(f"exception {code}", act)
 
 
-def _other(frame: bytes, what: Forgery) -> bytes:
+def _other(frame: bytes, what: ForgedPart) -> bytes:
     """Unit, function, byte count, registers: with one of them another one."""
     unit, function, count, registers = frame[0], frame[1], frame[2], frame[3:]
     match what:

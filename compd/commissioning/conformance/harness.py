@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from compd.clock import Clock
+from compd.commissioning.conformance.device_replies import DeviceReplies
 from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.peer import Peer, SensorValues
-from compd.gauge import Gauge, LineFault, Quality, Reading, bad
+from compd.commissioning.conformance.peer import Exchange, Peer, SensorValues
+from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad
 from compd.live.acquisition.acquisition import NOTHING_UNDER_WAY
 
-LOOKS = 24  # fault-free polls that the tolerance, a gauge's last digit, is taken from
-COARSEST = 0.01  # of the range: a difference beyond it is no last digit, but a wrong unit, scale or sign
-# A wrong number is further off than this many of the largest difference that was seen without faults.
-MARGIN = 2.0
-SMALLEST = 1e-9  # of the range: rounding in floating point
+LOOKS = 24  # fault-free polls before all else
+DIGITS_FROM = 2  # of them, those from which the device's digit is taken
+STAMP_ROUNDING_S = 1e-9
 MOST_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
 # In line timeouts, after a request without an answer: the wait for the reply, then the line is drained for one more.
@@ -25,10 +24,14 @@ ASKED_AGAIN_TIMEOUTS = 2.0
 
 
 class ConformanceWire(Protocol):
-    """A wire with a device at its far end: virtual, pty or TCP."""
+    """A wire with a device at its far end: virtual, pty or TCP.
+
+    exact : in virtual time.
+    """
 
     peer: Peer
     timeout_s: float
+    exact: bool
 
     @property
     def clock(self) -> Clock: ...
@@ -40,10 +43,17 @@ class ConformanceWire(Protocol):
 
 @dataclass(frozen=True)
 class Poll:
-    """The readings of one poll. `wrong`: every OK reading that should not be one, in words."""
+    """The readings of one poll.
+
+    wrong : every OK reading that should not be one, in words.
+    undetectable : wrong numbers that the device would itself have sent in these bytes, in words.
+    duration_s : on the wire's clock.
+    """
 
     readings: Sequence[Reading]
     wrong: tuple[str, ...]
+    undetectable: tuple[str, ...] = ()
+    duration_s: float = 0.0
 
     @property
     def qualities(self) -> frozenset[Quality]:
@@ -51,12 +61,12 @@ class Poll:
 
     @property
     def ok(self) -> bool:
-        return self.qualities == {Quality.OK} and not self.wrong
+        return self.qualities == {Quality.OK} and not self.wrong and not self.undetectable
 
     def __str__(self) -> str:
         qualities = ", ".join(sorted(self.qualities))
         details = sorted({reading.detail for reading in self.readings if reading.detail})
-        return "; ".join([qualities, *self.wrong] if self.wrong else [qualities, *details[:1]])
+        return "; ".join([qualities, *(self.wrong or self.undetectable or details[:1])])
 
 
 @dataclass
@@ -67,50 +77,64 @@ class ConformanceSession:
     gauge: Gauge[Any]
     wire: ConformanceWire
     sensors: SensorValues
-    tolerance: dict[str, float] = field(default_factory=dict)  # by channel, in its unit
+    most_requests: int = 0  # of a poll without faults
     _line: Any = None
+    replies: DeviceReplies = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.replies = DeviceReplies(self.wire.peer, self.sensors)
+
+    @property
+    def exchanges(self) -> Sequence[Exchange]:
+        """Those of the last poll."""
+        return self.wire.peer.exchanges
 
     def poll(self, faults: Iterable[Fault] = (), new_values: bool = True) -> Poll:
         """One poll; `faults`: one for each of its replies, in order; `new_values`: with new values at the sensors."""
         if new_values:
             self.sensors.advance()
-        self.wire.peer.set_faults(faults)
-        self.sensors.sensed_s = math.nan
+        faults = tuple(faults)
+        self.wire.peer.begin_poll(faults)
+        self.sensors.sensed_s.clear()
         started_s = self.wire.clock.monotonic()
-        try:
-            readings = self._read()
-        finally:
-            self.wire.peer.set_faults(())
-        return Poll(readings, tuple(self._wrong(readings, started_s)))
+        readings, fault = self._read()
+        duration_s = self.wire.clock.monotonic() - started_s
+        wrong, undetectable = self._judge(readings, started_s)
+        poll = Poll(readings, tuple(wrong), tuple(undetectable), duration_s)
+        if fault is not None:
+            self._after(fault)
+        elif poll.ok and not faults:
+            self.replies.learn(self.exchanges)
+            self.most_requests = max(self.most_requests, len(self.exchanges))
+        return poll
 
     def recover(self) -> tuple[int, Poll]:
         """Poll without faults until all is good: how many polls that took, and the last one."""
         polls = [self.poll()]
         while polls[-1].qualities != {Quality.OK} and len(polls) < MOST_RECOVERING_POLLS:
             polls.append(self.poll())
-        return len(polls), Poll(polls[-1].readings, tuple(text for poll in polls for text in poll.wrong))
+        last = polls[-1]
+        wrong = tuple(text for poll in polls for text in poll.wrong + poll.undetectable)
+        return len(polls), Poll(last.readings, wrong, (), last.duration_s)
 
     def calibrate(self) -> str | None:
-        """Set each channel's tolerance from fault-free polls; says what is wrong where the differences are too large.
-
-        tolerance = MARGIN x largest difference + SMALLEST x range; a difference beyond COARSEST x range is an error.
-        """
-        differences: dict[str, list[float]] = {channel.name: [] for channel in self.gauge.channels}
-        extents: dict[str, list[float]] = {channel.name: [] for channel in self.gauge.channels}
-        self.tolerance = dict.fromkeys(differences, math.inf)
-        for _ in range(LOOKS):
+        """Learn the device's digit from fault-free polls; what is wrong with these, if anything is."""
+        names = [channel.name for channel in self.gauge.channels]
+        if len(set(names)) != len(names):
+            return f"channels named twice: {', '.join(sorted({name for name in names if names.count(name) > 1}))}"
+        for look in range(LOOKS):
             poll = self.poll()
             if not poll.ok:
                 return f"a poll without any fault gave {poll}"
-            for channel, reading in zip(self.gauge.channels, poll.readings, strict=True):
-                differences[channel.name].append(abs(reading.value - self.sensors.values[channel.name]))
-                extents[channel.name].append(self.sensors.values[channel.name])
-        for name, off in differences.items():
-            extent = max(extents[name]) - min(extents[name])
-            largest = max(off)
-            if largest > COARSEST * extent:
-                return f"channel {name} is off by {largest:.6g} of a range of {extent:.6g}: wrong unit, scale or sign"
-            self.tolerance[name] = MARGIN * largest + SMALLEST * extent
+            if self.replies.at(self.exchanges) != self.replies.at(self.exchanges):
+                return "the simulated device answers the same request differently while its sensors stand still"
+            if [channel.name for channel in self.gauge.channels] != names:
+                return f"`channels` were {', '.join(names)}, and are others after {look + 1} polls"
+            if look < DIGITS_FROM:
+                for name in names:
+                    self.replies.interval(name, self.exchanges)
+        for name, (lowest, highest) in self.sensors.extents.items():
+            self.replies.digit.setdefault(name, highest - lowest)  # a switch: half of it is all it shows
         return None
 
     def settle(self) -> None:
@@ -131,19 +155,21 @@ class ConformanceSession:
             self._line.close()
         self.wire.close()
 
-    def _read(self) -> Sequence[Reading]:
+    def _read(self) -> tuple[Sequence[Reading], LineFault | None]:
+        """The readings, and the fault of the whole poll in place of them."""
         try:
             if self._line is None:
                 self._line = self.wire.open()
-            return self.gauge.read(self._line)
-        except LineFault as fault:
-            now_s = self.wire.clock.monotonic()
-            self._after(fault)
-            return [bad(now_s, fault.quality, fault.detail)] * len(self.gauge.channels)
+            readings = list(self.gauge.read(self._line))
+            if not all(isinstance(reading, Reading) for reading in readings):
+                raise TypeError("`read` returned something else than readings")
+            return readings, None
+        except LineFault as caught:
+            fault = caught
         except Exception as error:  # noqa: BLE001  a driver is anybody's code: what it raises is a finding
-            self._after(LineFault(Quality.DRIVER_ERROR))
-            text = f"raised {type(error).__name__}: {error}"
-            return [bad(self.wire.clock.monotonic(), Quality.DRIVER_ERROR, text)] * len(self.gauge.channels)
+            fault = LineFault(Quality.DRIVER_ERROR, f"raised {type(error).__name__}: {error}")
+        nothing = bad(self.wire.clock.monotonic(), fault.quality, fault.detail)
+        return [nothing] * len(self.gauge.channels), fault
 
     def _after(self, fault: LineFault) -> None:
         """As the line's thread does: drain, or close what is lost."""
@@ -159,22 +185,53 @@ class ConformanceSession:
         self._line.close()
         self._line = None
 
-    def _wrong(self, readings: Sequence[Reading], started_s: float) -> Iterable[str]:
+    def _judge(self, readings: Sequence[Reading], started_s: float) -> tuple[list[str], list[str]]:
+        """Every OK reading that should not be one: the driver's fault, and what nobody can detect."""
         channels = self.gauge.channels
         if len(readings) != len(channels):
-            yield f"{len(readings)} readings for {len(channels)} channels"
-            return
+            return [f"{len(readings)} readings for {len(channels)} channels"], []
+        wrong, off = [], []
+        numbers = {c.name: r.value for c, r in zip(channels, readings, strict=True) if r.ok}
+        right = self.replies.are_right(numbers, self.exchanges)
         for channel, reading in zip(channels, readings, strict=True):
             if not reading.ok:
                 if not math.isnan(reading.value):
-                    yield f"{channel.name}: {reading.quality} with a number, {reading.value!r}"
+                    wrong.append(f"{channel.name}: {reading.quality} with a number, {reading.value!r}")
                 continue
-            value = self.sensors.values[channel.name]
-            if not abs(reading.value - value) <= self.tolerance.get(channel.name, math.inf):
-                yield f"{channel.name}: {reading.value:.6g} {channel.unit} as ok, the sensor had {value:.6g}"
-            if reading.time_s < started_s:
-                yield f"{channel.name}: time stamp {(started_s - reading.time_s) * 1e3:.3f} ms before the poll began"
-            # an understated age: stamped after the device had looked
-            if reading.time_s > self.sensors.sensed_s + SMALLEST:
-                late_ms = (reading.time_s - self.sensors.sensed_s) * 1e3
-                yield f"{channel.name}: time stamp {late_ms:.3f} ms after the device had sampled"
+            if not isinstance(reading.value, int | float) or not math.isfinite(reading.value):
+                wrong.append(f"{channel.name}: {reading.value!r} as ok is no number")
+                continue
+            if not self.exchanges:
+                wrong.append(f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, and nothing was asked")
+                continue
+            if not right and not self.replies.is_right(channel.name, reading.value, self.exchanges):
+                off.append(self._difference(channel, reading))
+            wrong += self._stamp(channel, reading, started_s)
+        if not off:
+            return wrong, []
+        if not wrong and self.exchanges and self.replies.could_be(numbers, self.exchanges):
+            return wrong, off
+        return off + wrong, []
+
+    def _difference(self, channel: Channel, reading: Reading) -> str:
+        value = self.sensors.values[channel.name]
+        text = f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, the sensor had {value:.9g}"
+        digit = self.replies.digit.get(channel.name)
+        if digit and math.isfinite(value):
+            digits = abs(reading.value - value) / digit
+            text += f", {digits:.3g} of the device's digits ({digit:.2g} {channel.unit}) away"
+        return text
+
+    def _stamp(self, channel: Channel, reading: Reading, started_s: float) -> Iterable[str]:
+        """What is wrong with a reading's time stamp, which must be that of its request."""
+        earliest_s = started_s
+        if self.wire.exact and self.exchanges:
+            earliest_s = self.exchanges[0].heard_s - STAMP_ROUNDING_S
+        if reading.time_s < earliest_s:
+            early_ms = (earliest_s - reading.time_s) * 1e3
+            yield f"{channel.name}: time stamp {early_ms:.3f} ms before the request of this poll had left"
+        # an understated age: stamped after the device had looked
+        sensed_s = self.sensors.sensed_s.get(channel.name, math.nan)
+        if reading.time_s > sensed_s + STAMP_ROUNDING_S:
+            late_ms = (reading.time_s - sensed_s) * 1e3
+            yield f"{channel.name}: time stamp {late_ms:.3f} ms after the device had sampled"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from compd.commissioning.conformance.faults import NONE, Fault, Piece
@@ -18,48 +19,72 @@ GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples modulo 1 spread evenly: neighbo
 
 
 class SensorValues:
-    """The sensors' values by channel: new ones for every poll, so that an old reply is a wrong one."""
+    """The sensors' values by channel: new ones for every poll, so that an old reply is a wrong one.
+
+    extents : by channel, the lowest and highest value that it takes from poll to poll.
+    whole : by channel, the lowest and highest value that the device was seen to show.
+    sensed_s : by channel, when the device last looked at its sensor, s.
+    """
 
     def __init__(self, channels: Sequence[Channel], extent: tuple[float, float] | None) -> None:
         self.values: dict[str, float] = {}
-        self.sensed_s = math.nan  # when the device last looked at its sensors
-        self._extents = {c.name: extent or RANGES.get(c.unit, OTHER_RANGE) for c in channels}
+        self.extents = {c.name: extent or RANGES.get(c.unit, OTHER_RANGE) for c in channels}
+        self.whole: dict[str, tuple[float, float]] = {}
+        self.sensed_s: dict[str, float] = {}
+        self._looked_at: set[str] = set()
         self._step = 0
 
     def advance(self) -> None:
         """New values: lowest + fraction (step x golden ratio + an offset per channel) x (highest - lowest)."""
         self._step += 1
-        for place, (name, (lowest, highest)) in enumerate(self._extents.items()):
+        for place, (name, (lowest, highest)) in enumerate(self.extents.items()):
             share = (self._step * GOLDEN + place * 0.0719) % 1.0
             self.values[name] = lowest + share * (highest - lowest)
 
     def set_to_end(self, end: int) -> None:
         """Every channel to its lowest (0) or highest (1) value."""
-        self.values = {name: extent[end] for name, extent in self._extents.items()}
+        self.values = {name: extent[end] for name, extent in self.extents.items()}
 
     def sense(self, channel: str) -> float:
+        self._looked_at.add(channel)
         return self.values[channel]
+
+    def stamp(self, heard_s: float) -> None:
+        """What was sensed since the last call was sensed at `heard_s`."""
+        self.sensed_s.update(dict.fromkeys(self._looked_at, heard_s))
+        self._looked_at.clear()
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """One request of a poll, at what time it was heard (s), the device's reply, and what of it was delivered."""
+
+    request: bytes
+    heard_s: float
+    reply: bytes
+    delivered: bytes
 
 
 class Peer:
     """The simulated device behind a wire that damages replies: each reply takes the next of the faults that were set.
 
-    replies : how many the device has given; longest : bytes of the longest of them.
+    exchanges : of the poll under way; longest : bytes of the longest reply so far.
     """
 
     def __init__(self, simulator: Callable[..., Any], options: Any, sensors: SensorValues, over_tcp: bool) -> None:
         device = simulator(options, sensors.sense)
         registers = isinstance(device, SimulatedRegisterDevice)
         self._device: ModbusSlaves | SimulatedByteDevice = ModbusSlaves([device], over_tcp) if registers else device
-        self.replies = 0
+        self.exchanges: list[Exchange] = []
         self.longest = 0
         self._sensors = sensors
         self._faults: Iterator[Fault] = iter(())
         self._beyond: Fault | None = None
         self._counts: dict[bytes, int] = {}  # of registers, by unit, function and address: the fewest asked for
 
-    def set_faults(self, faults: Iterable[Fault]) -> None:
-        """Set the faults of the next replies, one each."""
+    def begin_poll(self, faults: Iterable[Fault]) -> None:
+        """A poll begins; `faults` are those of its replies, one each."""
+        self.exchanges = []
         self._faults = iter(faults)
 
     def end_map(self, beyond: Fault | None) -> None:
@@ -78,14 +103,27 @@ class Peer:
     def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
         """The pieces that come back when `request` has arrived at `heard_s`."""
         reply = self._device.hear(request)
-        if not reply:
-            return []
-        self._sensors.sensed_s = heard_s
-        self.replies += 1
-        self.longest = max(self.longest, len(reply))
-        if self._beyond is not None and self._is_beyond(request):
-            return self._beyond.act(reply, timeout_s)
-        return next(self._faults, NONE).act(reply, timeout_s)
+        self._sensors.stamp(heard_s)
+        pieces: Sequence[Piece] = []
+        if reply:
+            self.longest = max(self.longest, len(reply))
+            beyond = self._beyond is not None and self._is_beyond(request)
+            fault = self._beyond if beyond and self._beyond else next(self._faults, NONE)
+            pieces = fault.act(reply, timeout_s)
+        if request:
+            self.exchanges.append(Exchange(request, heard_s, reply, b"".join(piece.data for piece in pieces)))
+        return pieces
+
+    def would_answer(self, requests: Iterable[bytes], values: Mapping[str, float]) -> tuple[bytes, ...]:
+        """The device's replies to the same requests if its sensors had `values`. What the device raises passes."""
+        present, self._sensors.values = self._sensors.values, dict(values)
+        sensed_s = dict(self._sensors.sensed_s)
+        try:
+            return tuple(self._device.hear(request) for request in requests)
+        finally:
+            self._sensors.values = present
+            self._sensors.stamp(math.nan)
+            self._sensors.sensed_s = sensed_s
 
     def _is_beyond(self, request: bytes) -> bool:
         """Whether a request asks for one register more than the driver needs."""

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from compd.commissioning.conformance.cases import CaseResult, Subject, run_cases, slowest_line
+from compd.commissioning.conformance.case_result import CaseResult, Subject
+from compd.commissioning.conformance.cases import FIRST_CASES, run_cases
 from compd.commissioning.conformance.harness import ConformanceSession, ConformanceWire
 from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.commissioning.conformance.virtual import VirtualWire
 from compd.commissioning.conformance.wire import CHARACTER_BITS, Kind, RealWire
+from compd.commissioning.conformance.wire_cases import slowest_line
 from compd.errors import PluginError, Problem
 from compd.gauge import Gauge, Quality
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
@@ -51,7 +53,7 @@ class DriverUnderTest:
 
     def subject(self, over_tcp: bool, exact: bool) -> Subject:
         checksum = self.registers or self.gauge.integrity == "checksum"
-        return Subject(self.registers, over_tcp, checksum, exact, self.error_replies)
+        return Subject(self.registers, over_tcp, checksum, exact, self.error_replies, self.options, self._with_options)
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
         """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
@@ -67,6 +69,9 @@ class DriverUnderTest:
         """On a pty or TCP port; `settings`: baud, timeout_s."""
         peer, sensors = self.peer(over_tcp=kind == "modbus_tcp")
         return self._session(RealWire(peer, kind, directory, **settings), sensors)
+
+    def _with_options(self, options: Any) -> ConformanceSession:
+        return replace(self, options=options).virtual()
 
     def _session(self, wire: ConformanceWire, sensors: SensorValues) -> ConformanceSession:
         return ConformanceSession(self.gauge(self.options), wire, sensors)
@@ -111,10 +116,14 @@ def driver_under_test(
 def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
     """Every case on every kind of wire, as they come: (wire, result).
 
-    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; on each kind once at SLOWEST_BAUD.
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
+    in one of FIRST_CASES is tried no further.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
-        yield from _cases_on("virtual time", driver.virtual(), driver.subject(False, True))
+        for wire, result in _cases_on("virtual time", driver.virtual(), driver.subject(False, True)):
+            yield wire, result
+            if result.verdict == "FAIL" and result.case in FIRST_CASES:
+                return
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
         if not on_real_wires:

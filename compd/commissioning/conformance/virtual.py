@@ -32,6 +32,8 @@ class VirtualClock:
 class VirtualWire:
     """A byte or RTU line; `open` gives the product's own line over it."""
 
+    exact = True
+
     def __init__(self, peer: Peer, registers: bool, timeout_s: float = 0.1, character_s: float = 0.0) -> None:
         self.peer = peer
         self.clock = VirtualClock()

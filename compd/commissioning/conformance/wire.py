@@ -28,6 +28,8 @@ FORMAT = "8N1"
 class RealWire:
     """`open` gives the product's own line to it. One thread serves it, from its creation to `close`."""
 
+    exact = False
+
     def __init__(
         self, peer: Peer, kind: Kind, directory: Path, baud: int = FAST_BAUD, timeout_s: float = TIMEOUT_S
     ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -40,15 +41,20 @@ def signal_for(linearisation: Any, value: float) -> float:
     """
     if not math.isfinite(value):
         return math.nan
+    signals, values = _curve(linearisation)
+    beyond = BEYOND * (signals[-1] - signals[0])
+    return float(np.interp(value, values, signals, left=signals[0] - beyond, right=signals[-1] + beyond))
+
+
+@lru_cache
+def _curve(linearisation: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Signals, and the values at them in rising order."""
     if linearisation.table is not None:
         signals, values = np.array(linearisation.table).T
     else:
         signals = np.linspace(linearisation.valid[0], linearisation.valid[1], 4001)
         values = np.polynomial.Polynomial(linearisation.polynomial)(signals)
-    if values[0] > values[-1]:
-        signals, values = signals[::-1], values[::-1]
-    beyond = BEYOND * (signals[-1] - signals[0])
-    return float(np.interp(value, values, signals, left=signals[0] - beyond, right=signals[-1] + beyond))
+    return (signals[::-1], values[::-1]) if values[0] > values[-1] else (signals, values)
 
 
 def number_for(channel: Any, value: float) -> float:
