@@ -290,7 +290,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
                 next_step="raise poll_every_s, or the baud rate",
             )
         )
-    if isinstance(budget.line, SerialPortSettings) and not budget.line.low_latency and "://" not in budget.line.port:
+    line = budget.line
+    if isinstance(line, SerialPortSettings) and line.low_latency is False and "://" not in line.port:
         held_back_s = budget.usual_s + budget.exchanges * LATENCY_TIMER_S
         problems.append(
             Problem(

@@ -81,6 +81,8 @@ def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, 
 def _said(options: Mapping[str, Any]) -> dict[str, Any]:
     """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
     said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if "low_latency" in said:  # false if left out, up to 0.2.0
+        said["low_latency"] = bool(said["low_latency"])
     if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
         said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
     return said

@@ -53,8 +53,9 @@ class SerialPortSettings(_LineSettings):
     )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
-    low_latency: bool = Field(
-        default=True, description="ask the adapter not to hold bytes back, where it can be asked (FTDI: up to 16 ms)"
+    low_latency: bool | None = Field(
+        default=None,
+        description="false: do not ask the adapter to hold no bytes back (FTDI: up to 16 ms); left out: ask",
     )
     echo: bool = Field(default=False, description=_ECHO)
     dtr: bool | None = Field(

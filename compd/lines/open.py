@@ -50,7 +50,7 @@ class _Serial(_Pause, Protocol):
     @property
     def format(self) -> str: ...
     @property
-    def low_latency(self) -> bool: ...
+    def low_latency(self) -> bool | None: ...
     @property
     def echo(self) -> bool: ...
     @property
@@ -155,7 +155,12 @@ def open_stream(settings: StreamSettings, clock: Clock, wrap_port: WrapPort = _u
     else:
         control = ControlLines(settings.dtr, settings.rts, settings.rs485)
         port = SerialPort(
-            settings.port, settings.baud, settings.format, settings.low_latency, settings.timeout_s, control
+            settings.port,
+            settings.baud,
+            settings.format,
+            settings.low_latency is not False,
+            settings.timeout_s,
+            control,
         )
         quiet_s = max(QUIET_CHARACTERS * port.character_s, SERIAL_GAP_S)
     if settings.kind == "modbus_rtu":

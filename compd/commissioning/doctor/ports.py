@@ -34,7 +34,7 @@ def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_
         elif "://" in line.port:
             yield unknown(subject, f"{line.port} is looked at only by opening it")
         else:
-            yield from _serial_findings(computer, subject, line.port, line.low_latency, shared)
+            yield from _serial_findings(computer, subject, line.port, line.low_latency is not False, shared)
 
 
 def _network_finding(subject: str, host: str, port: int, daemon_runs: bool) -> Finding:

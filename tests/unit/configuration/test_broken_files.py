@@ -328,7 +328,7 @@ def test_merge_keys_work_also_in_lists(tmp_path: Path) -> None:
     assert found.configuration is not None, found.problems
     lines = found.configuration.lines
     assert [getattr(lines[f"scale_{k}"], "baud", None) for k in (1, 2, 3)] == [38400] * 3
-    assert [getattr(lines[f"scale_{k}"], "low_latency", None) for k in (1, 2, 3)] == [True, True, False]
+    assert [getattr(lines[f"scale_{k}"], "low_latency", None) for k in (1, 2, 3)] == [None, None, False]
     assert getattr(lines["scale_3"], "port", "").endswith("usb-scale-3")
 
 
