@@ -104,7 +104,7 @@ def lines(names: Sequence[str], nine: Sequence[str], baud: int, trigger: bool) -
 
 
 class Move(NamedTuple):
-    """Of every cycle: tip errors on the move and at rest, um, and how far the tip is off the path; skew of the setpoints,
+    """Of every cycle: tip errors on the move and at rest, um, how far the tip is off the path; skew of the setpoints,
     s; ratio of the error of what was carried on to its uncertainty.
     """
 
