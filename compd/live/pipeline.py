@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from typing import Any, NamedTuple
 
 from compd.configuration import Configuration
@@ -33,7 +34,13 @@ class Pipeline(NamedTuple):
 
 def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) -> Pipeline:
     """`gauges`: those of the configuration, by name. Raises KinematicsError for a geometry that is impossible."""
-    latest = Latest([f"{name}.{channel.name}" for name, gauge in gauges.items() for channel in gauge.channels])
+    channels = {name: [f"{name}.{channel.name}" for channel in gauge.channels] for name, gauge in gauges.items()}
+    latched = [
+        [channel for name in channels if configuration.gauges[name].line == line for channel in channels[name]]
+        for line, settings in configuration.lines.items()
+        if settings.round_trigger is not None
+    ]
+    latest = Latest(list(chain.from_iterable(channels.values())), latched)
     wires = MachineWires(configuration, latest)
     model = build_model(configuration.geometry, configuration.wiring)
     loader = ModelLoader(model, configuration.machine, configuration.geometry_hash, wires)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from pydantic import TypeAdapter
 
 from compd.configuration.machine_configuration import SECTIONS
@@ -115,7 +117,11 @@ def _paths(section: str) -> dict[str, str]:
                 walk(definition["properties"], nested)
 
     walk(dict(schema.schema.get("properties", {"": schema.schema})), section)
-    return paths
+    doubled = {path for path, count in Counter(paths.values()).items() if count > 1}
+    return {
+        model: f"{path} ({next(iter(schema.definitions[model]['properties']))} ...)" if path in doubled else path
+        for model, path in paths.items()
+    }
 
 
 def _choice(definition: dict[str, dict[str, dict[str, str]]]) -> str:

@@ -4,9 +4,9 @@ The simulated machine tours its workspace at 50 mm/s, with 250 mm/s2. Time is vi
 what its bytes take at the line's baud rate, its silences and a turnaround as long; a device samples in the middle of
 its turnaround. So neither the computer nor its load is in the figures. Nine units of one register each share a line;
 the other lines are those of the shipped machine. The same readings go through the daemon's own cycle, once as they are
-and once carried on to the tick. The error is the distance of the tip from the simulated machine's true one; What is left
-where every gauge is read at the tick stands above the table. "Off the path" is the distance from the nearest place at which the
-tip was within the last second: a tip that is late, and else right, is on it.
+and once carried on to the tick. The error is the distance of the tip from the simulated machine's true one; what is
+left of it where every gauge is read at the tick stands above the table. "Off the path" is the distance from the nearest
+place at which the tip was within the last second: a tip that is late, and else right, is on it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class VirtualLine:
             now_s = asked_s + pace.turnaround_s + exchange.received * pace.character_s
             sampled_s = asked_s + pace.turnaround_s / 2 if latched_s is None else latched_s
             samplings.append(Sampling(sampled_s, asked_s if latched_s is None else latched_s, now_s, exchange.names))
-        return samplings
+        return [s._replace(there_s=now_s) for s in samplings] if self.trigger else samplings
 
 
 def lines(names: Sequence[str], nine: Sequence[str], baud: int, trigger: bool) -> list[VirtualLine]:
@@ -104,7 +104,7 @@ def lines(names: Sequence[str], nine: Sequence[str], baud: int, trigger: bool) -
 
 
 class Move(NamedTuple):
-    """Tip errors on the move and at rest, um, one for each cycle, and how far they are off the path; skew of the setpoints,
+    """Of every cycle: tip errors on the move and at rest, um, how far the tip is off the path; skew of the setpoints,
     s; ratio of the error of what was carried on to its uncertainty.
     """
 
@@ -148,7 +148,8 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
         samplings = line.round(start_s)
         for sampling in samplings:
             follow(sampling)
-        push(samplings[-1].there_s, lambda: begin_round(line, samplings[-1].there_s))
+        end_s = samplings[-1].there_s
+        push(end_s, lambda: begin_round(line, end_s))
 
     def follow(sampling: Sampling) -> None:
         values: dict[str, float] = {}

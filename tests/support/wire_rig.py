@@ -97,6 +97,12 @@ class WatchedLatest(Latest):
             self.history.append((self.channels[index], reading))
             self._changed.notify_all()
 
+    def put_all(self, readings: Mapping[int, Reading]) -> None:
+        with self._changed:
+            super().put_all(readings)
+            self.history += [(self.channels[index], reading) for index, reading in readings.items()]
+            self._changed.notify_all()
+
     def wait_for(self, channel: str, quality: Quality, after: int = 0) -> Reading:
         """The first reading of `channel` with `quality` since history entry `after`."""
         return self._wait(channel, lambda reading: reading.quality is quality, after, str(quality))

@@ -27,7 +27,7 @@ from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.reply_order import ReplyOrder
-from compd.live.acquisition.round_trigger import send_trigger
+from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory.latest import Latest
 from compd.live.realtime import sharpen_timers
 
@@ -103,8 +103,11 @@ class LineThread:
         self.opened = 0
         self.lost = 0
         self.round_s = math.nan
+        self._round_buffer = None if settings.round_trigger is None else RoundBuffer(latest)
         self.gauges = [
-            PolledGauge(gauge, driver, latest, settings.timeout_s, stale_after_s[gauge], clock, trust)
+            PolledGauge(
+                gauge, driver, self._round_buffer or latest, settings.timeout_s, stale_after_s[gauge], clock, trust
+            )
             for gauge, driver in gauges
         ]
         self._settings = settings
@@ -194,6 +197,7 @@ class LineThread:
         self._waiting.clear()
         for gauge in self.gauges:
             gauge.lose(Quality.LINE_LOST, detail, self._clock.monotonic())
+        self._publish_round()
 
     def _close(self) -> None:
         line, self._line = self._line, None
@@ -214,12 +218,17 @@ class LineThread:
             if latched_s != NOT_LATCHED_S and not self._stop.is_set():
                 self._poll(gauge, line, latched_s)
         self._publish_waiting(line)
+        self._publish_round()
         end_s = self._clock.monotonic()
         self.round_s = end_s - start_s
         next_s = start_s + max(self._poll_every_s, FASTEST_ROUND_S)
         wake_s = max(next_s, min((gauge.rests_until_s for gauge in self.gauges), default=next_s))
         if wake_s > end_s:
             self._clock.wait(self._stop, wake_s - end_s)
+
+    def _publish_round(self) -> None:
+        if self._round_buffer is not None:
+            self._round_buffer.publish()
 
     def _latch(self, due: Sequence[PolledGauge], line: OpenLine) -> float | None:
         """Send the round trigger: its time (s); None where the line has none, NOT_LATCHED_S where it failed.

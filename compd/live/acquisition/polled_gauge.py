@@ -12,7 +12,7 @@ from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
 from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
-from compd.live.acquisition.round_trigger import stamped
+from compd.live.acquisition.round_trigger import RoundBuffer, stamped
 from compd.live.memory.latest import LONGEST_DETAIL, Latest
 from compd.pushed_gauge import Heard
 
@@ -65,7 +65,7 @@ class PolledGauge:
         self,
         name: str,
         driver: Gauge[Any],
-        latest: Latest,
+        latest: Latest | RoundBuffer,
         timeout_s: float,
         stale_after_s: float,
         clock: Clock,

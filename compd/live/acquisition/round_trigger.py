@@ -1,16 +1,19 @@
 """The round trigger: one message latches all gauges of a line, so that they are measured at the same time.
 
 It is sent once before the gauges of a round are read, and every reading of that round has its time, also where a gauge
-is missing. The devices latch no earlier than its last bit has left. Whether they have heard it, nobody says.
+is missing. The devices latch no earlier than its last bit has left. Whether they have heard it, nobody says. The
+readings are published together when the round has ended: a snapshot that mixed two rounds would be further apart than
+without a trigger.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.gauge import Gauge, Reading
+from compd.live.memory.latest import Latest
 
 
 def send_trigger(trigger: TriggerBytes | TriggerWrite, line: Any) -> float:
@@ -39,3 +42,22 @@ def read_latched(gauge: Gauge[Any], line: Any, trigger: TriggerBytes | TriggerWr
     """One poll of a gauge by itself, behind the trigger of its line where there is one. Raises LineFault."""
     latched_s = None if trigger is None else send_trigger(trigger, line)
     return stamped(gauge.read(line), latched_s)
+
+
+class RoundBuffer:
+    """In the place of `Latest` for the gauges of a line with a round trigger: keeps their readings until `publish`."""
+
+    def __init__(self, latest: Latest) -> None:
+        self.index: Mapping[str, int] = latest.index
+        self._latest = latest
+        self._readings: dict[int, Reading] = {}
+
+    def put(self, index: int, reading: Reading) -> None:
+        """The reading of the channel at `index`."""
+        self._readings[index] = reading
+
+    def publish(self) -> None:
+        """Publish what was put, all at once."""
+        readings, self._readings = self._readings, {}
+        if readings:
+            self._latest.put_all(readings)

@@ -31,10 +31,15 @@ def age_uncertainty_mm(reading: Reading, now_s: float, carried_on: bool) -> floa
     0 for a reading without motion: of a gauge that is no length, or in a recording of a release up to 0.2.0.
     carried_on : whether `extrapolated` is used, and not the value as it was read.
     """
-    motion = reading.motion
+    _, time_s, _, _, motion = reading
     if motion is None:
         return 0.0
     speed, _, u_mm_per_s, horizon_s = motion
-    age_s = max(0.0, now_s - reading.time_s)
-    not_carried_s = max(0.0, age_s - horizon_s) if carried_on else age_s
-    return float(abs(speed) * (SAMPLED_LATER_S + not_carried_s) + u_mm_per_s * age_s)
+    age_s = now_s - time_s
+    by_age_mm = u_mm_per_s * age_s
+    if speed == 0.0:
+        return by_age_mm
+    not_carried_s = age_s
+    if carried_on:
+        not_carried_s = age_s - horizon_s if age_s > horizon_s else 0.0
+    return by_age_mm + abs(speed) * (SAMPLED_LATER_S + not_carried_s)

@@ -60,11 +60,12 @@ class Latest:
     nobody waits, and no reading is ever mixed from two.
     """
 
-    def __init__(self, channels: Sequence[str]) -> None:
+    def __init__(self, channels: Sequence[str], together: Sequence[Sequence[str]] = ()) -> None:
         """`channels`: "gauge.channel" of every channel of every gauge, each once. `index` maps such a name to its
-        place in `channels`."""
+        place in `channels`. `together`: channels that are written by `put_all`."""
         self.channels: tuple[str, ...] = tuple(channels)
         self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
+        self._together = [[self.index[name] for name in names] for names in together]
         count = len(self.channels)
         memory = memoryview(shared_memory(max(count, 1) * (8 + SLOT_BYTES)))
         self._versions = memory[: 8 * count].cast("Q")
@@ -82,6 +83,20 @@ class Latest:
         self._versions[index] = writing
         self._slots[index * SLOT_BYTES : (index + 1) * SLOT_BYTES] = content
         self._versions[index] = writing + 1
+
+    def put_all(self, readings: Mapping[int, Reading]) -> None:
+        """Replace the readings of several channels, by index: of those that are `together` a snapshot has all or none.
+
+        Called by the thread of their line alone.
+        """
+        contents = {index: packed(reading) for index, reading in readings.items()}
+        writing = {index: self._versions[index] | 1 for index in contents}
+        for index, version in writing.items():
+            self._versions[index] = version
+        for index, content in contents.items():
+            self._slots[index * SLOT_BYTES : (index + 1) * SLOT_BYTES] = content
+        for index, version in writing.items():
+            self._versions[index] = version + 1
 
     def snapshot(self, time_s: float) -> Snapshot:
         """All readings as they are now, under the time `time_s` (s)."""
@@ -101,9 +116,13 @@ class Latest:
 
     def _take(self, changed: list[int], before: list[int], after: list[int], slots: bytes) -> None:
         """Take the readings from a copy of all slots, where the versions before and after it are the same and even."""
+        waiting: set[int] = set()
+        for group in self._together:  # one of them is odd as long as not all are there
+            if any(before[index] & 1 or before[index] != after[index] for index in group):
+                waiting.update(group)
         for index in changed:
             version = before[index]
-            if version & 1 or version != after[index]:
+            if version & 1 or version != after[index] or index in waiting:
                 continue
             start = index * SLOT_BYTES
             content = slots[start : start + SLOT_BYTES]

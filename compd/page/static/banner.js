@@ -41,7 +41,8 @@ export function showBanner(page, behind_s) {
   const setpoint = summary.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
-  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
+  const skew = setpoint?.skew_s === undefined ? "" : `, skew ${ago(setpoint.skew_s)}`;
+  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${skew}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");

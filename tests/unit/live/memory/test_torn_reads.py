@@ -54,6 +54,38 @@ def test_a_record_says_what_does_not_fit():
     assert SharedRecord(10).read() == b""
 
 
+def test_readings_that_belong_together_are_never_of_two_rounds():
+    names = [f"j{k}.v" for k in range(9)]
+    latest = Latest(["a.x", *names], [names])
+    numbers = itertools.count(1)
+
+    def write():
+        number = next(numbers)
+        latest.put(0, good(float(-number), float(number)))
+        latest.put_all({index: good(float(number), float(number)) for index in range(1, 10)})
+
+    rounds = set()
+    with beside(write):
+        for number in itertools.count():
+            together = latest.snapshot(1.0).readings[1:]
+            assert len({reading.value for reading in together if reading.ok}) <= 1
+            assert len({reading.ok for reading in together}) == 1
+            rounds.add(together[0].value)
+            if number > READS and len(rounds) > 100:
+                break
+
+
+def test_readings_that_belong_together_come_again_after_their_writer_was_killed():
+    latest = Latest(["a.v", "b.v"], [["a.v", "b.v"]])
+    latest.put_all({0: good(1.0, 1.0), 1: good(1.0, 1.0)})
+    latest.snapshot(1.0)
+    latest._versions[1] |= 1  # killed while it published
+    latest.put(0, good(2.0, 2.0))
+    assert [reading.value for reading in latest.snapshot(2.0).readings] == [1.0, 1.0]
+    latest.put_all({0: good(3.0, 3.0), 1: good(3.0, 3.0)})
+    assert [reading.value for reading in latest.snapshot(3.0).readings] == [3.0, 3.0]
+
+
 def test_readings_are_never_mixed_from_two():
     latest = Latest(["a.x", "a.y"])
     numbers = itertools.count(1)
