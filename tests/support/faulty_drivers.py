@@ -1,7 +1,7 @@
 r"""Drivers that are wrong in one way each, and the devices that they are for; `compd driver test` must find every one.
 
-The devices are of four kinds: a comparator that answers ``?`` CR by ``+01.2345mm`` CR LF, the same behind an address, with
-and without a checksum, two channels in one reply, and registers.
+The devices are of four kinds: a comparator that answers ``?`` CR by ``+01.2345mm`` CR LF, the same behind an address,
+with and without a checksum, two channels in one reply, and registers.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -56,6 +57,7 @@ class ComparatorDevice(AsciiDevice):
 class Comparator(Gauge[ByteLine]):
     """Right; the others differ from it in one way each."""
 
+    device: ClassVar[type] = ComparatorDevice
     request = b"?\r"
     form = re.compile(rb"([+-]\d{2}\.\d{4})mm")
     limit = 16
@@ -296,6 +298,22 @@ class WaitsByTheComputersClock(Comparator):
         raise LineFault(Quality.TIMEOUT)
 
 
+class SleepsEveryHundredthPoll(Comparator):
+    _polls = 0
+
+    def ask(self, line: ByteLine) -> tuple[float, bytes]:
+        self._polls += 1
+        if self._polls % 100 == 0:
+            time.sleep(1e-3)
+        return super().ask(line)
+
+
+class WaitsForAnEvent(Comparator):
+    def ask(self, line: ByteLine) -> tuple[float, bytes]:
+        threading.Event().wait(1e-3)
+        return super().ask(line)
+
+
 class AsksAgain(Comparator):
     def ask(self, line: ByteLine) -> tuple[float, bytes]:
         try:
@@ -385,6 +403,34 @@ class RaisesWhatItMeets(Comparator):
         return float(reply.removesuffix(b"mm"))
 
 
+class LastValueAfterThreeFaults(Comparator):
+    """In a row."""
+
+    _last: Sequence[Reading] = ()
+    _faults = 0
+
+    def read(self, line: ByteLine) -> Sequence[Reading]:
+        try:
+            self._last = super().read(line)
+            self._faults = 0
+        except LineFault:
+            self._faults += 1
+            if self._faults < 4 or not self._last:
+                raise
+        return self._last
+
+
+class FalseIdentity(Comparator):
+    """What it says its replies begin with is not compared with any."""
+
+    form = re.compile(rb".(\d{2}\.\d{4})mm")
+    sample_range = (0.1, 0.9)
+
+    @property
+    def reply_identity(self) -> str:
+        return "+"
+
+
 # --- a display in inches -------------------------------------------------------------------------------------
 
 
@@ -397,6 +443,7 @@ class InchDevice(AsciiDevice):
 
 
 class Inch(Comparator):
+    device = InchDevice
     form = re.compile(rb"([+-](?:0|[1-9]\d*)\.\d{5})in")
 
     def converted(self, value: float) -> float:
@@ -408,27 +455,31 @@ class Inch25(Inch):
         return value * 25.0
 
 
-# --- a device that says nothing at the end of its scale, and one with exponents -------------------------------
+# --- a device with a number that means another thing, and one with exponents -----------------------------------
 
 
-class SaturatingDevice(ComparatorDevice):
-    """Its largest number stands for all beyond it."""
+class CodeDevice(ComparatorDevice):
+    """+99.9999mm for all beyond +-50 mm."""
 
     def number(self) -> str:
         value_mm = self.sense("value")
-        return "ER1" if math.isnan(value_mm) else f"{max(-99.9999, min(99.9999, value_mm)):+08.4f}mm"
+        return "ER1" if math.isnan(value_mm) else f"{value_mm if abs(value_mm) < 50 else LARGEST_MM:+08.4f}mm"
 
 
-class EndOfScale(Comparator):
+class Code(Comparator):
+    device = CodeDevice
+
     def number(self, reply: bytes) -> float:
+        if reply == b"+99.9999mm":
+            raise LineFault(Quality.DEVICE_ERROR, "beyond its range")
         value = super().number(reply)
-        if abs(value) >= LARGEST_MM:
-            raise LineFault(Quality.MISMATCH, "at the end of its scale")
+        if abs(value) > 50:
+            raise LineFault(Quality.MISMATCH, "beyond its range")
         return value
 
 
-class EndOfScaleIsANumber(Comparator):
-    pass
+class CodeIsANumber(Comparator):
+    device = CodeDevice
 
 
 class ExponentDevice(AsciiDevice):
@@ -440,6 +491,7 @@ class ExponentDevice(AsciiDevice):
 
 
 class Exponent(Comparator):
+    device = ExponentDevice
     form = re.compile(rb"([+-]\d\.\d{5}E[+-]\d{2})mm")
 
 
@@ -476,6 +528,7 @@ class CheckedDevice(AddressedDevice):
 
 
 class Addressed(Comparator):
+    device = AddressedDevice
     Options = UnitOptions
     sample_options: ClassVar[Mapping[str, Any]] = {"address": 1}
     limit = 24
@@ -503,6 +556,7 @@ class AnyAddress(Addressed):
 class AnyAddressWritten(Comparator):
     """The same where the address is no option."""
 
+    device = AddressedDevice
     request = b"#01\r"
     limit = 24
 
@@ -514,6 +568,7 @@ class AnyAddressWritten(Comparator):
 
 
 class Checked(Addressed):
+    device = CheckedDevice
     integrity = "checksum"
 
     def ask(self, line: ByteLine) -> tuple[float, bytes]:
@@ -588,6 +643,7 @@ class PairDevice(AsciiDevice):
 class Pair(Gauge[ByteLine]):
     """Right."""
 
+    device: ClassVar[type] = PairDevice
     form = re.compile(rb"([+-]\d{2}\.\d{4}|-{8}),([+-]\d{2}\.\d{4}|-{8})")
 
     @property
@@ -655,6 +711,7 @@ class RegisterDevice(SimulatedRegisterDevice):
 class Registers(Gauge[RegisterLine]):
     """Right."""
 
+    device: ClassVar[type] = RegisterDevice
     line_kind = "registers"
 
     @property
@@ -696,3 +753,11 @@ class ExceptionIsZero(Registers):
             if fault.quality is not Quality.DEVICE_ERROR or re.search(r"exception [1-4],", fault.detail):
                 raise
             return [good(0.0, 0.0)]
+
+
+class OtherUnit(Registers):
+    """Asks another slave, which is not there."""
+
+    def read(self, line: RegisterLine) -> Sequence[Reading]:
+        line.read_registers(2, 4, 0, 2)
+        return super().read(line)

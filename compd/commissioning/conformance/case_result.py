@@ -19,6 +19,7 @@ NO_VALUE = frozenset(
 GOOD = frozenset({Quality.OK})
 NO_NUMBER = DAMAGED | NO_ANSWER | NO_VALUE
 
+BY_TCP = "TCP's own checksum keeps it from the driver"
 IN_VIRTUAL_TIME = "in virtual time"
 MOST_EXCHANGES = 64  # no driver makes more in one poll
 REAL_TIME_TRIES = 3

@@ -6,39 +6,41 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from compd.commissioning.conformance.case_result import Case, CaseResult, Subject
+from compd.commissioning.conformance.damage_cases import DAMAGE_CASES
 from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.reply_cases import REPLY_CASES
 from compd.commissioning.conformance.value_cases import VALUE_CASES
-from compd.commissioning.conformance.waiting_cases import waits
+from compd.commissioning.conformance.waiting_cases import WAITING_CASES, waits, waits_after_faults
 from compd.commissioning.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
-FIRST_OF_ALL = ("waits, retries", "units and scale")  # a driver that fails in them is tried no further
-CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *REPLY_CASES)
+CASES: tuple[Case, ...] = (*WAITING_CASES, *VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
+# A driver that fails in one of these is tried no further: each poll would take its time, or be wrong.
+FIRST_CASES = ("waits", "units and scale", "waits after faults")
 
 
 def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseResult]:
-    """Every case in turn; a driver that waits by itself, or whose fault-free readings are wrong, is tried no further."""
-    waiting = waits(session, subject)
-    yield waiting
-    if waiting.verdict == "FAIL":
-        return
-    required = "every channel within one digit of the device"
+    """Every case in turn, until one of the first fails."""
+    for first in (waits, _units_and_scale, waits_after_faults):
+        result = first(session, subject)
+        yield result
+        if result.verdict == "FAIL":
+            return
+    cases = [*CASES, *(CASES_ON_RTU if subject.registers and not subject.over_tcp else ())]
+    for case in cases:
+        yield run_case(case, session, subject)
+
+
+def _units_and_scale(session: ConformanceSession, subject: Subject) -> CaseResult:
+    case, required = "units and scale", "every channel within one digit of the device"
     for _ in range(subject.tries):
         fault = session.calibrate()
         if fault is None:
             break
         session.settle()
     if fault is not None:
-        yield CaseResult(FIRST_OF_ALL[1], required, fault, "FAIL")
-        return
-    digits = ", ".join(
-        f"{channel.name} {session.replies.digit[channel.name]:.2g} {channel.unit}"
-        for channel in session.gauge.channels
-    )
-    yield CaseResult(FIRST_OF_ALL[1], required, f"one digit is {digits}", "pass")
-    cases = [*CASES, *(CASES_ON_RTU if subject.registers and not subject.over_tcp else ())]
-    for case in cases:
-        yield run_case(case, session, subject)
+        return CaseResult(case, required, fault, "FAIL")
+    digits = ", ".join(f"{c.name} {session.replies.digit[c.name]:.2g} {c.unit}" for c in session.gauge.channels)
+    return CaseResult(case, required, f"one digit is {digits}", "pass")
 
 
 def run_case(case: Case, session: ConformanceSession, subject: Subject) -> CaseResult:

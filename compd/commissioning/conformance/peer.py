@@ -110,7 +110,8 @@ class Peer:
             beyond = self._beyond is not None and self._is_beyond(request)
             fault = self._beyond if beyond and self._beyond else next(self._faults, NONE)
             pieces = fault.act(reply, timeout_s)
-        self.exchanges.append(Exchange(request, heard_s, reply, b"".join(piece.data for piece in pieces)))
+        if request:
+            self.exchanges.append(Exchange(request, heard_s, reply, b"".join(piece.data for piece in pieces)))
         return pieces
 
     def would_answer(self, requests: Iterable[bytes], values: Mapping[str, float]) -> tuple[bytes, ...]:

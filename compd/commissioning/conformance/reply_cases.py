@@ -20,13 +20,12 @@ from compd.commissioning.conformance.case_result import (
     one_poll_each,
     result_of,
 )
-from compd.commissioning.conformance.faults import Fault
-from compd.commissioning.conformance.harness import ConformanceSession, Poll
+from compd.commissioning.conformance.damage_cases import fault_at, good_poll
+from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.other_settings import other_settings
-from compd.commissioning.conformance.peer import GOLDEN, Exchange
+from compd.commissioning.conformance.peer import GOLDEN
 from compd.commissioning.conformance.reply_text import Forgery, ReplyText, most_frequent_length
 from compd.commissioning.conformance.value_cases import share_of
-from compd.commissioning.conformance.wire_cases import BY_TCP
 from compd.gauge import Quality
 
 # Of Modbus: all that a slave or gateway answers a read with, and one that no table has.
@@ -50,58 +49,6 @@ class _Reply:
     values: Mapping[str, float]
     channels: Sequence[str]
     others: Mapping[str, Sequence[bytes]]
-
-
-def _bit_flips(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Every single bit of a reply turned, one at a time."""
-    case = "one bit turned"
-    if subject.over_tcp:
-        return CaseResult(case, "", BY_TCP, "-")
-    if not subject.exact:
-        return CaseResult(case, "", f"every bit: {IN_VIRTUAL_TIME}", "-")
-    bits = 8 * session.wire.peer.longest
-    return _damaged(session, subject, case, [[faults.flipped(bit)] for bit in range(bits)], "set a parity")
-
-
-def _bytes_lost(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Each byte of a reply lost, lost with all before it, or come twice."""
-    case = "bytes lost, or twice"
-    if subject.over_tcp:
-        return CaseResult(case, "", BY_TCP, "-")
-    if not subject.exact:
-        return CaseResult(case, "", f"every byte: {IN_VIRTUAL_TIME}", "-")
-    tries: list[Sequence[Fault]] = []
-    for number, exchange in enumerate(_good_poll(session)):
-        for place in range(len(exchange.reply)):
-            tries += [
-                _at(number, fault)
-                for fault in (faults.lost(place), faults.lost(0, place), faults.lost(place, 2), faults.repeated(place))
-            ]
-    return _damaged(session, subject, case, tries, "describe the number's exact width, where it has one")
-
-
-def _damaged(
-    session: ConformanceSession, subject: Subject, case: str, tries: Sequence[Sequence[Fault]], advice: str
-) -> CaseResult:
-    """Replies with small damage: no number that the device would not itself have sent in these very bytes."""
-    complaints, after, undetectable = [], [], []
-    for reply_faults in tries:
-        name = reply_faults[-1].name
-        poll = session.poll(reply_faults)
-        delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
-        complaints += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
-        undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
-        if Quality.DRIVER_ERROR in poll.qualities:
-            complaints.append(f"{name}: {poll}: {delivered}")
-        after += [f"after {name}: {text}" for text in complaints_of(session.recover()[1], GOOD)]
-    if subject.checksum:
-        complaints += undetectable
-    if undetectable and not (after or complaints):
-        text = f"{len(undetectable)} of {len(tries)} give another number that the device could have sent"
-        return CaseResult(
-            case, "no wrong number, with a checksum", f"{text}: not detectable on this wire, {advice}", "-"
-        )
-    return result_of(case, DAMAGED | NO_ANSWER | GOOD, f"{len(tries)} of them, no wrong number", after or complaints)
 
 
 def _forged(session: ConformanceSession, subject: Subject) -> CaseResult:
@@ -146,7 +93,7 @@ def _unlisted_errors(session: ConformanceSession, subject: Subject) -> CaseResul
             Forgery(f"{text!r} in its place", text)
             for listed in subject.error_replies
             for text in _other_digits(listed)
-            if text not in subject.error_replies
+            if text not in subject.error_replies and len(text) != len(reply.text.base)  # one of its length is a value
         ]
         for forgery in forgeries:
             complaints += _taken(session, reply, forgery, reply.channels)
@@ -208,10 +155,12 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     tried = 0
     identity = (session.gauge.reply_identity or "").encode("latin-1")
     for reply in _replies(session):
+        if reply.channels and (other := reply.text.without(identity)):
+            complaints.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
         for forgery in [*reply.text.addresses(), *reply.text.identities(identity)]:
             complaints += _taken(session, reply, forgery, reply.channels)
             tried += 1
-    requests = [exchange.request for exchange in _good_poll(session)]
+    requests = [exchange.request for exchange in good_poll(session)]
     another = subject.another
     for setting, second in [(text, another(o)) for text, o in other_settings(subject.options)] if another else ():
         second.sensors.advance()  # other values than the first one has
@@ -231,15 +180,9 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints, undetectable)
 
 
-def _good_poll(session: ConformanceSession) -> Sequence[Exchange]:
-    """The exchanges of a poll without faults."""
-    session.recover()
-    return tuple(session.exchanges)
-
-
 def _replies(session: ConformanceSession) -> Iterator[_Reply]:
     """Each reply of a poll without faults, with what is constant in it."""
-    heard = _good_poll(session)
+    heard = good_poll(session)
     sampled = [_values_at(session, sample) for sample in range(SAMPLES)]
     for number, exchange in enumerate(heard):
         replies = [session.replies.at([exchange], **values) for values in sampled]
@@ -271,7 +214,7 @@ def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channel
 
     A number that the device would itself have sent so is not wrong, nor one that is converted from another unit.
     """
-    poll = session.poll(_at(reply.number, faults.replaced(forgery.reply)))
+    poll = session.poll(fault_at(reply.number, faults.replaced(forgery.reply)))
     complaints = []
     if Quality.DRIVER_ERROR in poll.qualities:
         complaints.append(f"{forgery.what}: {poll}: {forgery.reply!r}")
@@ -290,11 +233,6 @@ def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channel
     return complaints[:1]
 
 
-def _at(number: int, fault: Fault) -> Sequence[Fault]:
-    """The fault for one of a poll's replies, the first being 0."""
-    return [*[faults.NONE] * number, fault]
-
-
 def _other_digits(reply: bytes) -> Iterator[bytes]:
     """An error reply with other digits."""
     for digit in b"059":
@@ -304,8 +242,6 @@ def _other_digits(reply: bytes) -> Iterator[bytes]:
 
 
 REPLY_CASES: tuple[Case, ...] = (
-    _bit_flips,
-    _bytes_lost,
     _forged,
     _wrong_checksums,
     _another_unit,

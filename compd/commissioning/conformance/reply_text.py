@@ -18,9 +18,9 @@ INCH_MARK = b'"'
 NO_ADDRESS = frozenset({0x00, 0xFF})  # what fills a binary frame
 # Texts by which instruments say that they have no number.
 ERROR_TEXTS = (
-    b"", b"ERR", b"ERROR", b"Err 5", b"ERR9", b"E01", b"E 42", b"ER99", b"ER,99", b"NG", b"NAK", b"?", b"OVER", b"UNDER",
-    b"OL", b"-OL", b"OVERFLOW", b"NO DATA", b"nan", b"inf", b"-inf", b"NONE", b"-----", b"+-----", b"*****", b"+++++",
-    b".", b"-", b"+", b"--.---",
+    b"", b"ERR", b"ERROR", b"Err 5", b"ERR9", b"E01", b"E 42", b"ER99", b"ER,99", b"NG", b"NAK", b"?", b"OVER",
+    b"UNDER", b"OL", b"-OL", b"OVERFLOW", b"NO DATA", b"nan", b"inf", b"-inf", b"NONE", b"-----", b"+-----",
+    b"*****", b"+++++", b".", b"-", b"+", b"--.---",
 )  # fmt: skip
 FIELD_FILLINGS = b"-*+ #?EF."
 
@@ -54,6 +54,10 @@ class ReplyText:
     @property
     def is_text(self) -> bool:
         return is_text(self.base)
+
+    def without(self, identity: bytes) -> bytes:
+        """A reply that does not begin with `identity`; b"" if all do."""
+        return next((reply for reply in self._alike if not reply.startswith(identity)), b"")
 
     @property
     def terminator(self) -> bytes:

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from compd.commissioning.conformance.case_result import CaseResult, Subject
-from compd.commissioning.conformance.cases import FIRST_OF_ALL, run_cases
+from compd.commissioning.conformance.cases import FIRST_CASES, run_cases
 from compd.commissioning.conformance.harness import ConformanceSession, ConformanceWire
 from compd.commissioning.conformance.peer import Peer, SensorValues
 from compd.commissioning.conformance.virtual import VirtualWire
@@ -52,9 +52,7 @@ class DriverUnderTest:
 
     def subject(self, over_tcp: bool, exact: bool) -> Subject:
         checksum = self.registers or self.gauge.integrity == "checksum"
-        return Subject(
-            self.registers, over_tcp, checksum, exact, self.error_replies, self.options, self._with_options
-        )
+        return Subject(self.registers, over_tcp, checksum, exact, self.error_replies, self.options, self._with_options)
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
         """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
@@ -109,12 +107,13 @@ def driver_under_test(
 def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
     """Every case on every kind of wire, as they come: (wire, result).
 
-    A driver that waits by itself, or is wrong without any fault, is tried no further. First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; on each kind once at SLOWEST_BAUD.
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
+    in one of FIRST_CASES is tried no further.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         for wire, result in _cases_on("virtual time", driver.virtual(), driver.subject(False, True)):
             yield wire, result
-            if result.verdict == "FAIL" and result.case in FIRST_OF_ALL:
+            if result.verdict == "FAIL" and result.case in FIRST_CASES:
                 return
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)

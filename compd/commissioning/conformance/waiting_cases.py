@@ -1,33 +1,27 @@
-"""What a driver waits for: the line's clock alone, no longer than its exchange takes, and no request twice."""
+"""What a driver waits for: its replies alone, by the line's clock; and that it asks no more than once."""
 
 from __future__ import annotations
 
 import resource
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
-from typing import Any
 
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.case_result import (
     IN_VIRTUAL_TIME,
+    Case,
     CaseResult,
     Subject,
     every_reply,
 )
+from compd.commissioning.conformance.clock_calls import clock_calls
 from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.virtual import GAP_S, TURNAROUND_S
 
 LOOKS = 5
-LONGEST_BLOCK_S = 5e-3  # by the computer's clock, in each of LOOKS polls
+LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; other threads take less of it
 IDLE_TIMEOUTS = 0.5  # in line timeouts: waiting in a poll whose replies come at once
 EXCHANGE_S = GAP_S + TURNAROUND_S  # of a virtual line
 LONGEST_WAIT_S = 10.0  # for a reply that does not come
-CLOCK_FUNCTIONS = (
-    "sleep", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter", "perf_counter_ns", "process_time",
-)  # fmt: skip
 FAULTS = (
     faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5),
     faults.replaced(b"ERR\r\n"),
@@ -35,73 +29,64 @@ FAULTS = (
 
 
 def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """First of all cases: a driver that waits by itself would take for ever in the others."""
-    case, required = "waits, retries", "the line's clock alone; no request twice"
+    """First of all cases, without faults: a driver that waits by itself would take for ever in the others."""
+    case, required = "waits", "for its replies alone, by the line's clock"
     if not subject.exact:
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
-    complaint = _without_faults(session) or _with_faults(session)
-    if complaint:
-        return CaseResult(case, required, complaint, "FAIL")
-    return CaseResult(case, required, f"{session.most_requests or 1} requests in a poll", "pass")
-
-
-def _without_faults(session: ConformanceSession) -> str:
-    """What is wrong with the waiting of polls whose replies come at once; "" if nothing is."""
     blocked_s = []
     for _ in range(LOOKS):
         started_s, gave_up = time.perf_counter(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
-        with _calls_watched() as called:
+        with clock_calls() as called:
             poll = session.poll()
         # a thread that waits gives the processor up; one from which it is taken has no part in that
         waited = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw > gave_up
         blocked_s.append(time.perf_counter() - started_s if waited else 0.0)
         if called:
-            return f"`read` calls {called[0]}: waiting and time are the line's"
+            return CaseResult(case, required, f"`read` calls {called[0]}", "FAIL")
         idle_s = poll.duration_s - EXCHANGE_S * max(1, len(session.exchanges))
-        if idle_s > IDLE_TIMEOUTS * session.wire.timeout_s:
-            return f"a poll takes {poll.duration_s:.3g} s although its replies come at once: it waits {idle_s:.3g} s"
+        if poll.ok and idle_s > IDLE_TIMEOUTS * session.wire.timeout_s:
+            text = f"a poll takes {poll.duration_s:.3g} s although its replies come at once: it waits {idle_s:.3g} s"
+            return CaseResult(case, required, text, "FAIL")
     if min(blocked_s) > LONGEST_BLOCK_S:
-        return f"`read` stands still for {min(blocked_s):.3g} s, without any line: it waits for something else"
-    return ""
+        text = f"`read` stands still for {min(blocked_s):.3g} s while the line does not wait"
+        return CaseResult(case, required, text, "FAIL")
+    return CaseResult(case, required, f"{poll.duration_s:.3g} s on the line's clock", "pass")
 
 
-def _with_faults(session: ConformanceSession) -> str:
-    """The same where replies do not come, or are damaged; and requests that are sent again."""
+def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """The same where replies do not come, or are damaged."""
+    case, required = "waits after faults", "for its replies alone, by the line's clock"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    longest_s = 0.0
     for fault in FAULTS:
-        with _calls_watched() as called:
+        with clock_calls() as called:
             poll = session.poll(every_reply(fault))
-        requests = len(session.exchanges)
         if called:
-            return f"{fault.name}: `read` calls {called[0]}: waiting and time are the line's"
-        if requests > max(1, session.most_requests):
-            text = f"asks {requests} times in one poll, {session.most_requests} without a fault"
-            return f"{fault.name}: {text}: the line's thread asks again, not the driver"
-        if poll.duration_s > LONGEST_WAIT_S:
-            return f"{fault.name}: waits {poll.duration_s:.3g} s, longer than any line"
+            return CaseResult(case, required, f"{fault.name}: `read` calls {called[0]}", "FAIL")
+        longest_s = max(longest_s, poll.duration_s)
+        session.settle()
         session.recover()
-    return ""
+    if longest_s > LONGEST_WAIT_S:
+        return CaseResult(case, required, f"waits {longest_s:.3g} s for a reply that does not come", "FAIL")
+    return CaseResult(case, required, f"at most {longest_s:.3g} s on the line's clock", "pass")
 
 
-@contextmanager
-def _calls_watched() -> Iterator[list[str]]:
-    """The clock functions of the computer that are called meanwhile, by their names."""
-    called: list[str] = []
-    watched: dict[Callable[..., Any], str] = {getattr(time, name): f"time.{name}" for name in CLOCK_FUNCTIONS}
+def _retries(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """No more requests in a poll that fails than in one that does not."""
+    case, required = "no request twice", "as many requests as without a fault, or fewer"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    for fault in FAULTS:
+        session.poll(every_reply(fault))
+        requests = len(session.exchanges)
+        session.settle()
+        session.recover()
+        if requests > session.most_requests:
+            text = f"asks {requests} times in one poll, {session.most_requests} without a fault"
+            observed = f"{fault.name}: {text}: the line's thread asks again, not the driver"
+            return CaseResult(case, required, observed, "FAIL")
+    return CaseResult(case, required, f"{session.most_requests} in a poll", "pass")
 
-    def note(frame: FrameType, event: str, function: Any) -> None:
-        if event != "c_call":
-            return
-        name = watched.get(function) if callable(function) and function.__hash__ else None
-        if name is None and getattr(function, "__qualname__", "") in ("datetime.now", "datetime.utcnow"):
-            name = function.__qualname__
-        if name is not None:
-            called.append(name)
 
-    if sys.getprofile() is not None:  # a profiler is at work, and there can be one alone
-        yield called
-        return
-    sys.setprofile(note)
-    try:
-        yield called
-    finally:
-        sys.setprofile(None)
+WAITING_CASES: tuple[Case, ...] = (_retries,)

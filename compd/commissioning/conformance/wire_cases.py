@@ -6,6 +6,7 @@ from random import Random
 
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.case_result import (
+    BY_TCP,
     DAMAGED,
     GOOD,
     IN_VIRTUAL_TIME,
@@ -27,8 +28,6 @@ ENDS_OF_MAPS = (2, 3, 4)  # of them, those with which slaves answer where their 
 
 IN_A_ROW = 5  # more than any driver counts before it does something else
 IN_ANY_ORDER = 300
-BY_TCP = "TCP's own checksum keeps it from the driver"
-
 
 
 def _time_stamp(session: ConformanceSession, _: Subject) -> CaseResult:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
 
 from compd_drivers.simulated.shared import CommandDevice
 
@@ -12,10 +11,12 @@ from compd_drivers.simulated.shared import CommandDevice
 LARGEST_MM = 199.9990  # what a head shows that has no value
 RS1A_COMMAND_ERROR = "ER,{},00\r\n"
 RS1A_GO, RS1A_ALARM = "02", "16"  # judgement of a head: inside its limits, or no value
+RS1A_CODES = {"+199.9990": "over_range", "-199.9990": "under_range", "---------": "sensor_fault"}
 # DL-EN1
 INVALID = -99_999_998
 OVER, UNDER = 99_999_999, -99_999_999
 EN1_GO, EN1_ERROR = "04", "03"
+EN1_CODES = {OVER: "over_range", UNDER: "under_range", INVALID: "sensor_fault", 100_000_000: "sensor_fault"}
 EN1_FORMAT_ERROR = "ER,{},255\r\n"
 
 
@@ -23,6 +24,16 @@ class SimulatedDlRs1a(CommandDevice):
     """Shows its channels `1`, `2` ...; a sensor that is off shows the number that means `no value`."""
 
     terminator = b"\r\n"
+
+    @property
+    def error_replies(self) -> Mapping[bytes, str]:
+        """Errors of the unit, and what every head shows without a value."""
+        request = self.options.request
+        replies = {f"ER,{request},{number}\r\n".encode(): "device_error" for number in ("00", "31")}
+        state = f",{RS1A_ALARM}" if request == "MS" else ""
+        for field, quality in RS1A_CODES.items():
+            replies[(request + f"{state},{field}" * self.options.heads + "\r\n").encode()] = quality
+        return replies
 
     def answer(self, command: str) -> str:
         """M0: values; MS: values with each head's judgement; ER for what it does not know."""
@@ -46,13 +57,15 @@ class SimulatedDlRs1a(CommandDevice):
 class SimulatedDlEn1(CommandDevice):
     """Shows its channels `1`, `2` ... as integers with a sign and nine digits; a sensor that is off is invalid."""
 
-    error_replies: ClassVar[Mapping[bytes, str]] = {
-        b"ER,MS,031\r\n": "device_error",
-        b"ER,MS,254\r\n": "device_error",
-        b"ER,MS,255\r\n": "device_error",
-    }
-
     terminator = b"\r\n"
+
+    @property
+    def error_replies(self) -> Mapping[bytes, str]:
+        """Errors of the unit, and the numbers with which every head says that it has no value."""
+        replies = {f"ER,MS,{number}\r\n".encode(): "device_error" for number in ("031", "254", "255")}
+        for number, quality in EN1_CODES.items():
+            replies[("MS" + f",{EN1_ERROR},{number:+010d}" * self.options.heads + "\r\n").encode()] = quality
+        return replies
 
     def answer(self, command: str) -> str:
         """MS: states and values; M0: values alone; ER for what it does not know."""
