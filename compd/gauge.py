@@ -34,7 +34,8 @@ Rules for every driver:
 - `time_s` is what `send` or `read_registers` returned, never the time of the reply.
 - There is no number unless the reply fits exactly. What is damaged, cut short or out of range becomes a `Quality`.
 - A channel that has no value is `bad` and the others go on; `LineFault` is for a poll that failed as a whole.
-- `read` does not sleep or log, nor repeat a poll that failed: the line's thread decides when to ask again.
+- `read` does not sleep, log or look at a clock, nor repeat a poll that failed: the line's thread decides when to ask
+  again.
 
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
 ``driver: /etc/compd/my_gauge.py:MyGauge``. One that calls a library which may keep the interpreter or crash belongs on

@@ -298,6 +298,16 @@ class WaitsByTheComputersClock(Comparator):
         raise LineFault(Quality.TIMEOUT)
 
 
+class SleepsEveryHundredthPoll(Comparator):
+    _polls = 0
+
+    def ask(self, line: ByteLine) -> tuple[float, bytes]:
+        self._polls += 1
+        if self._polls % 100 == 0:
+            time.sleep(1e-3)
+        return super().ask(line)
+
+
 class WaitsForAnEvent(Comparator):
     def ask(self, line: ByteLine) -> tuple[float, bytes]:
         threading.Event().wait(1e-3)

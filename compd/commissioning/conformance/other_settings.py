@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any, Literal, get_args, get_origin
 
@@ -11,7 +12,7 @@ from compd.gauge import GaugeOptions
 
 
 def other_settings(options: GaugeOptions) -> Iterator[tuple[str, GaugeOptions]]:
-    """What was changed ("address=2") and the options; for whole numbers, digits, choices and switches."""
+    """What was changed ("address=2") and the options; for whole numbers, texts that end so, choices, switches."""
     for name, field in type(options).model_fields.items():
         if name in GaugeOptions.model_fields:
             continue
@@ -31,6 +32,6 @@ def _others(value: Any, annotation: Any) -> list[Any]:
         return [not value]
     if isinstance(value, int):
         return [value + 1, value - 1]
-    if isinstance(value, str) and value.isdecimal():
-        return [f"{int(value) + 1:0{len(value)}d}"[-len(value) :]]
+    if isinstance(value, str) and (digits := re.search(r"\d+$", value)):
+        return [value[: digits.start()] + f"{int(digits[0]) + 1:0{len(digits[0])}d}"[-len(digits[0]) :]]
     return []

@@ -17,6 +17,7 @@ from compd.commissioning.conformance.case_result import (
     complaints_of,
     result_of,
 )
+from compd.commissioning.conformance.clock_calls import clock_calls
 from compd.commissioning.conformance.harness import ConformanceSession, Poll
 from compd.commissioning.conformance.peer import GOLDEN
 
@@ -26,6 +27,7 @@ BISECTIONS = 60  # from one step of a decade to the next, down to the last digit
 MOST_POWERS = 32  # of 2 digits, where counters and signs roll over
 MANY_EXCHANGES = 10_000
 FEWEST_POLLS = 3000  # a driver that is wrong every thousandth time is wrong three times
+WATCHED_POLLS = 300  # of them, in which no clock must be called
 MOST_WITHOUT_VALUE = 0.02  # of them: single numbers that mean something else, such as 85.0 degC of a DS18B20
 SMALL_STEPS = 20
 
@@ -173,7 +175,12 @@ def _many_polls(session: ConformanceSession, subject: Subject) -> CaseResult:
         for place, name in enumerate(session.sensors.values):
             share = (number * GOLDEN + place * 0.0719) % 1.0
             session.sensors.values[name] = share_of(session, name, share, logarithmic=number % 2 == 1)
-        poll = session.poll(new_values=False)
+        if number < WATCHED_POLLS:
+            with clock_calls() as called:
+                poll = session.poll(new_values=False)
+            complaints += [f"poll {number + 1}: `read` calls {name}" for name in called]
+        else:
+            poll = session.poll(new_values=False)
         complaints += [f"poll {number + 1}: {text}" for text in complaints_of(poll, GOOD | NO_VALUE)]
         complaints += [f"poll {number + 1}: {text}" for text in poll.undetectable]
         without += poll.qualities != GOOD

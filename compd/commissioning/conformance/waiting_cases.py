@@ -2,16 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 import resource
-import select
-import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
-from typing import Any
 
 from compd.commissioning.conformance import faults
 from compd.commissioning.conformance.case_result import (
@@ -21,6 +13,7 @@ from compd.commissioning.conformance.case_result import (
     Subject,
     every_reply,
 )
+from compd.commissioning.conformance.clock_calls import clock_calls
 from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.virtual import GAP_S, TURNAROUND_S
 
@@ -29,10 +22,6 @@ LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; other
 IDLE_TIMEOUTS = 0.5  # in line timeouts: waiting in a poll whose replies come at once
 EXCHANGE_S = GAP_S + TURNAROUND_S  # of a virtual line
 LONGEST_WAIT_S = 10.0  # for a reply that does not come
-CLOCK_FUNCTIONS = (
-    "sleep", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter", "perf_counter_ns", "process_time",
-)  # fmt: skip
-WAITS_OF_THREADS = [function.__code__ for function in (threading.Condition.wait, threading.Thread.join)]
 FAULTS = (
     faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5),
     faults.replaced(b"ERR\r\n"),
@@ -47,7 +36,7 @@ def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
     blocked_s = []
     for _ in range(LOOKS):
         started_s, gave_up = time.perf_counter(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
-        with _calls_watched() as called:
+        with clock_calls() as called:
             poll = session.poll()
         # a thread that waits gives the processor up; one from which it is taken has no part in that
         waited = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw > gave_up
@@ -71,7 +60,7 @@ def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseRes
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
     longest_s = 0.0
     for fault in FAULTS:
-        with _calls_watched() as called:
+        with clock_calls() as called:
             poll = session.poll(every_reply(fault))
         if called:
             return CaseResult(case, required, f"{fault.name}: `read` calls {called[0]}", "FAIL")
@@ -101,34 +90,3 @@ def _retries(session: ConformanceSession, subject: Subject) -> CaseResult:
 
 
 WAITING_CASES: tuple[Case, ...] = (_retries,)
-
-
-@contextmanager
-def _calls_watched() -> Iterator[list[str]]:
-    """The clock functions of the computer that are called meanwhile, by their names."""
-    called: list[str] = []
-    watched = {id(getattr(time, name)): f"time.{name}" for name in CLOCK_FUNCTIONS}
-    watched[id(select.select)] = "select.select"
-
-    def note(frame: FrameType, event: str, function: Any) -> None:
-        if event == "call" and frame.f_code in WAITS_OF_THREADS:
-            called.append(f"threading's {frame.f_code.co_qualname}")
-        elif event == "c_call":
-            name = watched.get(id(function), "")
-            if getattr(function, "__qualname__", "") in ("datetime.now", "datetime.utcnow"):
-                name = function.__qualname__
-            if name:
-                called.append(name)
-
-    if sys.getprofile() is not None:  # a profiler is at work, and there can be one alone
-        yield called
-        return
-    collecting = gc.isenabled()
-    gc.disable()  # what a collection calls is not the driver's
-    sys.setprofile(note)
-    try:
-        yield called
-    finally:
-        sys.setprofile(None)
-        if collecting:
-            gc.enable()

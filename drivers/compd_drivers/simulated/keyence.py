@@ -11,6 +11,7 @@ from compd_drivers.simulated.shared import CommandDevice
 LARGEST_MM = 199.9990  # what a head shows that has no value
 RS1A_COMMAND_ERROR = "ER,{},00\r\n"
 RS1A_GO, RS1A_ALARM = "02", "16"  # judgement of a head: inside its limits, or no value
+RS1A_CODES = {"+199.9990": "over_range", "-199.9990": "under_range", "---------": "sensor_fault"}
 # DL-EN1
 INVALID = -99_999_998
 OVER, UNDER = 99_999_999, -99_999_999
@@ -23,6 +24,16 @@ class SimulatedDlRs1a(CommandDevice):
     """Shows its channels `1`, `2` ...; a sensor that is off shows the number that means `no value`."""
 
     terminator = b"\r\n"
+
+    @property
+    def error_replies(self) -> Mapping[bytes, str]:
+        """Errors of the unit, and what every head shows without a value."""
+        request = self.options.request
+        replies = {f"ER,{request},{number}\r\n".encode(): "device_error" for number in ("00", "31")}
+        state = f",{RS1A_ALARM}" if request == "MS" else ""
+        for field, quality in RS1A_CODES.items():
+            replies[(request + f"{state},{field}" * self.options.heads + "\r\n").encode()] = quality
+        return replies
 
     def answer(self, command: str) -> str:
         """M0: values; MS: values with each head's judgement; ER for what it does not know."""

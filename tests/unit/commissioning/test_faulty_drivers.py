@@ -52,6 +52,7 @@ FAULTY = {
     "SleepsAfterAFault": ("waits after faults", "no reply: `read` calls time.sleep"),
     "DrainsEveryTime": ("waits", "although its replies come at once: it waits 0.1 s"),
     "WaitsByTheComputersClock": ("waits", "calls time.monotonic"),
+    "SleepsEveryHundredthPoll": ("thousands of polls", "`read` calls time.sleep"),
     "WaitsForAnEvent": ("waits", "calls threading's Condition.wait"),
     "AsksAgain": ("no request twice", "asks 2 times in one poll, 1 without a fault"),
     "SearchesANumber": ("one bit turned", r"is no reply of the device"),
