@@ -153,8 +153,11 @@ class MqttLine:
 
     def close(self) -> None:
         """Close the connection."""
+        connection = self._client.socket()
         self._client.on_disconnect = None
         self._client.disconnect()
+        if connection is not None:
+            connection.close()  # paho leaves one open to which DISCONNECT could not be sent
 
     def _log_in(self, settings: MqttSettings) -> None:
         """Raises OSError or ValueError for files that cannot be used."""
