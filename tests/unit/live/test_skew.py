@@ -8,11 +8,15 @@ from dataclasses import replace
 
 import pytest
 
+from compd.configuration import load
 from compd.errors import ConfigurationError
 from compd.gauge import Quality, good
 from compd.live.loop.commands import Target
 from compd.live.loop.states import State
+from compd.recording.reader import read_recording
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
+from tests.support.paths import CONFIG
+from tests.support.recorded_run import Run
 
 
 def apart(live, delays_s):
@@ -103,8 +107,6 @@ def test_before_the_first_reading_there_is_no_skew():
 
 
 def test_the_limit_is_a_time(tmp_path):
-    from compd.configuration import load
-    from tests.support.paths import CONFIG
 
     text = (CONFIG / "tripod-cmm.yaml").read_text()
     for value, allowed in (("0.05", True), ("0", False), ("soon", False)):
@@ -115,3 +117,16 @@ def test_the_limit_is_a_time(tmp_path):
         else:
             with pytest.raises(ConfigurationError, match="skew_s"):
                 load(file)
+
+
+def test_the_skew_of_a_recorded_row_is_a_column_and_no_covariate(tmp_path):
+
+    run = Run(machine())
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(5):
+            recorder.put(line, message)
+    header, *rows = (tmp_path / "run-0001.csv").read_text().splitlines()
+    assert [dict(zip(header.split(","), row.split(","), strict=True))["skew_s"] for row in rows] == ["0"] * 5
+    recording = read_recording(tmp_path / "run-0001.csv", run.machine.configuration, needs_reference=False)
+    assert recording.warnings == ()
+    assert "skew_s" not in recording.quantities
