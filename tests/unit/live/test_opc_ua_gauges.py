@@ -6,13 +6,14 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 from asyncua import ua
 
 from compd.gauge import Gauge, Quality
-from tests.support.opc_ua_server import NAMESPACE, OpcUaServer, running_server
+from tests.support.opc_ua_server import NAMESPACE, OneUser, OpcUaServer, running_server
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
 
 OK = Quality.OK
@@ -237,3 +238,17 @@ def test_a_server_that_stands_still_is_lost_though_its_connection_is_open(server
         server.go_on()
         server.write("a", 1.6)
         latest.wait_for_value("g.a", 1.6)
+
+
+def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("open sesame\n")
+    login = {"user": "compd", "password_file": str(secret)}
+    with running_server(OneUser()) as guarded:
+        guarded.write("a", 1.5)
+        with acquiring(line_to(guarded), {"g": probe()}) as (_, latest):
+            assert "refuses: Bad" in latest.wait_for("g.a", Quality.LINE_LOST).detail
+        with acquiring(line_to(guarded, **login), {"g": probe()}, stale_after_s=30.0) as (_, latest):
+            assert latest.wait_for("g.a", OK).value == 1.5
+        with acquiring(line_to(guarded, **{**login, "password_file": "/nowhere"}), {"g": probe()}) as (_, latest):
+            assert "No such file" in latest.wait_for("g.a", Quality.LINE_LOST).detail
