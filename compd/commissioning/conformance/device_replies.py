@@ -112,6 +112,8 @@ class DeviceReplies:
                     break
             while math.isfinite(alike) and step - alike > PART_OF_A_DIGIT * self.digit.get(channel, step):
                 middle = (alike + step) / 2
+                if middle in (alike, step):  # no number between them
+                    break
                 if self._shows(exchanges, {channel: value + direction * middle}):
                     alike = middle
                 else:

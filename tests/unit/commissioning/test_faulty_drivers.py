@@ -13,6 +13,8 @@ from compd.commissioning.conformance.case_result import CaseResult
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import Channel
 from compd.plugins import GAUGES, names
+from compd_drivers.modbus import Modbus
+from compd_drivers.modbus_description import ModbusOptions
 from tests.support import faulty_drivers
 
 FILE = Path(faulty_drivers.__file__)
@@ -145,3 +147,19 @@ def test_each_shipped_driver_is_right_from_digit_to_end_of_scale_on_both_sides_o
     for channel in channels:
         lowest, highest = map(float, re.search(rf"{channel.name} (\S+) to (\S+) ", result.observed).groups())  # type: ignore[union-attr]
         assert lowest < 0 < highest, result
+
+
+class InvalidForgotten(Modbus):
+    """The count that means no sensor is a number; the device shows it for all beyond its scale, too."""
+
+    def __init__(self, options: ModbusOptions) -> None:
+        super().__init__(options)
+        self._map = tuple(channel.model_copy(update={"invalid": ()}) for channel in self._map)
+
+
+def test_the_search_for_a_digit_ends_where_numbers_are_no_finer() -> None:
+    shipped = driver_under_test("modbus")
+    wrong = DriverUnderTest("x", InvalidForgotten, shipped.simulator, shipped.options)
+    result = next(r for _, r in run_conformance(wrong, on_real_wires=False) if r.case == "a sensor is off")
+    assert result.verdict == "FAIL"
+    assert "c: 2147.48365 mm as ok, the sensor had nan" in result.observed
