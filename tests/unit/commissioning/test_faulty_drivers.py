@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
+from compd.commissioning.catalogue import polled_drivers
 from compd.commissioning.conformance.case_result import CaseResult
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import Channel
-from compd.plugins import GAUGES, names
 from compd_drivers.modbus import Modbus
 from compd_drivers.modbus_description import ModbusOptions
 from tests.support import faulty_drivers
@@ -139,7 +139,7 @@ def test_where_replies_do_not_say_whose_they_are_that_is_said() -> None:
     assert "not detectable on this wire: the reply of a device with unit=inch" in result.observed
 
 
-@pytest.mark.parametrize("name", names(GAUGES))
+@pytest.mark.parametrize("name", polled_drivers())
 def test_each_shipped_driver_is_right_from_digit_to_end_of_scale_on_both_sides_of_zero(name: str) -> None:
     under_test = driver_under_test(name)
     channels: list[Channel] = list(under_test.gauge(under_test.options).channels)

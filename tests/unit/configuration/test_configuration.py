@@ -187,11 +187,11 @@ FORMER_HASHES = {
     "keyence_gt2_dlrs1a": "37090a4e118d798d",
     "mahr_c1202": "f821897c5b1592d2",
     "microepsilon_msc7": "897bc1b99b0561bd",
-    "modbus": "72088c3a76d2b61d",
+    "modbus": "35d493c8ff93e54c",
     "moxa_e1240": "ba4e6c27765b220e",
     "r4dcb08": "c2e5d7b7d4e42b05",
     "serial_ascii": "7f7fe85c9e2cc9b1",
-    "serial_frame": "046b90be97bea64d",
+    "serial_frame": "07c1d6c91634a587",
     "sylvac_optors": "892952aec8a8d994",
     "tesa_tt80": "e12f38ef40f38f10",
 }

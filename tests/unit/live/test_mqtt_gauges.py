@@ -276,14 +276,15 @@ def test_one_damaged_length_is_not_believed_and_two_that_agree_are(broker: Broke
     memory = TrustMemory(["g.a"], [0.001])
     judge = ReadingTrust(memory, "g.a", TrustSettings(MotionLimits(acceleration=1.0), False, stale_after_s=30.0))
     with listening(broker, device, timed(), trust={"g.a": judge}, stale_after_s=30.0) as (_, latest):
-        for value in (1.0, 1.0, 1.0):
-            device.publish("a", payload(value))
+        # measured 0.1 s apart, however fast they are sent: of a part whose speed is known
+        for age_s in (0.8, 0.7, 0.6):
+            device.publish("a", payload(1.0, age_s))
         latest.wait_for("g.a", OK)
-        device.publish("a", payload(5.0))  # damaged on its way: nobody can ask again
-        device.publish("a", payload(1.0001))
-        device.publish("a", payload(1.0002))
+        device.publish("a", payload(5.0, 0.5))  # damaged on its way: nobody can ask again
+        device.publish("a", payload(1.0001, 0.4))
+        device.publish("a", payload(1.0002, 0.3))
         latest.wait_for_value("g.a", 1.0002)
         assert 5.0 not in {r.value for _, r in latest.history}
-        device.publish("a", payload(5.0))
-        device.publish("a", payload(5.0))
+        device.publish("a", payload(5.0, 0.2))
+        device.publish("a", payload(5.0, 0.1))
         assert "jumped by 4.000 mm" in latest.wait_for("g.a", Quality.DISTRUSTED).detail
