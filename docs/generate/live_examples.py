@@ -110,9 +110,10 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
     setpoint = client.next_setpoint("ok")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
     target = client.ask({"class": "TARGET", "tip_B0_mm": [round(number, 1) + 0.0 for number in setpoint["tip_B0_mm"]]})
-    refused = other.ask({"class": "TARGET", "tip_B0_mm": [0.0, 0.0, -500.0]}, "ERROR")
     watch = client.ask({"class": "WATCH", "rate_hz": 10}, "WATCH")
     driven = client.next_setpoint("ok", "slewing")
+    # the answer to WATCH says that the target before it has been heard
+    refused = other.ask({"class": "TARGET", "tip_B0_mm": [0.0, 0.0, -500.0]}, "ERROR")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
     authorized = client.ask({"class": "AUTH", "token": "hvNhV6l3Zk3lY0cJ4lV5Wg"}, "VERSION")
     talk = {
