@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import closing
 
 import pytest
 
@@ -43,8 +44,7 @@ class WithThreeLinks(LinuxCnc):
 
 
 def test_corrections_of_three_links_reach_three_drives() -> None:
-    with run_directory() as directory:
-        sender = SetpointSender(directory / "compd.sock")
+    with run_directory() as directory, closing(SetpointSender(directory / "compd.sock")) as sender:
         sender.correction_mm = [0.0] * 3
         with WithThreeLinks(directory / "controller", directory, hal_files=()) as controller:
             controller.switch_on()
@@ -62,4 +62,3 @@ def test_corrections_of_three_links_reach_three_drives() -> None:
             controller.wait_for("compd.armed", False)
             assert controller.value("compd.reason") == 7
             controller.wait_for("motion.feed-inhibit", True)
-        sender.close()
