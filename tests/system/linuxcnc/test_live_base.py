@@ -35,21 +35,24 @@ def drives_mm(controller: LinuxCnc) -> list[float]:
 
 
 def test_the_moved_base_makes_what_the_correction_would() -> None:
-    with run_directory() as directory, closing(SetpointSender(directory / "compd.sock")) as sender:
-        with WithLiveBase(directory / "controller", directory, hal_files=()) as controller:
-            controller.switch_on()
-            assert drives_mm(controller) == pytest.approx([0.0] * 6, abs=1e-6)
-            controller.wait_for("compd.connected", True)
-            controller.with_corrections()
-            sender.frame = {
-                "origin_M_mm": [0.0, 0.0, 900.0 + UP_MM],
-                "displacement_M_mm": [0.0, 0.0, UP_MM],
-                "rotation_M_rad": [0.0] * 3,
-            }
-            sender.correction_mm = [LONGER_MM] * 6
-            until("the drives are there", lambda: drives_mm(controller) == pytest.approx([LONGER_MM] * 6, abs=2e-5))
-            raised_mm = pytest.approx(900.0 + UP_MM, abs=1e-6)
-            until("the base is there", lambda: controller.value("genhexkins.base.3.z") == raised_mm)
-            offsets_mm = controller.values([f"limit3.{joint}.out" for joint in range(6)])
-            assert list(offsets_mm.values()) == pytest.approx([0.0] * 6, abs=2e-5)
-            assert controller.value("axis.z.pos-cmd") == pytest.approx(320.0, abs=1e-6)
+    with (
+        run_directory() as directory,
+        closing(SetpointSender(directory / "compd.sock")) as sender,
+        WithLiveBase(directory / "controller", directory, hal_files=()) as controller,
+    ):
+        controller.switch_on()
+        assert drives_mm(controller) == pytest.approx([0.0] * 6, abs=1e-6)
+        controller.wait_for("compd.connected", True)
+        controller.with_corrections()
+        sender.frame = {
+            "origin_M_mm": [0.0, 0.0, 900.0 + UP_MM],
+            "displacement_M_mm": [0.0, 0.0, UP_MM],
+            "rotation_M_rad": [0.0] * 3,
+        }
+        sender.correction_mm = [LONGER_MM] * 6
+        until("the drives are there", lambda: drives_mm(controller) == pytest.approx([LONGER_MM] * 6, abs=2e-5))
+        raised_mm = pytest.approx(900.0 + UP_MM, abs=1e-6)
+        until("the base is there", lambda: controller.value("genhexkins.base.3.z") == raised_mm)
+        offsets_mm = controller.values([f"limit3.{joint}.out" for joint in range(6)])
+        assert list(offsets_mm.values()) == pytest.approx([0.0] * 6, abs=2e-5)
+        assert controller.value("axis.z.pos-cmd") == pytest.approx(320.0, abs=1e-6)
