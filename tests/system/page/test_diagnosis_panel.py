@@ -109,6 +109,8 @@ def test_rivals_and_formulas_are_handed_to_the_panels_that_plan_and_try(open_tab
 def test_it_is_cancelled_and_seen_in_another_browser_and_after_a_reload(open_tab):
     first, second = open_tab("two.model.yaml"), open_tab("two.model.yaml")
     first.locator("#diagnose").click()
+    until(first, RUNNING)
+    second.evaluate(f"{PANEL}.look()")  # at rest a browser looks too seldom for a diagnosis of seconds
     until(second, f"{RUNNING} && document.querySelectorAll('.stages .been, .stages .now').length >= 1")
     second.locator("#diagnose").click()
     for tab in (first, second):
