@@ -36,6 +36,7 @@ SECONDS = 4.0  # of measuring per row
 FORMAT = "8N1"
 WANTED = 0.90
 SPIN_S = 2e-4  # before a deadline: sleeping is not that exact
+PLAIN = 0x3C00  # of a register: a number of usual size as int16 and, two of them, as float32
 TRIES = 5  # of a row in which the computer pauses
 FIFO_CHARACTERS = 16  # a UART hands over so many at a time
 
@@ -72,7 +73,7 @@ def slave(fd: int, baud: int, turnaround_s: float, timer_s: float) -> None:
             request += os.read(fd, 8 - len(request))
         now_s = time.monotonic() + 8 * character_s + turnaround_s
         unit, function, _, count = struct.unpack(">BBHH", request[:6])
-        reply = bytes([unit, function, 2 * count]) + b"".join((k + 1).to_bytes(2, "big") for k in range(count))
+        reply = bytes([unit, function, 2 * count]) + b"".join((PLAIN + k).to_bytes(2, "big") for k in range(count))
         reply += crc16(reply).to_bytes(2, "little")
         for at in range(0, len(reply), FIFO_CHARACTERS):
             piece = reply[at : at + FIFO_CHARACTERS]
