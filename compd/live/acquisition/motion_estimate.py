@@ -7,7 +7,8 @@ windowing for velocity estimation, IEEE Trans. Control Systems Technology 8 (200
 
 The slopes of the windows before, each as long, say more:
 
-- A speed counts where the window before shows it too: a single step is no motion to be carried on.
+- A speed counts where the window before shows it too: a single step is no motion to be carried on. It counts where the
+  last interval shows it, too: a part that has come to rest since is at rest.
 - Where the slope falls from window to window, the part brakes: it is carried on to its standstill, and not beyond. One
   that becomes faster is carried on with the speed that it has, since it may stop to do so at any time.
 - What the slope has changed by from one window to the next, within a second, it may change by again: that is its
@@ -60,7 +61,7 @@ def estimated_motion(history: Sequence[Sample], tolerance_mm: float) -> ReadingM
     changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
     u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s)
     before = slopes[1] if len(slopes) > 1 else 0.0
-    if now * before <= 0.0:
+    if now * before <= 0.0 or _has_stopped(history, now, tolerance_mm):
         return _rounded(0.0, 0.0, max(u, abs(now)), horizon_s)
     if abs(now) >= abs(before):
         speed = math.copysign(min(abs(now), LARGEST_GROWTH * abs(before)), now)
@@ -83,6 +84,13 @@ def _window_start(history: Sequence[Sample], last: int, tolerance_mm: float) -> 
         if abs(newest.value - history[k].value) > tolerance_mm:
             break
     return start
+
+
+def _has_stopped(history: Sequence[Sample], speed: float, tolerance_mm: float) -> bool:
+    """Whether the last interval shows no motion, though `speed` (mm/s), that of its window, would show in it."""
+    newest, before = history[-1], history[-2]
+    shown_mm = abs(newest.value - before.value)
+    return shown_mm <= tolerance_mm < abs(speed) * (newest.time_s - before.time_s) - shown_mm
 
 
 def _slopes(history: Sequence[Sample], start: int, duration_s: float) -> list[float]:

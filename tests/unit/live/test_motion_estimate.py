@@ -54,6 +54,19 @@ def test_a_single_step_is_not_carried_on_and_its_speed_is_in_the_uncertainty():
     assert motion([0.0] * 10 + [0.5, 0.5]).speed_mm_per_s == 0.0
 
 
+@pytest.mark.parametrize("last_mm", [0.5, 5.0, 9.0, 10.0])
+@pytest.mark.parametrize("round_s", [0.01, 0.04, 0.3])
+def test_what_the_last_two_readings_show_at_rest_is_at_rest_however_it_came_there(last_mm, round_s):
+    moving = [10.0 * k for k in range(6)]
+    end = moving[-1] + last_mm
+    for rounds_at_rest in range(1, 6):
+        values = [*moving, *[end] * (1 + rounds_at_rest)]
+        shown = motion(values, [round_s * k for k in range(len(values))])
+        assert shown.speed_mm_per_s == 0.0
+        if (1 + rounds_at_rest) * round_s < 0.5:
+            assert shown.u_mm_per_s >= last_mm / round_s / (1 + rounds_at_rest), "it may move again as it did"
+
+
 def test_a_motion_that_turns_is_not_carried_on():
     assert motion([0.0, 1.0, 2.0, 3.0, 2.0]).speed_mm_per_s == 0.0
 
