@@ -33,21 +33,19 @@ Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 
 from __future__ import annotations
 
-import json
-import socket
 from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
+from compd.client_connection import ClientConnection, Message, open_connection
 from compd.errors import DaemonError, Problem
 from compd.live.loop.states import state_named
 
-DEFAULT_ADDRESS = "127.0.0.1:7750"
-_IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
+__all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
 
-Message = dict[str, Any]
+DEFAULT_ADDRESS = "127.0.0.1:7750"
 
 
 def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token: str | None = None) -> Client:
@@ -81,31 +79,9 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token
             for setpoint in daemon.watch(rate_hz=10):
                 print(setpoint["tip_M_mm"] if setpoint["valid"] else setpoint["reason"])
     """
-    text = str(address)
+    connection = open_connection(str(address), timeout_s)
     try:
-        if "/" in text:
-            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            connection.settimeout(timeout_s)
-            try:
-                connection.connect(text)
-            except OSError:
-                connection.close()
-                raise
-        else:
-            host, _, port = text.rpartition(":")
-            connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
-    except ValueError as error:
-        raise DaemonError(
-            Problem(
-                where="address", what="not an address", value=text, allowed="host:port, or the path of a Unix socket"
-            )
-        ) from error
-    except OSError as error:
-        raise DaemonError(
-            Problem(where=text, what=f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
-        ) from error
-    try:
-        return Client(connection, text, token)
+        return Client(connection, token)
     except DaemonError:
         connection.close()
         raise
@@ -124,19 +100,16 @@ class Client:
         The daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
     """
 
-    def __init__(self, connection: socket.socket, address: str, token: str | None = None) -> None:
-        """`connection`: an open socket with its timeout set; `address`: the name of the other end in errors; `token`:
-        as in `connect`."""
+    def __init__(self, connection: ClientConnection, token: str | None = None) -> None:
+        """`connection`: to the daemon, with nothing read yet; `token`: as in `connect`."""
         self._connection = connection
-        self._address = address
-        self._lines = connection.makefile("rb")
         self._setpoints: deque[Message] = deque()
-        _, greeting = self._read()
+        _, greeting = connection.read()
         if greeting["class"] == "AUTH":
             if token is None:
                 raise DaemonError(
                     Problem(
-                        where=address,
+                        where=connection.address,
                         what="the daemon wants a token before anything else",
                         next_step="give the one in its file `sockets.tcp.token_file`: connect(..., token=...), "
                         "`compd watch --token-file`",
@@ -196,9 +169,9 @@ class Client:
             Where the daemon refuses, has gone, or sent nothing within the timeout.
         """
         request: Message = {"class": "WATCH", "what": "readings"}
-        self._send(request if rate_hz is None else request | {"rate_hz": rate_hz})
+        self._connection.send(request if rate_hz is None else request | {"rate_hz": rate_hz})
         while True:
-            yield self._read()
+            yield self._connection.read()
 
     def target(
         self,
@@ -228,7 +201,8 @@ class Client:
             Where the daemon has gone.
         """
         keys = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
-        self._send({"class": "TARGET", **{key: list(value) for key, value in keys.items() if value is not None}})
+        given = {key: list(value) for key, value in keys.items() if value is not None}
+        self._connection.send({"class": "TARGET", **given})
 
     def release(self) -> None:
         """Give the controller's role back: the daemon returns to CMM mode.
@@ -359,7 +333,6 @@ class Client:
 
     def close(self) -> None:
         """Close the connection; a controller's role ends with it."""
-        self._lines.close()
         self._connection.close()
 
     def __enter__(self) -> Self:
@@ -371,49 +344,16 @@ class Client:
         self.close()
 
     def _ask(self, message: Message, answer: str) -> Message:
-        self._send(message)
+        self._connection.send(message)
         return self._await(answer)
-
-    def _send(self, message: Message) -> None:
-        try:
-            self._connection.sendall(json.dumps(message).encode() + b"\n")
-        except OSError as error:
-            raise self._lost(error.strerror or str(error)) from error
 
     def _await(self, wanted: str) -> Message:
         """Read until a message of class `wanted`; every setpoint on the way is kept for `watch`."""
         while True:
-            _, message = self._read()
+            _, message = self._connection.read()
             if message["class"] == "SETPOINT":
                 if state_named(message.get("state", "")) is None:
                     message["valid"] = False
                 self._setpoints.append(message)
             if message["class"] == wanted:
                 return message
-
-    def _read(self) -> tuple[bytes, Message]:
-        """The next line, and the message that it is. Raises DaemonError for an ERROR message too."""
-        try:
-            line = self._lines.readline()
-        except OSError as error:
-            raise self._lost(error.strerror or "no answer in time") from error
-        if not line.endswith(b"\n"):
-            raise self._lost("it closed the connection")
-        try:
-            message: Message = json.loads(line)
-            error_code = message["code"] if message["class"] == "ERROR" else None
-        except (ValueError, TypeError, KeyError) as error:
-            raise DaemonError(
-                Problem(
-                    where=self._address,
-                    what="what answers here is not compd",
-                    value=repr(line[:40]),
-                    next_step="give the address under `sockets:` in the daemon's configuration",
-                )
-            ) from error
-        if error_code is not None:
-            raise DaemonError(Problem(where=self._address, what=message["text"], value=error_code))
-        return line, message
-
-    def _lost(self, why: str) -> DaemonError:
-        return DaemonError(Problem(where=self._address, what=f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))

@@ -47,109 +47,32 @@ of the entry-point group ``compd.gauge_presets``.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from compd.reading import LineFault, Quality, Reading, ReadingMotion, bad, good
 
-class Quality(StrEnum):
-    """Whether a reading has a value, and if not, why. Only OK carries a number. text : meaning, for people."""
-
-    text: str
-
-    def __new__(cls, name: str, text: str = "") -> Self:
-        quality = str.__new__(cls, name)
-        quality._value_ = name
-        quality.text = text
-        return quality
-
-    OK = "ok", "there is a value"
-    NEVER_READ = "never_read", "nothing has been asked yet"
-    TIMEOUT = "timeout", "no byte came"
-    INCOMPLETE = "incomplete", "the reply was cut short"
-    CRC = "crc", "a checksum or parity does not fit"
-    MISMATCH = "mismatch", "a whole reply came, but not to what was asked"
-    DEVICE_ERROR = "device_error", "the device answered with an error of its own"
-    OVER_RANGE = "over_range", "the device says that the value is above its range"
-    UNDER_RANGE = "under_range", "the device says that the value is below its range"
-    SENSOR_FAULT = "sensor_fault", "the device says that its sensor is faulty or absent"
-    NOT_FINITE = "not_finite", "the reply is no finite number"
-    SILENT = "silent", "the device is silent by design, for instance in its menu, and not lost"
-    LINE_LOST = "line_lost", "the port is gone; the line is opened again after a pause"
-    DRIVER_ERROR = "driver_error", "the driver itself failed: a defect in it, to be reported"
-    STALE = "stale", "there was a value, which is too old now"
-    DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
-
-
-class ReadingMotion(NamedTuple):
-    """How what a length gauge measures moves, by its own last readings. compd finds it; a driver leaves it out.
-
-    Attributes
-    ----------
-    speed_mm_per_s : at the time of the reading, mm/s; 0 where it does not move, or not steadily.
-    braking_mm_per_s2 : by how much its size falls, mm/s2; 0 where it does not brake.
-    u_mm_per_s : standard uncertainty of the speed, mm/s; nan where there are not enough readings yet.
-    horizon_s : for so long after a reading, s, the motion may be taken to go on.
-    """
-
-    speed_mm_per_s: float
-    braking_mm_per_s2: float
-    u_mm_per_s: float
-    horizon_s: float
-
-
-class Reading(NamedTuple):
-    """One channel of one gauge at one time. Drivers make it by `good` and `bad`.
-
-    Attributes
-    ----------
-    value : in the channel's unit (mm for every length); nan unless `quality` is OK.
-    time_s : monotonic time (s) at which the request had left the port. It is the earliest time at which the device can
-        have sampled, so that the age of a reading is never understated.
-    quality : OK, or the reason why there is no value.
-    detail : what the device sent or the line saw, for a person ("ER,MS,31"); "" when OK.
-    motion : of a length, where compd knows it; drivers leave it out.
-    """
-
-    value: float
-    time_s: float
-    quality: Quality
-    detail: str = ""
-    motion: ReadingMotion | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Whether there is a value."""
-        return self.quality is Quality.OK
-
-
-def good(value: float, time_s: float) -> Reading:
-    """A reading with a value, in the channel's unit; one that is not finite becomes `bad` with NOT_FINITE."""
-    if not math.isfinite(value):
-        return bad(time_s, Quality.NOT_FINITE, repr(value))
-    return Reading(value, time_s, Quality.OK)
-
-
-def bad(time_s: float, quality: Quality, detail: str = "") -> Reading:
-    """A reading without a value: its quality is the reason, `detail` what was seen."""
-    return Reading(math.nan, time_s, quality, detail)
-
-
-class LineFault(Exception):
-    """A poll that failed as a whole: every channel of the gauge takes this quality.
-
-    Lines raise it for what happens to the bytes, drivers for a reply that cannot be used (MISMATCH, CRC, DEVICE_ERROR).
-    """
-
-    def __init__(self, quality: Quality, detail: str = "") -> None:
-        super().__init__(f"{quality}: {detail}" if detail else str(quality))
-        self.quality = quality
-        self.detail = detail
+__all__ = [
+    "ByteLine",
+    "Channel",
+    "Gauge",
+    "GaugeOptions",
+    "LineFault",
+    "LineKind",
+    "Quality",
+    "Reading",
+    "ReadingMotion",
+    "RegisterLine",
+    "RegisterReply",
+    "Unit",
+    "bad",
+    "good",
+    "replies_tell_whose",
+]
 
 
 Unit = Literal["mm", "degC", "N", "hPa", "pct", "1"]

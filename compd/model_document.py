@@ -207,7 +207,7 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
     )
 
 
-class _Dumper(yaml.SafeDumper):
+class _DumperWithoutAliases(yaml.SafeDumper):
     """Writes a formula that stands in the model and in a step twice, and not as `&id001` and `*id001`."""
 
     def ignore_aliases(self, data: Any) -> bool:
@@ -224,7 +224,9 @@ def write_stored(path: Path, stored: StoredModel) -> None:
         **stored.state,
         "steps": [_step_data(step) for step in stored.steps],
     }
-    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    text = yaml.dump(
+        data, Dumper=_DumperWithoutAliases, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
+    )
     try:
         # the daemon, another user, must be able to read it
         write_files({path: text}, mode=0o644)

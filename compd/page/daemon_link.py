@@ -120,7 +120,7 @@ class DaemonConnection:
         self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
         try:
             _agreed(await self.read(), "the connection")  # the greeting
-        except BaseException:
+        except BaseException:  # a cancelled task, too, leaves no open connection
             await self._close()
             raise
         return self

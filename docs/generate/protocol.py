@@ -8,7 +8,10 @@ from compd.configuration.operation import TargetSettings, TcpSocket
 from compd.live.loop.packet_layout import PACKET_FIELDS, PACKET_SIZE
 from compd.live.loop.states import Mode
 from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES
-from compd.live.service.message_keys import ErrorKeys, ReadingsKeys, SentMessage, SetpointKeys, StatusKeys, VersionKeys
+from compd.live.service.message_keys.message import ErrorKeys, SentMessage, VersionKeys
+from compd.live.service.message_keys.readings import ReadingsKeys
+from compd.live.service.message_keys.setpoint import SetpointKeys
+from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL, ErrorCode
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS

@@ -172,7 +172,7 @@ def run_loop(latest: Any, put: Callable[[Setpoint | None], None], rate_hz: float
     collector = realtime.QuietCollector()
     collector.start(time.monotonic())
     while not all(reading.ok for reading in latest.snapshot(0.0).readings):
-        time.sleep(0.01)
+        time.sleep(0.01)  # readings are in shared memory, which tells nobody of a new one
     for _ in range(WARM_UP_CYCLES):
         run_cycle(0, time.monotonic())
     go.wait()
@@ -268,7 +268,7 @@ def run_layout(layout: str, scheduling: str, scheduling_client: str, rate_hz: fl
     if layout != NO_LOOP:
         processes.append(partial(receive, service, scheduling_client))
     results = [fork(process) for process in processes]
-    time.sleep(SETTLE_S)
+    time.sleep(SETTLE_S)  # what the interpreters do after their start is not measured
     if layout != NO_LOOP:
         go.wait()
     command = ["cyclictest", "--quiet", "--mlockall", f"--priority={PRIORITY}", f"--interval={round(1e6 / rate_hz)}"]

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tests.injection.rig import InjectedMachine
 
 CONNECTED_WITHIN_S = 10.0
+# Between one attack and the next: the attack is meant to last, and not to take a processor.
 PAUSE_S = 0.01
 RESET = struct.pack("ii", 1, 0)
 Address = tuple[str, int]

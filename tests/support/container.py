@@ -47,15 +47,15 @@ def what_is_missing() -> str:
     return "" if os.geteuid() == 0 else "a container is booted by root alone"
 
 
-def wait_until(look: Callable[[], T | None], what: str, timeout_s: float) -> T:
-    """What `look` returns as soon as that is neither None nor False; AssertionError after `timeout_s`."""
+def wait_until(condition: Callable[[], T | None], what: str, timeout_s: float) -> T:
+    """What `condition` returns, once it is neither None nor False; AssertionError after `timeout_s`."""
     end_s = time.monotonic() + timeout_s
     while True:
-        found = look()
-        if found is not None and found is not False:
-            return found
+        result = condition()
+        if result is not None and result is not False:
+            return result
         assert time.monotonic() < end_s, f"waited {timeout_s:g} s for {what}"
-        time.sleep(LOOK_EVERY_S)
+        time.sleep(LOOK_EVERY_S)  # nothing inside the container tells the outside that something has changed
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ class Daemon:
             )
             try:
                 self._wait_for_ready(manager)
-            except BaseException:
+            except BaseException:  # Ctrl-C, too, leaves no daemon running
                 self.stop()
                 raise
         return self

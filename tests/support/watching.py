@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -137,8 +135,7 @@ class Watcher:
     def close(self) -> None:
         """Stop watching."""
         # ends the thread's read; the thread closes the files
-        with contextlib.suppress(OSError):
-            self._client._connection.shutdown(socket.SHUT_RDWR)
+        self._client._connection.shutdown()
         self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive()
 

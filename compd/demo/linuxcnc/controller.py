@@ -102,7 +102,7 @@ class LinuxCnc:
             )
         try:
             self._panel = self._connect()
-        except BaseException:
+        except BaseException:  # Ctrl-C, too, leaves no LinuxCNC running
             self._end()
             raise
         return self

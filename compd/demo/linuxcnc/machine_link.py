@@ -41,7 +41,7 @@ END_S = 1.0
 HYSTERESIS_MM = 0.002
 
 
-class Sample(NamedTuple):
+class ServoSample(NamedTuple):
     """What the sampler caught in one servo period; see machine.hal."""
 
     number: int
@@ -51,11 +51,11 @@ class Sample(NamedTuple):
     bits: list[bool]
 
 
-def read_sample(line: bytes) -> Sample:
+def read_sample(line: bytes) -> ServoSample:
     number, *cells = line.split()
     values = [float(cell) for cell in cells[: 2 * LINKS + 3]]
     bits = [cell != b"0" for cell in cells[2 * LINKS + 3 :]]
-    return Sample(int(number), values[:LINKS], values[LINKS : 2 * LINKS], values[2 * LINKS :], bits)
+    return ServoSample(int(number), values[:LINKS], values[LINKS : 2 * LINKS], values[2 * LINKS :], bits)
 
 
 class Simulation:
@@ -163,7 +163,7 @@ class Link:
         except subprocess.TimeoutExpired:
             self._sampler.kill()
 
-    def _hand_over(self, samples: list[Sample]) -> None:
+    def _hand_over(self, samples: list[ServoSample]) -> None:
         followed = [sample for sample in samples if sample.number % FOLLOWED == 0]
         if followed:
             self._simulation.follow([[sample.number * PERIOD_S, *sample.drive_mm] for sample in followed])
@@ -172,7 +172,7 @@ class Link:
             if sample.number % LOGGED == 0:
                 self._write(sample)
 
-    def _watch(self, sample: Sample) -> None:
+    def _watch(self, sample: ServoSample) -> None:
         correction_mm = [drive - nominal for drive, nominal in zip(sample.drive_mm, sample.nominal_mm, strict=True)]
         before = self._before or correction_mm
         steps_mm = [abs(now - last) for now, last in zip(correction_mm, before, strict=True)]
@@ -180,7 +180,7 @@ class Link:
         self._largest_mm = max(self._largest_mm, *(abs(value) for value in correction_mm))
         self._step_mm = max(self._step_mm, *steps_mm)
 
-    def _write(self, sample: Sample) -> None:
+    def _write(self, sample: ServoSample) -> None:
         tip_mm = self._simulation.tip_mm(sample.drive_mm) if sample.number % WITH_TIP == 0 else None
         if tip_mm is not None and self._probe is not None:
             self._probe.aim(sample.believed_mm, tip_mm)

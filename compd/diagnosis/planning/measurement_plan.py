@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
-from compd.instruments.writers.gcode import Motion
+from compd.instruments.writers.gcode import FeedAndDwell
 from compd.instruments.writers.target import Way
 from compd.number_text import join_words
 from compd.recording.plan_file import NOT_SET, plan_text, write_text_file
@@ -124,7 +124,7 @@ class MeasurementPlan:
         """The text of the file that `write` writes, with the same parameters."""
         if format == "plan":
             return plan_text(self.rows)
-        motion = None if feed_mm_per_min is None else Motion(feed_mm_per_min, dwell_s)
+        motion = None if feed_mm_per_min is None else FeedAndDwell(feed_mm_per_min, dwell_s)
         title = f"{', '.join(self.rivals)}; {len(self.rows)} rows"
         return target_bytes(self.rows, format, self.ways, motion, title).decode()
 

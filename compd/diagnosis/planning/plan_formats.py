@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 
 from compd.errors import CompdError, Problem
-from compd.instruments.writers.gcode import MARK, Motion, write_gcode
-from compd.instruments.writers.target import Target, Way
+from compd.instruments.writers.gcode import MARK, FeedAndDwell, write_gcode
+from compd.instruments.writers.target import TargetPoint, Way
 from compd.instruments.writers.target_list import CSV_MARK, SA_MARK, write_csv_targets, write_sa_targets
 from compd.recording.plan_file import NOT_SET, PURPOSE_COLUMN, SPEED_COLUMN, TIP_COLUMNS
 
@@ -26,7 +26,7 @@ def target_name(row: int) -> str:
     return f"P{row:0{_NAME_DIGITS}d}"
 
 
-def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] = ()) -> list[Target]:
+def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] = ()) -> list[TargetPoint]:
     """The rows as targets. ways : of each row; () where they are not known."""
     targets = []
     last_s = np.inf
@@ -40,7 +40,7 @@ def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] =
         way = ways[k] if ways else None
         wanted = any(row[name] for name in motion)
         targets.append(
-            Target(
+            TargetPoint(
                 name=target_name(row.get("row", k + 1)),
                 purpose=row[PURPOSE_COLUMN],
                 tip_M_mm=tip,
@@ -59,7 +59,7 @@ def target_bytes(
     rows: Sequence[Mapping[str, Any]],
     shape: PlanFormat,
     ways: Sequence[Way | None] = (),
-    motion: Motion | None = None,
+    motion: FeedAndDwell | None = None,
     title: str = "",
 ) -> bytes:
     """The bytes of a list of targets, or of a programme. ways, motion, title : for G-code.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.instruments.writers.target import Target
+from compd.instruments.writers.target import TargetPoint
 
 # By this a file is known as a programme of compd, which may be written over.
 MARK = "(compd plan"
@@ -23,14 +23,14 @@ _COMMENT_WIDTH = 90
 
 
 @dataclass(frozen=True)
-class Motion:
+class FeedAndDwell:
     """What a plan does not say. feed_mm_per_min : between places. dwell_s : at rest at each of them."""
 
     feed_mm_per_min: float
     dwell_s: float
 
 
-def write_gcode(targets: Sequence[Target], motion: Motion, title: str) -> bytes:
+def write_gcode(targets: Sequence[TargetPoint], motion: FeedAndDwell, title: str) -> bytes:
     """The programme. Every target needs a place.
 
     Where something is to be set that differs from the target before, the programme stops (M0) and says what.
@@ -41,14 +41,14 @@ def write_gcode(targets: Sequence[Target], motion: Motion, title: str) -> bytes:
 class _Programme:
     """Writes lines, and knows where the tip is and what was set last."""
 
-    def __init__(self, motion: Motion) -> None:
+    def __init__(self, motion: FeedAndDwell) -> None:
         self._motion = motion
         self._here_M_mm: FloatArray | None = None
         self._set: Mapping[str, float] | None = None
         # since the beginning of a programme, as far as feeds and dwells tell
         self._time_s = 0.0
 
-    def lines(self, targets: Sequence[Target], title: str) -> Iterator[str]:
+    def lines(self, targets: Sequence[TargetPoint], title: str) -> Iterator[str]:
         yield f"{MARK}: {_clean(title)})"
         yield "(X Y Z: tip of the tool in the machine's frame M, mm. Try it without the machine first.)"
         yield "G21 G90 G94"
@@ -56,7 +56,7 @@ class _Programme:
             yield from self._target(target)
         yield "M2"
 
-    def _target(self, target: Target) -> Iterator[str]:
+    def _target(self, target: TargetPoint) -> Iterator[str]:
         assert target.tip_M_mm is not None
         yield ""
         yield from _comments(f"{target.name}: {target.purpose}")
@@ -93,7 +93,7 @@ class _Programme:
         self._time_s += seconds
         return f"G4 P{_number(seconds, 1)}"
 
-    def _travel_s(self, target: Target) -> float:
+    def _travel_s(self, target: TargetPoint) -> float:
         """Time of the way to the target, at the feed."""
         assert target.tip_M_mm is not None
         stations = [target.way.via_M_mm] if target.way is not None else []

@@ -22,7 +22,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Target:
+class TargetPoint:
     """One row of a plan.
 
     Attributes

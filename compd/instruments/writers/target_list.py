@@ -10,13 +10,13 @@ import numpy as np
 
 from compd.instruments.writers.samples import POSITION, Samples
 from compd.instruments.writers.spatial_analyzer import write_spatial_analyzer
-from compd.instruments.writers.target import Target
+from compd.instruments.writers.target import TargetPoint
 
 # By these a file is known as a list of compd, which may be written over.
 SA_MARK, CSV_MARK = "targets of compd plan", ",purpose\n"
 
 
-def write_sa_targets(targets: Sequence[Target]) -> bytes:
+def write_sa_targets(targets: Sequence[TargetPoint]) -> bytes:
     """Points of the collection `compd`, group `plan`, in {M} and mm. Every target needs a place."""
     samples = Samples(
         POSITION,
@@ -27,7 +27,7 @@ def write_sa_targets(targets: Sequence[Target]) -> bytes:
     return write_spatial_analyzer(samples, frame="compd::M", collection="compd", version=SA_MARK)
 
 
-def write_csv_targets(targets: Sequence[Target]) -> bytes:
+def write_csv_targets(targets: Sequence[TargetPoint]) -> bytes:
     """name; x_mm, y_mm, z_mm where the targets have a place; what is to be set or held; purpose."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

@@ -8,7 +8,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from compd.live.service.client_session import ClientSession, Stream
-from compd.live.service.message_keys import BudgetKeys, Keys, MachineKeys, SentMessage, StatusKeys, VersionKeys
+from compd.live.service.message_keys.budget import BudgetKeys
+from compd.live.service.message_keys.machine import MachineKeys
+from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys
+from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError, line, unknown_key
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater

@@ -9,7 +9,7 @@ import structlog
 from pydantic import Field, field_validator, model_validator
 
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys import ModelsKeys, SentMessage
+from compd.live.service.message_keys.message import ModelsKeys, SentMessage
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater

@@ -9,7 +9,7 @@ from typing import ClassVar
 from pydantic import BaseModel, ConfigDict
 
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys import SentMessage
+from compd.live.service.message_keys.message import SentMessage
 from compd.live.service.request_context import RequestContext, SendLater
 
 

@@ -14,7 +14,9 @@ from pydantic import ValidationError
 from compd.live.service import local_requests
 from compd.live.service.client_requests import AuthKeys, AuthRequest
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys import ErrorKeys, ReadingsKeys, SentMessage, SetpointKeys
+from compd.live.service.message_keys.message import ErrorKeys, SentMessage
+from compd.live.service.message_keys.readings import ReadingsKeys
+from compd.live.service.message_keys.setpoint import SetpointKeys
 from compd.live.service.messages import (
     QUOTED_CHARACTERS,
     ErrorCode,

@@ -1,4 +1,8 @@
-"""The text of a file of effects, changed entry by entry: what people wrote beside an entry stays as it is."""
+"""The text of a file of effects, changed entry by entry: what people wrote beside an entry stays as it is.
+
+The text is cut where the parser says that an entry begins and ends. A round trip through ruamel.yaml would write every
+entry anew, with other indentation and line breaks, and lose the comment before an entry that is deleted.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ _WIDTH = 110
 Declaration = Mapping[str, Any]
 
 
-class _Dumper(yaml.SafeDumper):
+class _QuotingDumper(yaml.SafeDumper):
     """Texts in quotes, but for plain words: no reader of YAML takes them for numbers."""
 
 
@@ -29,7 +33,7 @@ def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
-_Dumper.add_representer(str, _represent_text)
+_QuotingDumper.add_representer(str, _represent_text)
 
 
 def entries_of(text: str, path: Path) -> list[Declaration]:
@@ -79,7 +83,7 @@ def without_entry(text: str, effect: str, path: Path) -> str:
 def _written(declaration: Declaration, indent: str) -> str:
     """An entry of a list, without the last line's end."""
     options: dict[str, Any] = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None, "width": _WIDTH}
-    lines = yaml.dump([dict(declaration)], Dumper=_Dumper, **options).splitlines()
+    lines = yaml.dump([dict(declaration)], Dumper=_QuotingDumper, **options).splitlines()
     return "\n".join(f"{indent}{line}" for line in lines)
 
 
@@ -117,11 +121,11 @@ def _end(node: yaml.Node) -> int:
 def _comments(entry: str, indent: str) -> str:
     """The comments in an entry, each in a line of its own."""
     ends = [0]
-    found: list[str] = []
+    comments: list[str] = []
     for token in yaml.scan(entry, Loader=yaml.SafeLoader):
-        found += re.findall(r"#[^\n]*", entry[ends[-1] : token.start_mark.index])
+        comments += re.findall(r"#[^\n]*", entry[ends[-1] : token.start_mark.index])
         ends.append(token.end_mark.index)
-    return "".join(f"{indent}{comment}\n" for comment in [*found, *re.findall(r"#[^\n]*", entry[ends[-1] :])])
+    return "".join(f"{indent}{comment}\n" for comment in [*comments, *re.findall(r"#[^\n]*", entry[ends[-1] :])])
 
 
 def _by_hand(path: Path) -> StateError:

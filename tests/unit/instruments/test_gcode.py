@@ -11,13 +11,13 @@ import pytest
 
 from compd.diagnosis.planning.plan_formats import plan_targets, target_bytes
 from compd.errors import CompdError
-from compd.instruments.writers.gcode import Motion
+from compd.instruments.writers.gcode import FeedAndDwell
 from compd.instruments.writers.target import Way
 
 # One line: a comment without parentheses in it, or words of a letter and a number without an exponent.
 COMMENT = re.compile(r"\([ -'*-~]*\)")
 WORDS = re.compile(r"[GMXYZFP]-?\d+(?:\.\d+)?(?: [GMXYZFP]-?\d+(?:\.\d+)?)*")
-MOTION = Motion(feed_mm_per_min=1200.0, dwell_s=2.5)
+MOTION = FeedAndDwell(feed_mm_per_min=1200.0, dwell_s=2.5)
 
 
 def row(number: int, x: float, time_s: float = 0.0, speed: float = 0.0, force: float = 0.0, side: int = 1) -> dict:

@@ -11,7 +11,7 @@ import pytest
 from compd.gauge import Quality, ReadingMotion, good
 from compd.live.loop.commands import Target
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from compd.live.service.message_keys import ReadingsKeys
+from compd.live.service.message_keys.readings import ReadingsKeys
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
 from tests.support.recorded_run import Run

@@ -14,7 +14,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad, good
 from compd.live.acquisition.acquisition import LineThread
-from compd.live.service.message_keys import LineStatusKeys
+from compd.live.service.message_keys.status import LineStatusKeys
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
 
 OK = Quality.OK

@@ -52,6 +52,23 @@ def test_what_people_wrote_stays(own):
     assert list(own.effects) == ["first", "last", "mine"]
 
 
+def test_the_layout_of_other_entries_stays(own):
+    first = """effects:
+    # of the links
+    - id:   first
+      port: link
+      formula: 'k * time_s'
+      parameters: {k: {unit: um/s,
+                       plausible: [0, 1.50], source: "notes"}}
+"""
+    own.path.write_text(first)
+    own.reload()
+    own.save(declared(), replace=False)
+    assert own.path.read_text().startswith(first)
+    own.delete("mine")
+    assert own.path.read_text() == first
+
+
 def test_one_is_replaced_in_its_place_with_its_comments(own):
     own.path.write_text(HAND)
     own.reload()

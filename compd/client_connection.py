@@ -1,0 +1,108 @@
+"""A connection to the daemon: one JSON object per line, each way, over TCP or the Unix socket."""
+
+from __future__ import annotations
+
+import json
+import socket
+from contextlib import suppress
+from typing import Any
+
+from compd.errors import DaemonError, Problem
+
+_IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
+
+Message = dict[str, Any]
+
+
+def open_connection(address: str, timeout_s: float) -> ClientConnection:
+    """Connect to ``"host:port"``, or to the Unix socket with this path.
+
+    timeout_s : for connecting, and for each message after it, s.
+    Raises DaemonError where the address is none, or no daemon answers there.
+    """
+    try:
+        connected = _unix_socket(address, timeout_s) if "/" in address else _tcp_socket(address, timeout_s)
+    except ValueError as error:
+        raise DaemonError(
+            Problem(
+                where="address", what="not an address", value=address, allowed="host:port, or the path of a Unix socket"
+            )
+        ) from error
+    except OSError as error:
+        raise DaemonError(
+            Problem(where=address, what=f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
+        ) from error
+    return ClientConnection(connected, address)
+
+
+class ClientConnection:
+    """Messages to and from the daemon. Used by one thread; another may call `shutdown`."""
+
+    def __init__(self, connected: socket.socket, address: str) -> None:
+        """`connected`: an open socket with its timeout set; `address`: the name of the other end in errors."""
+        self.address = address
+        self._socket = connected
+        self._lines = connected.makefile("rb")
+
+    def send(self, message: Message) -> None:
+        """Raises DaemonError where the daemon has gone."""
+        try:
+            self._socket.sendall(json.dumps(message).encode() + b"\n")
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+
+    def read(self) -> tuple[bytes, Message]:
+        """The next line, and the message in it.
+
+        Raises DaemonError where it is an ERROR message or none of compd's, and where nothing came within the timeout.
+        """
+        try:
+            line = self._lines.readline()
+        except OSError as error:
+            raise self._lost(error.strerror or "no answer in time") from error
+        if not line.endswith(b"\n"):
+            raise self._lost("it closed the connection")
+        try:
+            message: Message = json.loads(line)
+            error_code = message["code"] if message["class"] == "ERROR" else None
+        except (ValueError, TypeError, KeyError) as error:
+            raise DaemonError(
+                Problem(
+                    where=self.address,
+                    what="what answers here is not compd",
+                    value=repr(line[:40]),
+                    next_step="give the address under `sockets:` in the daemon's configuration",
+                )
+            ) from error
+        if error_code is not None:
+            raise DaemonError(Problem(where=self.address, what=message["text"], value=error_code))
+        return line, message
+
+    def shutdown(self) -> None:
+        """End both directions: a `read` that waits on another thread raises DaemonError."""
+        with suppress(OSError):  # the daemon was first
+            self._socket.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Close the socket and what is buffered of it."""
+        self._lines.close()
+        self._socket.close()
+
+    def _lost(self, why: str) -> DaemonError:
+        return DaemonError(Problem(where=self.address, what=f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))
+
+
+def _tcp_socket(address: str, timeout_s: float) -> socket.socket:
+    host, _, port = address.rpartition(":")
+    return socket.create_connection((host.strip("[]"), int(port)), timeout_s)
+
+
+def _unix_socket(path: str, timeout_s: float) -> socket.socket:
+    connected = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connected.settimeout(timeout_s)
+    try:
+        connected.connect(path)
+    except OSError:
+        connected.close()
+        raise
+    return connected

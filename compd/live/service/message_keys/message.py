@@ -1,0 +1,59 @@
+"""The base of every message that the daemon sends, and the short messages: VERSION, ERROR, the models in use."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from compd.live.service.messages import ErrorCode
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Links = Annotated[list[float], Field(min_length=3, max_length=6)]
+
+
+class Keys(BaseModel):
+    """Base of every part of a message."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class SentMessage(Keys):
+    """Base of all messages that the daemon sends. wire_name : the message's "class"."""
+
+    wire_name: ClassVar[str]
+
+
+class VersionKeys(SentMessage):
+    """Greets every client, and answers VERSION."""
+
+    wire_name = "VERSION"
+    protocol: int = Field(description="version of this protocol; a client ignores keys that it does not know")
+    release: str = Field(description="version of compd")
+    machine: str = Field(description="the machine's name in the configuration")
+    config_hash: str = Field(description="hash of the whole configuration, hexadecimal")
+    links: int = Field(description="number of links: 3 or 6")
+
+
+class ErrorKeys(SentMessage):
+    """A request that could not be followed; the connection stays open, except after too_many_clients."""
+
+    wire_name = "ERROR"
+    code: ErrorCode = Field(description="what was wrong, for a program")
+    text: str = Field(description="what was wrong, for a person")
+
+
+class ModelSummaryKeys(Keys):
+    """One model."""
+
+    effects: list[str] = Field(description="ids of the effects that are computed")
+    not_live: list[str] | None = Field(default=None, description="ids of effects at the reference, not computed")
+    model: str | None = Field(default=None, description="hash of its file; absent without effects")
+    file: str | None = Field(default=None, description="path of its file; absent without effects, and from STATUS")
+
+
+class ModelsKeys(Keys):
+    """The models that the daemon runs with."""
+
+    applied: ModelSummaryKeys | None = Field(default=None, description="the model whose correction is applied")
+    shadow: ModelSummaryKeys | None = Field(default=None, description="a model that is computed and not applied")

@@ -1,0 +1,93 @@
+"""The keys of SETPOINT, the result of one cycle."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from compd.live.loop.states import Mode, State
+from compd.live.service.message_keys.message import Keys, Links, SentMessage, Vector
+
+
+class FrameKeys(Keys):
+    """The frame of the base platform, {B}."""
+
+    origin_M_mm: Vector = Field(description="its origin in {M}, mm")
+    displacement_M_mm: Vector = Field(description="displacement of its origin since machine zero, in {M}, mm")
+    rotation_M_rad: Vector = Field(description="its rotation since machine zero, as a rotation vector in {M}, rad")
+
+
+class ShadowKeys(Keys):
+    """What the shadow model asks for in this cycle. Nothing of it is applied."""
+
+    model: str = Field(description="hash of its file")
+    reason: str = Field(description='why it has no numbers; "" when it has')
+    correction_mm: Links | None = Field(default=None, description="correction of each link before limits, mm")
+    tip_M_mm: Vector | None = Field(default=None, description="the tip in {M}, mm")
+    tip_P_mm: Vector | None = Field(default=None, description="tool on the plate: the touched place in {P}, mm")
+
+
+class SetpointKeys(SentMessage):
+    """The result of one cycle. Where `valid` is false, no key is there that holds a value a controller could use.
+
+    In mode `cmm` the uncompensated command is what the scales show, and `correction_mm` is what would have to be added
+    to bring the tip to where the scales alone believe it to be. While a correction is clamped or slews to that of a
+    newly adopted model, the tip in mode `cmm` is the one that belongs to the correction which is applied.
+
+    While setpoints are invalid the last correction is remembered, and the next valid one slews from it: hold your last
+    command meanwhile.
+    """
+
+    wire_name = "SETPOINT"
+    seq: int = Field(
+        description="number of the cycle, which rises by one per period; a gap is a missed cycle, a lower rate or a "
+        "dropped message"
+    )
+    time_s: float = Field(description="when the gauges were looked at, s on the daemon's monotonic clock")
+    valid: bool = Field(description="false: use nothing of this message; from `tip_M_mm` on every key is absent")
+    state: State = Field(description="how the setpoint came about")
+    reason: str = Field(description='why the state is not `ok`, for a person; "" when it is')
+    valid_until: float = Field(description="not to be used later than this, s; `time_s` itself when it is not valid")
+    mode: Mode = Field(description="cmm: the scales say where the tip is; machine_tool: a `TARGET` does")
+    model: str | None = Field(
+        default=None, description="hash of the model file that is applied; absent without effects"
+    )
+    age_s: float | None = Field(default=None, description="age of the oldest reading used, s")
+    skew_s: float | None = Field(
+        default=None,
+        description="how much later than the oldest the newest length that was used was measured, s; absent where none "
+        "was. `loop.skew_s` limits it",
+    )
+    tip_M_mm: Vector | None = Field(
+        default=None,
+        description="the tip in {M}, the surface plate, mm; in mode cmm measured, in mode machine_tool the target, "
+        "which is reached in state ok",
+    )
+    tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, the base platform at machine zero, mm")
+    tip_P_mm: Vector | None = Field(default=None, description="tool on the plate: the touched place in {P}, mm")
+    frame: FrameKeys | None = Field(default=None, description="where the base platform is, and how it has moved")
+    link_length_mm: Links | None = Field(
+        default=None, description="length of each link, mm: measured (cmm) or needed (machine_tool)"
+    )
+    scale_setpoint_mm: Links | None = Field(
+        default=None, description="what each scale is to show, from machine zero, mm: command the drives with this"
+    )
+    correction_mm: Links | None = Field(
+        default=None,
+        description="what was added to each link's uncompensated command, within its limits, mm; "
+        "`scale_setpoint_mm - correction_mm` is that command",
+    )
+    sources_mm: dict[str, Links] | None = Field(
+        default=None,
+        description="how much each cause asks for, for each link, mm: `joints`, `frame`, then by its id what each "
+        "effect adds to those before it; their sum is the correction before its limits",
+    )
+    u_tip_um: Vector | None = Field(
+        default=None,
+        description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
+        "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
+        "once a second, and from the age of each length and how surely its motion is known, in every cycle; absent "
+        "while any of them is not known",
+    )
+    shadow: ShadowKeys | None = Field(
+        default=None, description="what the shadow model asks for in this cycle; absent without a shadow"
+    )
