@@ -1,4 +1,4 @@
-"""The daemon with scales on OPC UA and MQTT: setpoints while all is well, and a server or broker that goes and comes."""
+"""The daemon with scales on OPC UA and MQTT: setpoints, and a server or broker that goes and comes back."""
 
 from __future__ import annotations
 
