@@ -158,13 +158,13 @@ class PushedGauge(Gauge[PushedLine]):
     def _heard(self, place: int, message: Message) -> Heard | None:
         arrived_s = message.arrival.arrived_s
         if message.quality is not Quality.OK:
+            self._sent.pop(place, None)  # the value before it counts again when the source says so
             return Heard(place, bad(arrived_s, message.quality, message.detail))
         try:
             stamp = self.stamp(place, message)
             time = self._times[place].of(message.arrival, stamp.utc_s, stamp.resolution_s)
             reading = self.decode(place, message, time.time_s)
-            sent, self._sent[place] = self._sent.get(place), (stamp.utc_s, reading.value)
-            if sent == self._sent[place] and not message.arrival.holds:
+            if self._is_repeated(place, stamp, reading) and not message.arrival.holds:
                 return None
         except LineFault as fault:
             return Heard(place, bad(arrived_s, fault.quality, fault.detail))
@@ -173,3 +173,10 @@ class PushedGauge(Gauge[PushedLine]):
         except AgeUnknownError as error:
             return Heard(place, bad(arrived_s, Quality.STALE, str(error)))
         return Heard(place, reading, time.window_s, time.note)
+
+    def _is_repeated(self, place: int, stamp: Stamp, reading: Reading) -> bool:
+        """Whether this is a second copy of the last value: only a time of the source that counts can show it."""
+        if self.options.time_from == "arrival" or math.isnan(stamp.utc_s):
+            return False
+        sent, self._sent[place] = self._sent.get(place), (stamp.utc_s, reading.value)
+        return sent == self._sent[place]

@@ -28,6 +28,7 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
+from compd.lines.mqtt_tls import TlsSettings, handshake_failure, tls_context
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
 
@@ -36,17 +37,6 @@ SLICE_S = 0.1
 # Of one call of `messages`: more waits in the socket meanwhile.
 MOST_MESSAGES = 1000
 LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
-
-
-class TlsSettings(Protocol):
-    """TLS to the broker: see `compd.configuration.pushed_lines.MqttTls`."""
-
-    @property
-    def ca_file(self) -> str | None: ...
-    @property
-    def certificate(self) -> str | None: ...
-    @property
-    def private_key(self) -> str | None: ...
 
 
 class MqttSettings(Protocol):
@@ -72,7 +62,7 @@ class MqttSettings(Protocol):
     def tls(self) -> TlsSettings | None: ...
 
 
-class MqttLine:
+class MqttSubscriber:
     """A `PushedLine` over MQTT. Used by one thread."""
 
     last_request_s = -math.inf  # nobody asks
@@ -86,6 +76,7 @@ class MqttLine:
         """
         self._where = f"{settings.host}:{settings.port}"
         self._timeout_s = settings.timeout_s
+        self._has_tls = settings.tls is not None
         self._clock = clock
         self._utc = utc
         self._came: deque[Message] = deque()
@@ -106,7 +97,8 @@ class MqttLine:
             self._work_until(lambda: self._answer is not None, "has not accepted the connection")
         except (OSError, ValueError) as error:
             self.close()
-            raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}: {error}") from error
+            reason = str(error) if settings.tls is None else handshake_failure(error)
+            raise LineFault(Quality.LINE_LOST, f"cannot connect to {self._where}: {reason}") from error
         except LineFault:
             self.close()
             raise
@@ -169,10 +161,7 @@ class MqttLine:
                     raise ValueError(f"{settings.password_file} is too long for a password")
             self._client.username_pw_set(settings.user, password)
         if settings.tls is not None:
-            context = ssl.create_default_context(cafile=settings.tls.ca_file)
-            if settings.tls.certificate is not None:
-                context.load_cert_chain(settings.tls.certificate, settings.tls.private_key)
-            self._client.tls_set_context(context)
+            self._client.tls_set_context(tls_context(settings.tls))
 
     def _work_until(self, done: Callable[[], bool], what: str) -> None:
         """Raises LineFault (LINE_LOST) where it is not done within the timeout: the broker `what`."""
@@ -211,6 +200,9 @@ class MqttLine:
     def _lost(self, error: MQTTErrorCode) -> LineFault:
         if self._answer is not None and self._answer.is_failure:
             return LineFault(Quality.LINE_LOST, f"{self._where} refuses: {self._answer}")
+        if self._answer is None:
+            hint = "does it ask for `tls`?" if not self._has_tls else "does it ask for a `certificate` that it trusts?"
+            return LineFault(Quality.LINE_LOST, f"{self._where} has closed the connection before the log-in; {hint}")
         reason = self._why_lost or error.name.removeprefix("MQTT_ERR_").replace("_", " ").lower()
         return LineFault(Quality.LINE_LOST, f"{self._where} is gone: {reason}")
 

@@ -20,12 +20,10 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from asyncua import ua
 from asyncua.client.client import Client
-from asyncua.crypto import security_policies
 from asyncua.ua.attribute_ids import AttributeIds
 from asyncua.ua.status_codes import StatusCodes
 from asyncua.ua.ua_binary import nodeid_to_binary
@@ -33,6 +31,7 @@ from asyncua.ua.uaerrors import UaError, UaStatusCodeError
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
+from compd.lines.opc_ua_login import OpcUaSettings, log_in, refusal
 from compd.lines.opc_ua_status import quality_of
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
@@ -55,45 +54,7 @@ _NAMESPACE = "nsu="
 ResultT = TypeVar("ResultT")
 
 
-class SecuritySettings(Protocol):
-    """A secure channel: see `compd.configuration.pushed_lines.OpcUaSecurity`."""
-
-    @property
-    def policy(self) -> str: ...
-    @property
-    def mode(self) -> str: ...
-    @property
-    def certificate(self) -> str: ...
-    @property
-    def private_key(self) -> str: ...
-    @property
-    def server_certificate(self) -> str: ...
-
-
-class OpcUaSettings(Protocol):
-    """The keys of an OPC UA line in the configuration."""
-
-    @property
-    def kind(self) -> Literal["opc_ua"]: ...
-    @property
-    def timeout_s(self) -> float: ...
-    @property
-    def endpoint(self) -> str: ...
-    @property
-    def publishing_s(self) -> float: ...
-    @property
-    def sampling_s(self) -> float | None: ...
-    @property
-    def unchanged(self) -> Literal["stale", "holds"]: ...
-    @property
-    def user(self) -> str | None: ...
-    @property
-    def password_file(self) -> str | None: ...
-    @property
-    def security(self) -> SecuritySettings | None: ...
-
-
-class OpcUaLine:
+class OpcUaSubscriber:
     """A `PushedLine` over OPC UA. Used by one thread."""
 
     last_request_s = -math.inf  # no reading belongs to a request
@@ -170,26 +131,14 @@ class OpcUaLine:
         except TimeoutError as error:
             raise LineFault(Quality.LINE_LOST, f"{where} has not answered within {timeout_s:g} s") from error
         except UaStatusCodeError as error:
-            raise LineFault(Quality.LINE_LOST, f"{where} refuses: {ua.StatusCode(error.code).name}") from error
+            raise LineFault(Quality.LINE_LOST, f"{where} {refusal(error)}") from error
         except (OSError, UaError, ValueError) as error:
             text = str(error) or type(error).__name__
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {where}: {text}") from error
 
     async def _connect(self, settings: OpcUaSettings) -> None:
         """Connect, log in, and make the subscription."""
-        if settings.security is not None:
-            await self._client.set_security(
-                getattr(security_policies, f"SecurityPolicy{settings.security.policy}"),
-                settings.security.certificate,
-                settings.security.private_key,
-                server_certificate=settings.security.server_certificate,
-                mode=ua.MessageSecurityMode[settings.security.mode],
-            )
-        if settings.user is not None:
-            self._client.set_user(settings.user)
-            if settings.password_file is not None:
-                self._client.set_password(Path(settings.password_file).read_text(encoding="utf-8").rstrip("\r\n"))
-        await self._client.connect()
+        await log_in(self._client, settings)
         self._asked_s = self._clock.monotonic()
         result = await self._client.uaclient.create_subscription(
             ua.CreateSubscriptionParameters(

@@ -15,11 +15,12 @@ from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import StreamLine
 
 if TYPE_CHECKING:  # their libraries need not be installed
-    from compd.lines.mqtt import MqttLine, MqttSettings
-    from compd.lines.opc_ua import OpcUaLine, OpcUaSettings
+    from compd.lines.mqtt import MqttSettings, MqttSubscriber
+    from compd.lines.opc_ua import OpcUaSubscriber
+    from compd.lines.opc_ua_login import OpcUaSettings
 
 PolledLine = StreamLine | RtuMaster | AsciiMaster | ModbusTcp
-Line: TypeAlias = "PolledLine | MqttLine | OpcUaLine"
+Line: TypeAlias = "PolledLine | MqttSubscriber | OpcUaSubscriber"
 WrapPort = Callable[[Port], Port]
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
@@ -128,15 +129,15 @@ def open_line(
     return stream
 
 
-def _open_pushed_line(settings: OpcUaSettings | MqttSettings, clock: Clock) -> MqttLine | OpcUaLine:
+def _open_pushed_line(settings: OpcUaSettings | MqttSettings, clock: Clock) -> MqttSubscriber | OpcUaSubscriber:
     try:
         if settings.kind == "opc_ua":
-            from compd.lines.opc_ua import OpcUaLine
+            from compd.lines.opc_ua import OpcUaSubscriber
 
-            return OpcUaLine(settings, clock)
-        from compd.lines.mqtt import MqttLine
+            return OpcUaSubscriber(settings, clock)
+        from compd.lines.mqtt import MqttSubscriber
 
-        return MqttLine(settings, clock)
+        return MqttSubscriber(settings, clock)
     except ImportError as error:
         extra = settings.kind.replace("_", "")
         text = f"{error.name} is not installed: pip install 'compd[{extra}]'"

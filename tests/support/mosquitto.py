@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import shutil
 import signal
 import socket
@@ -85,6 +87,13 @@ class Publisher:
     def close(self) -> None:
         self._client.disconnect()
         self._client.loop_stop()
+
+
+def hashed(user: str, password: str) -> str:
+    """A line of mosquitto's password file, as `mosquitto_passwd` writes it (type 7: PBKDF2 of SHA-512)."""
+    salt = bytes(12)
+    digest = hashlib.pbkdf2_hmac("sha512", password.encode(), salt, 101)
+    return f"{user}:$7$101${base64.b64encode(salt).decode()}${base64.b64encode(digest).decode()}\n"
 
 
 @contextmanager

@@ -8,19 +8,31 @@ import socket
 import threading
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.crypto.truststore import TrustStore
+from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
 from asyncua.server.user_managers import UserManager
 
+from tests.support.certificates import Certificate
 from tests.support.wire_rig import PATIENCE_S
 
 NAMESPACE = "http://compd.example/probes"
 NAMESPACE_INDEX = 2  # the first that a server gives
 
 logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+
+
+@dataclass(frozen=True)
+class Security:
+    """What a server has that offers signed and encrypted channels alone: its certificate, and one that it trusts."""
+
+    own: Certificate
+    trusted: Certificate
 
 
 class OneUser(UserManager):
@@ -35,11 +47,12 @@ class OneUser(UserManager):
 class OpcUaServer:
     """Nodes ns=2;s=NAME with values, statuses and times that a test writes."""
 
-    def __init__(self, users: UserManager | None = None) -> None:
+    def __init__(self, users: UserManager | None = None, security: Security | None = None) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.endpoint = f"opc.tcp://127.0.0.1:{probe.getsockname()[1]}/probes"
         self._users = users
+        self._security = security
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="opc ua server", daemon=True)
         self._thread.start()
@@ -105,7 +118,10 @@ class OpcUaServer:
         server = Server(user_manager=self._users)
         await server.init()  # takes two seconds of a processor
         server.set_endpoint(self.endpoint)
-        server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        if self._security is None:
+            server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        else:
+            await _secure(server, self._security)
         assert await server.register_namespace(NAMESPACE) == NAMESPACE_INDEX
         return server
 
@@ -118,9 +134,27 @@ class OpcUaServer:
         await self._server.iserver.write_attribute_value(node_id, data)
 
 
+async def _secure(server: Server, security: Security) -> None:
+    server.set_security_policy(
+        [
+            ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+            ua.SecurityPolicyType.Aes256Sha256RsaPss_Sign,
+        ]
+    )
+    await server.load_certificate(security.own.der)
+    await server.load_private_key(security.own.key)
+    trusted = security.trusted.der.parent / "trusted"
+    trusted.mkdir()
+    (trusted / security.trusted.der.name).write_bytes(security.trusted.der.read_bytes())
+    store = TrustStore([trusted], [])
+    await store.load_trust()
+    options = CertificateValidatorOptions.TRUSTED_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
+    server.set_certificate_validator(CertificateValidator(options, store))
+
+
 @contextmanager
-def running_server(users: UserManager | None = None) -> Iterator[OpcUaServer]:
-    server = OpcUaServer(users)
+def running_server(users: UserManager | None = None, security: Security | None = None) -> Iterator[OpcUaServer]:
+    server = OpcUaServer(users, security)
     server.start()
     try:
         yield server

@@ -26,7 +26,7 @@ RATE_HZ = 100.0
 MEMORY_MB = 200
 
 
-def _takes_zero(client: Client) -> bool:
+def takes_zero(client: Client) -> bool:
     """Take machine zero; False where a gauge was too late for it just now."""
     try:
         client.zero()
@@ -104,7 +104,7 @@ class Machine:
             if not observer.status()["zero"]["taken"]:
                 with daemon.connected() as client:
                     wait_for_gauges(observer, client.watch(10))
-                until("machine zero is taken", lambda: _takes_zero(observer))
+                until("machine zero is taken", lambda: takes_zero(observer))
             until("the dial is good", lambda: daemon.quality() == "ok")
             watcher.until("ok", lambda seen: seen["state"] == "ok", watcher.now)
 

@@ -328,11 +328,8 @@ class LineThread:
             self._fail(gauge, line, fault.quality, explained(fault, line).detail)
         except MemoryError:  # it is the whole process that has none left
             raise
-        except Exception as error:  # a driver may raise anything; it must not end the line's thread
-            if not gauge.reported:
-                gauge.reported = True
-                log.exception("driver failed", gauge=gauge.name)
-            self._fail(gauge, line, Quality.DRIVER_ERROR, f"{type(error).__name__}: {error}")
+        except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
+            self._fail(gauge, line, Quality.DRIVER_ERROR, gauge.driver_error(error))
 
     def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
         """Raises LineFault (LINE_LOST)."""

@@ -173,6 +173,13 @@ class PolledGauge:
         if quality is Quality.TIMEOUT or self.failures > 1:
             self.rests_until_s = now_s + self._back_off.failed()
 
+    def driver_error(self, error: Exception) -> str:
+        """The detail of an exception that its driver has raised, which is logged with its traceback the first time."""
+        if not self.reported:
+            self.reported = True
+            log.error("driver failed", gauge=self.name, exc_info=error)
+        return f"{type(error).__name__}: {error}"
+
     def lose(self, quality: Quality, detail: str, now_s: float) -> None:
         """Give every channel `quality`, without a poll: the line is lost."""
         self._trust.fail(quality, now_s)

@@ -82,11 +82,8 @@ class PushedRound:
                 gauge.hear(heard, now_s)
             except MemoryError:  # it is the whole process that has none left
                 raise
-            except Exception as error:  # a driver may raise anything; it must not end the line's thread
-                if not gauge.reported:
-                    gauge.reported = True
-                    log.exception("driver failed", gauge=gauge.name)
-                gauge.fail(Quality.DRIVER_ERROR, f"{type(error).__name__}: {error}", now_s)
+            except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
+                gauge.fail(Quality.DRIVER_ERROR, gauge.driver_error(error), now_s)
                 continue
             self._note_clock(gauge, heard)
             for listener in listeners:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,11 +12,18 @@ from paho.mqtt.enums import CallbackAPIVersion
 from compd.clock import Clock
 from compd.errors import CompdError, Problem
 from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.pushed_line import SimulatedPushedLine
+from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine
+
+NOT_A_NUMBER = "not a number"
+# What spreadsheets and gateways write in place of a value that they do not have.
+NO_VALUE = b"#N/A"
 
 
 class MqttPublisher(SimulatedPushedLine):
     """Publishes to a broker; never to that of the machine's own configuration, where real programs may listen."""
+
+    kind = "mqtt"
+    own_faults = (NOT_A_NUMBER,)
 
     def __init__(
         self,
@@ -35,13 +43,14 @@ class MqttPublisher(SimulatedPushedLine):
                 )
             )
         self._broker = broker
-        self._client = Client(CallbackAPIVersion.VERSION2)
+        self._client: Client
 
     @property
     def port(self) -> tuple[str, int]:
         return self._broker
 
     def plug_in(self) -> None:
+        self._client = Client(CallbackAPIVersion.VERSION2)
         try:
             self._client.connect(*self._broker)
         except OSError as error:
@@ -55,6 +64,24 @@ class MqttPublisher(SimulatedPushedLine):
         self._client.disconnect()
         self._client.loop_stop()
 
-    def send(self, values: Mapping[str, Any], utc_s: float) -> None:
+    def send(self, values: Mapping[str, Any], utc_s: float, fault: str | None = None) -> None:
         for topic, payload in values.items():
-            self._client.publish(topic, payload)
+            self._client.publish(topic, _damaged(payload, fault))
+
+
+def _damaged(payload: bytes, fault: str | None) -> bytes:
+    """The payload as a source with this fault publishes it."""
+    if fault == NOT_A_NUMBER:
+        return NO_VALUE
+    if fault == WRONG_TYPE:
+        return json.dumps(_numbers_as_text(json.loads(payload))).encode()
+    return payload
+
+
+def _numbers_as_text(document: Any) -> Any:
+    """The JSON document with text in place of each number."""
+    if isinstance(document, dict):
+        return {key: _numbers_as_text(value) for key, value in document.items()}
+    if isinstance(document, list):
+        return [_numbers_as_text(value) for value in document]
+    return str(document) if isinstance(document, int | float) and not isinstance(document, bool) else document

@@ -17,7 +17,7 @@ from asyncua.ua.status_codes import StatusCodes
 
 from compd.clock import Clock
 from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.pushed_line import SimulatedPushedLine, is_off
+from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
 from compd.simulation.wires.wire_ends import LOOPBACK
 
 for _name in ("asyncua.server", "asyncua.client"):
@@ -25,10 +25,18 @@ for _name in ("asyncua.server", "asyncua.client"):
 
 FIRST_NAMESPACE = 2  # 0 is that of OPC UA, 1 that of the server itself
 _NAMESPACE = "nsu="
+BAD_STATUS, UNCERTAIN_STATUS = "bad status", "uncertain status"
+STATUSES: Mapping[str, int] = {
+    BAD_STATUS: StatusCodes.BadNoCommunication,
+    UNCERTAIN_STATUS: StatusCodes.UncertainLastUsableValue,
+}
 
 
 class OpcUaNodes(SimulatedPushedLine):
     """An OPC UA server with a node for each of the gauges' values, and their times."""
+
+    kind = "opc_ua"
+    own_faults = tuple(STATUSES)
 
     def __init__(self, name: str, devices: Sequence[SimulatedPushedDevice], clock: Clock | None = None) -> None:
         super().__init__(name, devices, clock)
@@ -62,8 +70,8 @@ class OpcUaNodes(SimulatedPushedLine):
         if self._server is not None:
             self._do(self._server.stop())
 
-    def send(self, values: Mapping[str, Any], utc_s: float) -> None:
-        self._do(self._write(values, utc_s))
+    def send(self, values: Mapping[str, Any], utc_s: float, fault: str | None = None) -> None:
+        self._do(self._write(values, utc_s, fault))
 
     def _do(self, work: Coroutine[Any, Any, None]) -> None:
         asyncio.run_coroutine_threadsafe(work, self._loop).result()
@@ -79,13 +87,14 @@ class OpcUaNodes(SimulatedPushedLine):
             await self._write(device.say(utc_s), utc_s)
         await self._server.start()
 
-    async def _write(self, values: Mapping[str, Any], utc_s: float) -> None:
+    async def _write(self, values: Mapping[str, Any], utc_s: float, fault: str | None = None) -> None:
         assert self._server is not None
         now = datetime.fromtimestamp(utc_s, UTC)
         when = ua.DateTime(now.year, now.month, now.day, now.hour, now.minute, now.second, now.microsecond)
         for node, value in values.items():
-            status = ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure if is_off(value) else StatusCodes.Good))
-            number = ua.Variant(value, ua.VariantType.Double)
+            usual = StatusCodes.BadSensorFailure if is_off(value) else StatusCodes.Good
+            status = ua.StatusCode(ua.UInt32(STATUSES.get(fault or "", usual)))
+            number = ua.Variant(_of_other_rank(value) if fault == WRONG_TYPE else value, ua.VariantType.Double)
             if node not in self._node_ids:
                 self._node_ids[node] = await self._added(node, number)
             data = ua.DataValue(number, status, SourceTimestamp=when)
@@ -104,3 +113,8 @@ class OpcUaNodes(SimulatedPushedLine):
         name = ua.QualifiedName(str(node_id.Identifier), node_id.NamespaceIndex)
         await self._server.nodes.objects.add_variable(node_id, name, number)
         return node_id
+
+
+def _of_other_rank(value: Any) -> Any:
+    """An array in place of a number, and a number in place of an array."""
+    return value[0] if isinstance(value, list) else [value]

@@ -22,6 +22,7 @@ from compd.configuration.lines import PolledLine, SerialPortSettings
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
 from compd.simulation.wires.latch import Latch, TriggeredDevices
+from compd.simulation.wires.line_fault import SILENT, UNPLUGGED, checked_fault
 from compd.simulation.wires.modbus_slaves import ModbusSlaves
 from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
@@ -62,7 +63,7 @@ def _other_unit_tcp(reply: bytes) -> bytes:
 # Delay of a reply with the fault "late", in line timeouts.
 LATE_TIMEOUTS = 1.5
 _COMMON: Mapping[str, Damage] = {
-    "silent": lambda reply: b"",
+    SILENT: lambda reply: b"",
     "garble": _garble,
     "late": lambda reply: reply,
     "cut": lambda reply: reply[: len(reply) // 2],
@@ -76,7 +77,6 @@ DAMAGES: Mapping[str, Mapping[str, Damage]] = {
     "modbus_ascii": {**_COMMON, "wrong unit": _other_unit_ascii},
     "modbus_tcp": {**_COMMON, "garble": _garble_header, "wrong unit": _other_unit_tcp},
 }
-UNPLUGGED = "unplugged"
 
 
 class Listener(Protocol):
@@ -182,11 +182,10 @@ class SimulatedLine:
 
     @fault.setter
     def fault(self, fault: str | None) -> None:
-        if fault is not None and fault not in self.faults:
-            raise ValueError(f"no fault {fault!r} on a line of kind {self._settings.kind}: {', '.join(self.faults)}")
+        wanted = checked_fault(fault, self.faults, self._settings.kind)
         if not self._thread.is_alive():
             raise RuntimeError("only a line that is served can have a fault: start it first")
-        self._requested_fault = fault
+        self._requested_fault = wanted
         self._applied.clear()
         self._wake()
         self._applied.wait()

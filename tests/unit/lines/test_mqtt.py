@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import socket
 import time
 from collections.abc import Iterator
@@ -18,7 +16,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.pushed_gauge import Message
-from tests.support.mosquitto import Broker, needs_mosquitto, publisher, running_broker
+from tests.support.mosquitto import Broker, hashed, needs_mosquitto, publisher, running_broker
 from tests.support.wire_rig import PATIENCE_S, SETTINGS
 
 OK = Quality.OK
@@ -170,8 +168,7 @@ def test_what_has_waited_in_the_socket_has_the_time_since_which_it_may_have_wait
 
 def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
     passwords, rules, secret = tmp_path / "passwords", tmp_path / "rules", tmp_path / "secret"
-    # mosquitto's own hash of "open sesame": PBKDF2 of SHA-512, as `mosquitto_passwd` writes it
-    passwords.write_text(_hashed(*USER))
+    passwords.write_text(hashed(*USER))
     rules.write_text("user compd\ntopic readwrite allowed/#\n")
     for file in (passwords, rules):
         file.chmod(0o600)
@@ -187,10 +184,3 @@ def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
             assert first(line).payload == b"1"
         with pytest.raises(LineFault, match="No such file"), line_to(broker, user="compd", password_file="/nowhere"):
             pass
-
-
-def _hashed(user: str, password: str) -> str:
-    """A line of mosquitto's password file (`mosquitto_passwd`, type 7)."""
-    salt = bytes(12)
-    digest = hashlib.pbkdf2_hmac("sha512", password.encode(), salt, 101)
-    return f"{user}:$7$101${base64.b64encode(salt).decode()}${base64.b64encode(digest).decode()}\n"

@@ -247,11 +247,16 @@ def test_channels_out_of_one_document(broker: Broker, device: Publisher) -> None
         assert "warming up" in latest.wait_for("g.b", Quality.DEVICE_ERROR).detail
 
 
+def good_then(device: Publisher, latest: Any) -> int:
+    """Deliver a good value; what comes after the returned history entry is new."""
+    device.publish("a", payload(1.5))
+    latest.wait_for("g.a", OK)
+    return int(latest.now)
+
+
 def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker, device: Publisher) -> None:
     with listening(broker, device, timed()) as (acquisition, latest):
-        device.publish("a", payload(1.5))
-        latest.wait_for("g.a", OK)
-        since = latest.now
+        since = good_then(device, latest)
         broker.kill()
         assert math.isnan(latest.wait_for("g.a", Quality.LINE_LOST, since).value)
         assert acquisition.status()["l"]["state"] == "lost"
@@ -264,9 +269,7 @@ def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker,
 
 def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -> None:
     with listening(broker, device, timed()) as (_, latest):
-        device.publish("a", payload(1.5))
-        latest.wait_for("g.a", OK)
-        since = latest.now
+        since = good_then(device, latest)
         broker.pause()
         assert "Keep alive" in latest.wait_for("g.a", Quality.LINE_LOST, since).detail
         broker.go_on()
