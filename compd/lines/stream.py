@@ -127,7 +127,8 @@ class StreamLine:
                 time_s = math.nan
         if math.isnan(time_s):
             time_s = self.listen()
-            self._line_until(terminator, limit, timeout_s, gap_timeout_s)  # what is left of the line under way
+            # what is left of the line under way; the end of a terminator alone ends with the line behind it
+            self._line_until(terminator, limit + len(terminator) - 1, timeout_s, gap_timeout_s)
         self._next_line_s = math.nan
         line, ended_s = self._line_until(terminator, limit, timeout_s, gap_timeout_s)
         looked_s = self._clock.monotonic()

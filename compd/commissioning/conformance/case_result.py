@@ -46,6 +46,7 @@ class Subject:
     checksum : the protocol has one of its own.
     exact : in virtual time; cases that need thousands of polls run there alone.
     error_replies : whole replies by which the device reports an error, and the quality that must come.
+    unasked : the device speaks by itself.
     options : those that the driver is tried with.
     another : the driver once more, with other options and a simulated device of its own, on a virtual wire.
     """
@@ -55,6 +56,7 @@ class Subject:
     checksum: bool
     exact: bool
     error_replies: Mapping[bytes, Quality]
+    unasked: bool = False
     options: Any = None
     another: Callable[[Any], ConformanceSession] | None = field(default=None, repr=False)
 
@@ -62,6 +64,10 @@ class Subject:
     def tries(self) -> int:
         """How often a case is tried until it counts as failed; in virtual time nothing is late by chance."""
         return 1 if self.exact else REAL_TIME_TRIES
+
+    def possible(self, kinds: Iterable[Fault]) -> Sequence[Fault]:
+        """Those of the faults that this device's replies can have."""
+        return [fault for fault in kinds if not (self.unasked and fault.only_of_answers)]
 
 
 Case = Callable[[ConformanceSession, Subject], CaseResult]

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from compd.commissioning.conformance import waiting_cases, wire_cases
 from compd.commissioning.conformance.case_result import Case, CaseResult, Subject
 from compd.commissioning.conformance.damage_cases import DAMAGE_CASES
 from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.reply_cases import REPLY_CASES
 from compd.commissioning.conformance.value_cases import VALUE_CASES
-from compd.commissioning.conformance.waiting_cases import WAITING_CASES, waits, waits_after_faults
+from compd.commissioning.conformance.waiting_cases import waits, waits_after_faults
 from compd.commissioning.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
-CASES: tuple[Case, ...] = (*WAITING_CASES, *VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
+CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
+# A device that speaks unasked has no answers that could be late, or asked for twice.
+CASES_OF_ANSWERS: tuple[Case, ...] = (*waiting_cases.CASES_OF_ANSWERS, *wire_cases.CASES_OF_ANSWERS)
 # A driver that fails in one of these is tried no further: each poll would take its time, or be wrong.
 FIRST_CASES = ("waits", "units and scale", "waits after faults")
 
@@ -25,7 +28,8 @@ def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseRes
         yield result
         if result.verdict == "FAIL":
             return
-    cases = [*CASES, *(CASES_ON_RTU if subject.registers and not subject.over_tcp else ())]
+    cases = [*(() if subject.unasked else CASES_OF_ANSWERS), *CASES]
+    cases += CASES_ON_RTU if subject.registers and not subject.over_tcp else ()
     for case in cases:
         yield run_case(case, session, subject)
 

@@ -39,7 +39,7 @@ MOST_BEHIND = 3  # bytes of a terminator
 FEWEST_SAMPLES = 4  # different ones: a wrong algorithm fits by chance in one of 256 to the power of their number
 
 
-class Checksum(NamedTuple):
+class ReplyChecksum(NamedTuple):
     """How a reply's checksum is made, and where it stands."""
 
     algorithm: str
@@ -63,14 +63,14 @@ class Checksum(NamedTuple):
         return ENCODINGS[self.encoding](ALGORITHMS[self.algorithm](covered))
 
 
-def checksum_in(samples: Sequence[bytes]) -> Checksum | None:
+def checksum_in(samples: Sequence[bytes]) -> ReplyChecksum | None:
     """The checksum that all of the replies have; None where no known one fits."""
     different = list(dict.fromkeys(samples))
     if len(different) < FEWEST_SAMPLES:
         return None
     places = itertools.product(range(MOST_BEFORE + 1), range(MOST_BETWEEN + 1), range(MOST_BEHIND + 1))
     for (first, between, behind), algorithm, encoding in itertools.product(places, ALGORITHMS, ENCODINGS):
-        checksum = Checksum(algorithm, encoding, first, between, behind)
+        checksum = ReplyChecksum(algorithm, encoding, first, between, behind)
         if all(len(reply) > behind + 4 and checksum.repaired(reply) == reply for reply in different):
             return checksum
     return None

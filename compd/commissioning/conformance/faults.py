@@ -23,10 +23,14 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """`act(reply, timeout_s)`: the pieces that come in place of `reply`; `timeout_s` is the line's."""
+    """`act(reply, timeout_s)`: the pieces that come in place of `reply`; `timeout_s` is the line's.
+
+    only_of_answers : nothing is wrong with it where a device speaks unasked: it is another line, as good as any.
+    """
 
     name: str
     act: Callable[[bytes, float], Sequence[Piece]]
+    only_of_answers: bool = False
 
     def __repr__(self) -> str:
         return f"Fault({self.name})"
@@ -58,7 +62,7 @@ def garbage_after(junk: bytes = GARBAGE) -> Fault:
 
 def late(timeouts: float) -> Fault:
     """The whole reply, `timeouts` line timeouts too late."""
-    return Fault(f"late by {timeouts:.2f} timeouts", lambda reply, s: [Piece(timeouts * s, reply)])
+    return Fault(f"late by {timeouts:.2f} timeouts", lambda reply, s: [Piece(timeouts * s, reply)], True)
 
 
 def split(fraction: float = 0.5, timeouts: float = 0.3) -> Fault:
@@ -72,7 +76,7 @@ def split(fraction: float = 0.5, timeouts: float = 0.3) -> Fault:
 
 
 def doubled() -> Fault:
-    return Fault("doubled", lambda reply, _: [Piece(0.0, reply + reply)])
+    return Fault("doubled", lambda reply, _: [Piece(0.0, reply + reply)], True)
 
 
 def cut(fraction: float = 0.5) -> Fault:

@@ -26,12 +26,14 @@ ASKED_AGAIN_TIMEOUTS = 2.0
 class ConformanceWire(Protocol):
     """A wire with a device at its far end: virtual, pty or TCP.
 
-    exact : in virtual time.
+    exact : in virtual time. pause_s : between two lines of a device that speaks unasked, s; 0 where it is asked.
     """
 
     peer: Peer
     timeout_s: float
     exact: bool
+    pause_s: float
+    character_s: float
 
     @property
     def clock(self) -> Clock: ...
@@ -202,7 +204,8 @@ class ConformanceSession:
                 wrong.append(f"{channel.name}: {reading.value!r} as ok is no number")
                 continue
             if not self.exchanges:
-                wrong.append(f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, and nothing was asked")
+                event = "said in this poll" if self.wire.pause_s else "asked"
+                wrong.append(f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, and nothing was {event}")
                 continue
             if not right and not self.replies.is_right(channel.name, reading.value, self.exchanges):
                 off.append(self._difference(channel, reading))
@@ -223,13 +226,16 @@ class ConformanceSession:
         return text
 
     def _stamp(self, channel: Channel, reading: Reading, started_s: float) -> Iterable[str]:
-        """What is wrong with a reading's time stamp, which must be that of its request."""
-        earliest_s = started_s
+        """What is wrong with a reading's time stamp: that of its request, or, unasked, since the line before began."""
+        earliest_s, event = started_s, "the request of this poll had left"
         if self.wire.exact and self.exchanges:
             earliest_s = self.exchanges[0].heard_s - STAMP_ROUNDING_S
+        if self.wire.pause_s:
+            earliest_s -= self.wire.pause_s + self.wire.peer.longest * self.wire.character_s
+            event = "the line before had begun"
         if reading.time_s < earliest_s:
             early_ms = (earliest_s - reading.time_s) * 1e3
-            yield f"{channel.name}: time stamp {early_ms:.3f} ms before the request of this poll had left"
+            yield f"{channel.name}: time stamp {early_ms:.3f} ms before {event}"
         # an understated age: stamped after the device had looked
         sensed_s = self.sensors.sensed_s.get(channel.name, math.nan)
         if reading.time_s > sensed_s + STAMP_ROUNDING_S:

@@ -57,12 +57,17 @@ class SensorValues:
 
 @dataclass(frozen=True)
 class Exchange:
-    """One request of a poll, at what time it was heard (s), the device's reply, and what of it was delivered."""
+    """One request of a poll, at what time it was heard (s), the device's reply, and what of it was delivered.
+
+    request : b"" where the device was asked by DTR, or has spoken unasked: it was heard as DTR fell, or as it began.
+    pause_s : before the reply, of no driver's making, s: DTR was LOW, or the device silent between two lines.
+    """
 
     request: bytes
     heard_s: float
     reply: bytes
     delivered: bytes
+    pause_s: float = 0.0
 
 
 class Peer:
@@ -100,9 +105,9 @@ class Peer:
         """Blocks of registers that were asked for since `end_map`."""
         return len(self._counts)
 
-    def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-        """The pieces that come back when `request` has arrived at `heard_s`."""
-        reply = self._device.hear(request)
+    def answer(self, request: bytes, heard_s: float, timeout_s: float, pause_s: float = 0.0) -> Sequence[Piece]:
+        """The pieces that come back when `request` has arrived at `heard_s`; see `Exchange`."""
+        reply = self._reply(request)
         self._sensors.stamp(heard_s)
         pieces: Sequence[Piece] = []
         if reply:
@@ -110,8 +115,9 @@ class Peer:
             beyond = self._beyond is not None and self._is_beyond(request)
             fault = self._beyond if beyond and self._beyond else next(self._faults, NONE)
             pieces = fault.act(reply, timeout_s)
-        if request:
-            self.exchanges.append(Exchange(request, heard_s, reply, b"".join(piece.data for piece in pieces)))
+        if request or reply:
+            delivered = b"".join(piece.data for piece in pieces)
+            self.exchanges.append(Exchange(request, heard_s, reply, delivered, pause_s))
         return pieces
 
     def would_answer(self, requests: Iterable[bytes], values: Mapping[str, float]) -> tuple[bytes, ...]:
@@ -119,11 +125,16 @@ class Peer:
         present, self._sensors.values = self._sensors.values, dict(values)
         sensed_s = dict(self._sensors.sensed_s)
         try:
-            return tuple(self._device.hear(request) for request in requests)
+            return tuple(self._reply(request) for request in requests)
         finally:
             self._sensors.values = present
             self._sensors.stamp(math.nan)
             self._sensors.sensed_s = sensed_s
+
+    def _reply(self, request: bytes) -> bytes:
+        if request or isinstance(self._device, ModbusSlaves):
+            return self._device.hear(request)
+        return self._device.speak()
 
     def _is_beyond(self, request: bytes) -> bool:
         """Whether a request asks for one register more than the driver needs."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from compd.commissioning.conformance.checksum_repair import Checksum, checksum_in
+from compd.commissioning.conformance.checksum_repair import ReplyChecksum, checksum_in
 from compd.commissioning.conformance.device_replies import CONTROL, is_text
 
 FEWEST_ALIKE = 6  # replies of the same length, of which what does not change is taken as constant
@@ -48,7 +48,7 @@ class ReplyText:
             len(self._alike) >= FEWEST_ALIKE and all(reply[place] == byte for reply in self._alike)
             for place, byte in enumerate(base)
         ]
-        self._checksum: Checksum | None = checksum_in([base, *self._alike])
+        self._checksum: ReplyChecksum | None = checksum_in([base, *self._alike])
         self._check_place = self._checksum.place(base) if self._checksum else slice(0, 0)
 
     @property

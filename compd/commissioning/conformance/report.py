@@ -15,6 +15,7 @@ from compd.commissioning.conformance.case_result import CaseResult, Subject
 from compd.commissioning.conformance.cases import FIRST_CASES, run_cases
 from compd.commissioning.conformance.harness import ConformanceSession, ConformanceWire
 from compd.commissioning.conformance.peer import Peer, SensorValues
+from compd.commissioning.conformance.talker_cases import CHARACTER_S, opened_within_a_line, seldom_read
 from compd.commissioning.conformance.virtual import VirtualWire
 from compd.commissioning.conformance.wire import CHARACTER_BITS, Kind, RealWire
 from compd.commissioning.conformance.wire_cases import slowest_line
@@ -47,13 +48,29 @@ class DriverUnderTest:
         replies = getattr(device, "error_replies", {})
         return {reply: Quality(quality) for reply, quality in replies.items()}
 
+    @property
+    def by_dtr(self) -> bool:
+        """Whether its device is asked by DTR."""
+        return "DTR" in self.gauge(self.options).serial_signals
+
+    @property
+    def unasked(self) -> bool:
+        """Whether its device speaks without being asked."""
+        device = self.simulator(self.options, lambda channel: 0.0)
+        return not self.registers and not self.by_dtr and bool(device.speak())
+
     def kinds(self) -> tuple[Kind, ...]:
-        """The kinds of line that it can be wired to."""
+        """The kinds of line of this computer on which it can be tried."""
+        if self.by_dtr or self.unasked:
+            return ()
         return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
 
     def subject(self, over_tcp: bool, exact: bool) -> Subject:
         checksum = self.registers or self.gauge.integrity == "checksum"
-        return Subject(self.registers, over_tcp, checksum, exact, self.error_replies, self.options, self._with_options)
+        errors = self.error_replies
+        return Subject(
+            self.registers, over_tcp, checksum, exact, errors, self.unasked, self.options, self._with_options
+        )
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
         """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
@@ -62,8 +79,13 @@ class DriverUnderTest:
 
     def virtual(self, character_s: float = 0.0) -> ConformanceSession:
         """On a wire in virtual time."""
+        return self.virtual_with_wire(character_s)[0]
+
+    def virtual_with_wire(self, character_s: float = 0.0) -> tuple[ConformanceSession, VirtualWire]:
+        """The same, and the wire, whose time can pass between polls."""
         peer, sensors = self.peer()
-        return self._session(VirtualWire(peer, self.registers, character_s=character_s), sensors)
+        wire = VirtualWire(peer, self.registers, character_s=character_s, unasked=self.unasked)
+        return self._session(wire, sensors), wire
 
     def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
         """On a pty or TCP port; `settings`: baud, timeout_s."""
@@ -126,7 +148,14 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
                 return
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
+        if driver.unasked:
+            yield "virtual time", opened_within_a_line(*driver.virtual_with_wire(CHARACTER_S))
+            yield "virtual time", seldom_read(*driver.virtual_with_wire())
         if not on_real_wires:
+            return
+        if not driver.kinds():
+            why = "a pty and TCP have no DTR" if driver.by_dtr else "a device that speaks unasked: in virtual time"
+            yield "ptys, ports", CaseResult("on ptys and TCP ports", "", why, "-")
             return
         for kind in driver.kinds():
             session = driver.real(kind, Path(temporary))

@@ -29,6 +29,7 @@ class RealWire:
     """`open` gives the product's own line to it. One thread serves it, from its creation to `close`."""
 
     exact = False
+    pause_s = 0.0
 
     def __init__(
         self, peer: Peer, kind: Kind, directory: Path, baud: int = FAST_BAUD, timeout_s: float = TIMEOUT_S

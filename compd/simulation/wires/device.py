@@ -26,8 +26,11 @@ class SimulatedByteDevice(ABC):
     def hear(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the reply to complete requests, or b""."""
 
-    def asked_by_dtr(self) -> bytes:
-        """The reply to a pulse of DTR; b"" for a device that is not asked so. A simulated port has no DTR."""
+    def speak(self) -> bytes:
+        """What it says where no bytes ask it: unasked, time after time, or to a pulse of DTR; b"" where it does not.
+
+        `compd driver test` plays both. On the ptys and ports of a simulated machine it is not heard.
+        """
         return b""
 
 

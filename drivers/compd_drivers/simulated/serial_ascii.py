@@ -55,8 +55,9 @@ class SimulatedAscii(SimulatedByteDevice):
             replies += self._answer(self._replies[asked])
         return replies.encode("latin-1")
 
-    def asked_by_dtr(self) -> bytes:
-        return self._answer(self.options.in_).encode("latin-1") if self.options.dtr_pulse_s else b""
+    def speak(self) -> bytes:
+        asked = self.options.out or self.options.requests
+        return b"" if asked else self._answer(self.options.in_).encode("latin-1")
 
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -15,10 +15,9 @@ from compd.commissioning.conformance.report import DriverUnderTest, driver_under
 from compd.gauge import Channel
 from compd_drivers.modbus import Modbus
 from compd_drivers.modbus_description import ModbusOptions
-from tests.support import faulty_drivers
+from tests.support.faulty_drivers import DRIVERS
 
-FILE = Path(faulty_drivers.__file__)
-RIGHT = ("Comparator", "Inch", "Code", "Exponent", "Addressed", "Checked", "Pair", "Registers")
+RIGHT = ("Comparator", "Inch", "Code", "Exponent", "Addressed", "Checked", "Pair", "Registers", "Talker", "Pulsed")
 RANGE = "range: all that the device can show"
 EXCHANGED = "letters, units and signs exchanged"
 ANOTHER = "another unit, or other settings"
@@ -87,12 +86,19 @@ FAULTY = {
     "LowWordAlone": (RANGE, "1.5536 mm as ok, the sensor had -5"),
     "WithoutSign": (RANGE, "429496.73 mm as ok, the sensor had -0.0001"),
     "ExceptionIsZero": ("error replies", "exception 5: value: 0 mm as ok"),
+    "KeepsTheLastLine": ("no reply", "mm as ok, the sensor had"),
+    "KeepsTheLastReading": ("no reply", "mm as ok, the sensor had"),
+    "HalfALine": ("opened within a line", "mm as ok"),
+    "OldestLine": ("polled seldom: the newest line", "3 lines later: .* nothing was said in this poll"),
+    "StampOfTheReceipt": ("units and scale", "after the device had sampled"),
+    "StampBehindThePulse": ("units and scale", "time stamp 120.000 ms after the device had sampled"),
+    "PulsesAgain": ("no request twice", "asks 2 times in one poll, 1 without a fault"),
     "OtherUnit": ("units and scale", "a poll without any fault gave timeout"),
 }
 
 
 def driver(name: str) -> DriverUnderTest:
-    gauge = getattr(faulty_drivers, name)
+    gauge = DRIVERS[name]
     options = gauge.Options(driver=name, line="test", **(gauge.sample_options or {}))
     return DriverUnderTest(name, gauge, gauge.device, options)
 
@@ -118,14 +124,14 @@ def test_a_faulty_driver_is_found_and_its_fault_is_named(name: str) -> None:
 
 
 def test_every_driver_of_the_file_is_tried() -> None:
-    drivers = {name for name, value in vars(faulty_drivers).items() if hasattr(value, "device")}
-    assert drivers == {*RIGHT, *FAULTY}
+    assert set(DRIVERS) == {*RIGHT, *FAULTY}
 
 
 @pytest.mark.parametrize(("name", "code"), [("AnyAddress", 1), ("Addressed", 0)])
 def test_from_the_command_line(name: str, code: int) -> None:
-    device = getattr(faulty_drivers, name).device.__name__
-    result = CliRunner().invoke(app, ["driver", "test", f"{FILE}:{name}", "--simulator", f"{FILE}:{device}", "--quick"])
+    gauge = f"{inspect.getfile(DRIVERS[name])}:{name}"
+    device = f"{inspect.getfile(DRIVERS[name].device)}:{DRIVERS[name].device.__name__}"
+    result = CliRunner().invoke(app, ["driver", "test", gauge, "--simulator", device, "--quick"])
     assert result.exit_code == code, result.output
     assert ("cases failed" in result.output) == bool(code)
     assert ("nothing failed" in result.output) == (not code)
@@ -163,3 +169,26 @@ def test_the_search_for_a_digit_ends_where_numbers_are_no_finer() -> None:
     result = next(r for _, r in run_conformance(wrong, on_real_wires=False) if r.case == "a sensor is off")
     assert result.verdict == "FAIL"
     assert "c: 2147.48365 mm as ok, the sensor had nan" in result.observed
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"unit": "mm", "cable": "simplex", "decimals": 3}, "no DTR"),
+        ({"unit": "inch", "cable": "simplex", "decimals": 5}, "no DTR"),
+    ],
+)
+def test_a_preset_that_is_asked_by_dtr_is_tried_in_virtual_time(options: dict[str, object], why: str) -> None:
+    results = list(run_conformance(driver_under_test("sylvac_optors", options)))
+    assert [result for _, result in results if result.verdict == "FAIL"] == []
+    assert sum(result.verdict == "pass" for _, result in results) >= 18
+    assert why in results[-1][1].observed
+
+
+@pytest.mark.parametrize("form", ["%+08.3f", "%+08.3f mm", "%+08.3f%0<sum8>"])
+def test_a_described_device_that_speaks_unasked_is_tried_in_virtual_time(form: str) -> None:
+    options = {"in": form, "in_terminator": r"\r\n", "channels": [{"name": "a", "unit": "mm"}]}
+    results = list(run_conformance(driver_under_test("serial_ascii", options)))
+    assert [result for _, result in results if result.verdict == "FAIL"] == []
+    passed = {result.case for _, result in results if result.verdict == "pass"}
+    assert {"no reply", "cut", "opened within a line", "polled seldom: the newest line"} <= passed

@@ -126,3 +126,10 @@ def test_a_device_that_stops_speaking() -> None:
     with pytest.raises(LineFault) as caught:
         listening(b"", b"+12.5\r\n", b"+13.")
     assert caught.value.quality is Quality.INCOMPLETE
+
+
+def test_a_line_opened_between_the_bytes_of_a_terminator_is_read() -> None:
+    clock = InstantClock()
+    line = StreamLine(ScriptedPort(clock, [b"", b"\n+00001.0\r\n", b"+00002.0\r\n"]), 0.3, 0.002, clock)
+    text, _ = line.next_line(b"\r\n", limit=10)
+    assert text == b"+00002.0"
