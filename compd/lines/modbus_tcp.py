@@ -10,6 +10,7 @@ Source: Modbus Messaging on TCP/IP Implementation Guide V1.0b (transaction numbe
 
 from __future__ import annotations
 
+import logging
 import math
 import struct
 import threading
@@ -30,6 +31,10 @@ from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, exception_fault
 from compd.lines.port import TcpPort
+
+# Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one, and each late reply, as well.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+logging.getLogger("pymodbus").propagate = False
 
 LAST_TRANSACTION = 0xFFFF
 # A connection that stays silent so long, s, beyond the gateway's wait, is closed: a device may have forgotten it. Two
@@ -162,9 +167,7 @@ class ModbusTcp:
         if isinstance(reply, ExceptionResponse):
             raise exception_fault(reply.exception_code)
         if reply.function_code != request.function_code:
-            raise self._closed(
-                Quality.MISMATCH, f"asked function {request.function_code}, got {reply.function_code}"
-            )
+            raise self._closed(Quality.MISMATCH, f"asked function {request.function_code}, got {reply.function_code}")
         return time_s, reply
 
     def _receive(self, port: TcpPort, request: ModbusPDU, time_s: float) -> ModbusPDU:

@@ -35,10 +35,12 @@ class AbsentGauges:
         """`gauge` answers at the monotonic time `now_s` (s); its new readings are not published yet."""
         self._misses.pop(gauge, None)
         self._asked_s.pop(gauge, None)
-        for absent, asked_s in self._asked_s.items():
+        if self._asked_s:
+            # those that were asked behind the first may have waited for it in the gateway's queue
+            absent, asked_s = next(iter(self._asked_s.items()))
             if gauge.fresh(asked_s) and not gauge.fresh(now_s):
                 self._count(absent, now_s - asked_s, now_s)
-        self._asked_s.clear()
+            self._asked_s.clear()
 
     def _count(self, absent: PolledGauge, cost_s: float, now_s: float) -> None:
         misses = self._misses[absent] = self._misses.get(absent, 0) + 1

@@ -2,8 +2,9 @@
 
 A lost line is closed, and opened again after a waiting time that doubles with every failure. A gauge that does not
 answer rests for a shorter time, so that an absent unit does not slow the others on its line, and for a longer one where
-it makes them stale (`compd.live.acquisition.absent_gauges`). No line waits for another. Where replies do not say whose they are, the readings of a round are published when it has ended and nothing
-more came (`compd.live.acquisition.reply_order`).
+it makes them stale (`compd.live.acquisition.absent_gauges`). No line waits for another. Where replies do not say whose
+they are, the readings of a round are published when it has ended and nothing more came
+(`compd.live.acquisition.reply_order`).
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ import json
 import math
 import threading
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -461,7 +462,7 @@ def test_a_unit_that_misses_once_is_asked_again_within_a_second() -> None:
         bus.at[time_s + 0.5] = bus.dead.clear
     bus.scripted.run()
     asked_s = bus.times_s(2)
-    assert max(late - soon for soon, late in zip(asked_s, asked_s[1:], strict=False)) < 2.0
+    assert max(late - soon for soon, late in pairwise(asked_s)) < 2.0
 
 
 def test_units_that_come_back_together_are_all_asked_within_a_second() -> None:
