@@ -21,10 +21,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from compd.configuration import Configuration
-from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, PolledLine, SerialPortSettings
+from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, PolledLine, SerialPortSettings
 from compd.configuration.pushed_lines import PushedLineSettings
 from compd.configuration.round_trigger import BROADCAST, WRITE_REGISTERS, TriggerBytes
-from compd.errors import Problem
 from compd.gauge import replies_tell_whose
 from compd.lines.open import QUIET_CHARACTERS
 from compd.live.acquisition.reply_order import LATER_S, SLOWER
@@ -36,9 +35,6 @@ USUAL_TURNAROUND_S = 10e-3
 # An FTDI adapter hands over a packet that is not full when its latency timer has run out: 16 ms, if nobody shortens it
 # (FTDI AN232B-04, "Data Throughput, Latency and Handshaking").
 LATENCY_TIMER_S = 16e-3
-# Lengths that are further apart, s, and nobody limits it or latches them: at 1 mm/s, which is slow for a machine that
-# moves, 20 um, and a comparator shows a hundredth of that.
-LARGEST_SPREAD_S = 0.02
 # Over Ethernet: a packet there and back through a device's firmware. No bits to count.
 TCP_EXCHANGE_S = 2e-3
 
@@ -140,10 +136,10 @@ def budget_of_line(
     slowest = pace(line, USUAL_TURNAROUND_S)
     trigger_s = _trigger_s(line, pace(line)) if known else 0.0
     usual_s = [slowest.exchange_s(*exchange) for exchange in known]
-    # The request goes out, and nothing comes for the timeout.
+    # The request goes out, and nothing comes for the timeout, or a gateway is busy for longer.
+    wait_s = max(line.timeout_s, (line.gateway_wait_s or 0.0) if isinstance(line, ModbusTcpLine) else 0.0)
     absent_s = max(
-        (line.timeout_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic),
-        default=line.timeout_s,
+        (wait_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic), default=wait_s
     )
     return LineBudget(
         name=name,
@@ -188,6 +184,11 @@ def _silence_s(line_pace: Pace, traffic: Traffic) -> float:
     return SLOWER * longest_s + LATER_S
 
 
+def gauges_on(configuration: Configuration, line: str) -> list[str]:
+    """Names of the gauges on the line of this name."""
+    return [gauge for gauge, options in configuration.gauges.items() if options.line == line]
+
+
 def line_budgets(configuration: Configuration) -> list[LineBudget]:
     """The budget of every line that polls a gauge."""
     gauges = configuration.gauge_objects()
@@ -195,121 +196,7 @@ def line_budgets(configuration: Configuration) -> list[LineBudget]:
     for name, line in configuration.lines.items():
         if isinstance(line, PushedLineSettings):
             continue
-        if on_line := {gauge: gauges[gauge] for gauge in _gauges_on(configuration, name)}:
+        if on_line := {gauge: gauges[gauge] for gauge in gauges_on(configuration, name)}:
             traffic = {gauge: driver.traffic() for gauge, driver in on_line.items()}
             budgets.append(budget_of_line(name, line, traffic, replies_tell_whose(list(on_line.values()))))
     return budgets
-
-
-def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
-    """What will not work as configured, or will not while one device is absent."""
-    problems = []
-    for budget in budgets:
-        stale_after_s = min(
-            configuration.gauges[gauge].stale_after_s or configuration.loop.stale_after_s
-            for gauge in _gauges_on(configuration, budget.name)
-        )
-        problems += line_warnings(budget, stale_after_s, configuration.where("lines", budget.name))
-    return [*problems, *_skew_warnings(configuration, budgets)]
-
-
-def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
-    """Lines whose lengths are measured far apart: beyond `loop.skew_s`, or unnoticed where that is left out."""
-    allowed_s = configuration.loop.skew_s
-    measuring = [budget for budget in budgets if budget.known and _measures_lengths(configuration, budget.name)]
-    problems = []
-    for budget in measuring:
-        # just before its next reading comes, a length is a round older than the newest of another line
-        skew_s = max(budget.usual_s, budget.line.poll_every_s)
-        if allowed_s is not None and skew_s > allowed_s:
-            problems.append(
-                Problem(
-                    where=configuration.where("loop", "skew_s"),
-                    what=f"line `{budget.name}` takes {skew_s * 1e3:.0f} ms for a round: setpoints will be refused",
-                    value=f"{allowed_s:g} s",
-                    allowed=f"{skew_s:.3g} s or more",
-                    next_step="raise it, or the baud rate, or spread the gauges over more lines",
-                )
-            )
-        elif allowed_s is None and budget.spread_s > LARGEST_SPREAD_S:
-            problems.append(
-                Problem(
-                    where=configuration.where("lines", budget.name),
-                    what=f"its lengths are measured {budget.spread_s * 1e3:.0f} ms apart within a round: on the move "
-                    "they do not belong together, and no setpoint is refused for it",
-                    allowed=f"{LARGEST_SPREAD_S * 1e3:g} ms, or a limit",
-                    next_step="set `round_trigger` where the devices can latch, or say by `loop.skew_s` how far apart "
-                    "lengths may be",
-                )
-            )
-    return problems
-
-
-def _measures_lengths(configuration: Configuration, line: str) -> bool:
-    """Whether a length of the wiring is read on this line."""
-    wiring = configuration.wiring
-    channels = [
-        *(wire.gauge for wire in wiring.scale),
-        *(wire.gauge for wire in wiring.joint),
-        *(wire.gauge for wire in wiring.frame),
-    ]
-    return not {channel.split(".")[0] for channel in channels}.isdisjoint(_gauges_on(configuration, line))
-
-
-def _gauges_on(configuration: Configuration, line: str) -> list[str]:
-    return [gauge for gauge, options in configuration.gauges.items() if options.line == line]
-
-
-def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[Problem]:
-    """One line's warnings. `stale_after_s`: the shortest of its gauges; `where`: the line's place in the file."""
-    if budget.unknown:
-        text = f"cannot be planned: {', '.join(budget.unknown)} does not say how many bytes it moves"
-        return [
-            Problem(where=where, what=text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")
-        ]
-    problems = []
-    takes = f"a round of {budget.bytes} bytes takes {budget.usual_s * 1e3:.1f} ms with 10 ms turnaround"
-    # A reading is up to a whole round old when the next one comes, and must outlive that one's own reading.
-    if 2 * budget.usual_s > stale_after_s:
-        problems.append(
-            Problem(
-                where=where,
-                what=f"{takes}: readings go stale between two polls",
-                value=f"{stale_after_s:g} s until stale",
-                allowed=f"{2 * budget.usual_s:.3g} s or more",
-                next_step="raise the baud rate, read registers in one block, or spread the gauges over more lines",
-            )
-        )
-    if budget.line.poll_every_s and budget.usual_s > budget.line.poll_every_s:
-        problems.append(
-            Problem(
-                where=where,
-                what=f"{takes}: the wanted rate cannot be reached",
-                value=f"poll_every_s {budget.line.poll_every_s:g}",
-                allowed=f"{budget.usual_s:.3g} s or more",
-                next_step="raise poll_every_s, or the baud rate",
-            )
-        )
-    line = budget.line
-    if isinstance(line, SerialPortSettings) and line.low_latency is False and "://" not in line.port:
-        held_back_s = budget.usual_s + budget.exchanges * LATENCY_TIMER_S
-        problems.append(
-            Problem(
-                where=where,
-                what=f"an FTDI adapter holds each reply back for up to 16 ms: a round of {budget.usual_s * 1e3:.1f} ms "
-                f"takes up to {held_back_s * 1e3:.1f}",
-                value="low_latency: false",
-                next_step="leave `low_latency` out",
-            )
-        )
-    if budget.gauges > 1 and budget.usual_s + budget.absent_s > stale_after_s:
-        problems.append(
-            Problem(
-                where=where,
-                what=f"one absent device of {budget.gauges} delays the others by {budget.absent_s * 1e3:.0f} ms: "
-                "they go stale whenever it is tried again",
-                value=f"{stale_after_s:g} s until stale",
-                next_step="shorten timeout_s, or give that device a line of its own",
-            )
-        )
-    return problems

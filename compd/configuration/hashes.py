@@ -45,6 +45,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "extrapolate": True,
     "skew_s": None,
     "round_trigger": None,
+    "gateway_wait_s": None,
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

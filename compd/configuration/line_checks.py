@@ -34,14 +34,13 @@ def line_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _port_problems(sections: Sections) -> Iterator[Problem]:
-    """A port that two lines name."""
+    """A port or an address that two lines name: behind one address a gateway's units wait for each other."""
     line_of_port: dict[str, str] = {}
     for name, line in sections.lines.items():
         port = getattr(line, "port", None)
         if port is None or getattr(line, "kind", None) in (None, "mqtt"):  # a broker takes many connections
             continue
-        if line.kind in ("tcp", "modbus_tcp"):
-            port = f"{line.host}:{port}"
+        port = _endpoint(f"//{line.host}:{port}" if line.kind in ("tcp", "modbus_tcp") else port)
         if port in line_of_port:
             yield Problem(
                 where=sections.document.where(("lines", name, "port")),
@@ -51,6 +50,16 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
                 next_step="hang both gauges on one line",
             )
         line_of_port[port] = name
+
+
+def _endpoint(port: str) -> str:
+    """A port by one spelling: host:port for any that is reached by TCP, whatever is spoken there."""
+    scheme, slashes, address = port.partition("//")
+    if not slashes or scheme not in ("", "socket:", "rfc2217:"):
+        return port
+    host, _, number = address.split("?")[0].rstrip("/").rpartition(":")
+    host = host.lower().rstrip(".")
+    return f"{'127.0.0.1' if host == 'localhost' else host}:{number}"
 
 
 def _kind_problems(sections: Sections) -> Iterator[Problem]:

@@ -127,6 +127,11 @@ class ModbusTcpLine(_LineSettings):
     kind: Literal["modbus_tcp"] = Field(description="Modbus TCP registers")
     host: Text = Field(description=_HOST)
     port: Annotated[int, Field(ge=1, le=65535)] = Field(default=502, description="TCP port of the device")
+    gateway_wait_s: Positive | None = Field(
+        default=None,
+        description="how long a gateway waits for a unit on its serial bus before it serves the next request; left "
+        "out: as long as `timeout_s`",
+    )
     round_trigger: TriggerWrite | None = Field(default=None, description=_TRIGGER)
 
 

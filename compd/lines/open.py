@@ -99,6 +99,8 @@ class ModbusTcpSettings(_Address, Protocol):
 
     @property
     def kind(self) -> Literal["modbus_tcp"]: ...
+    @property
+    def gateway_wait_s(self) -> float | None: ...
 
 
 StreamSettings = SerialSettings | ModbusSerialSettings | TcpSettings
@@ -117,7 +119,9 @@ def open_line(
     """
     match settings.kind:
         case "modbus_tcp":
-            return ModbusTcp(settings.host, settings.port, settings.timeout_s, clock, settings.pause_s)
+            return ModbusTcp(
+                settings.host, settings.port, settings.timeout_s, clock, settings.pause_s, settings.gateway_wait_s
+            )
         case "opc_ua" | "mqtt":
             return _open_pushed_line(settings, clock)
     stream = open_stream(settings, clock, wrap_port)

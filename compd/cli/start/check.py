@@ -106,7 +106,8 @@ def print_blind_spots(configuration: Configuration) -> None:
 def print_lines(configuration: Configuration) -> list[Problem]:
     """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
     from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
-    from compd.commissioning.line_budget import budget_warnings, line_budgets
+    from compd.commissioning.line_budget import line_budgets
+    from compd.commissioning.line_warnings import budget_warnings
     from compd.commissioning.pushed_periods import period_warnings
 
     budgets = line_budgets(configuration)

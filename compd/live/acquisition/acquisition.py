@@ -1,9 +1,10 @@
 """The threads that poll the gauges, or listen to them, one per line, and put their readings into `Latest`.
 
 A lost line is closed, and opened again after a waiting time that doubles with every failure. A gauge that does not
-answer rests for a shorter time, so that an absent unit does not slow the others on its line. No line waits for
-another. Where replies do not say whose they are, the readings of a round are published when it has ended and nothing
-more came (`compd.live.acquisition.reply_order`).
+answer rests for a shorter time, so that an absent unit does not slow the others on its line, and for a longer one where
+it makes them stale (`compd.live.acquisition.absent_gauges`). No line waits for another. Where replies do not say whose
+they are, the readings of a round are published when it has ended and nothing more came
+(`compd.live.acquisition.reply_order`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
 from compd.lines.echo import explained
 from compd.lines.stream import shown
+from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.reading_trust import ReadingTrust
@@ -122,6 +124,7 @@ class LineThread:
         self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the time from request to reply, s
         self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
         self._back_off = BackOff(*settings.back_off_s)
+        self._absent = AbsentGauges()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
 
@@ -251,11 +254,14 @@ class LineThread:
             return NOT_LATCHED_S
 
     def _poll(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> None:
+        start_s = self._clock.monotonic()
+        failures = gauge.failures
         with self._faults_of(gauge, line):
             before_s = line.last_request_s
             readings = self._ask(gauge, line, latched_s)
             now_s = self._clock.monotonic()
             self._back_off.succeeded()
+            self._absent.answered(gauge, now_s)
             # a device that speaks unasked has no late replies
             asked_s = line.last_request_s
             if asked_s > before_s and self._order.in_doubt(now_s):
@@ -264,6 +270,8 @@ class LineThread:
                 if asked_s > before_s:
                     self._order.answered(now_s - asked_s)
                 gauge.put(readings, now_s)
+        if gauge.failures > failures:
+            self._absent.missed(gauge, start_s)
 
     def _ask(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> Sequence[Reading]:
         """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""

@@ -14,11 +14,10 @@ from compd.cli.start.check import print_lines
 from compd.commissioning.line_budget import (
     LineBudget,
     budget_of_line,
-    budget_warnings,
     character_bits,
     line_budgets,
-    line_warnings,
 )
+from compd.commissioning.line_warnings import budget_warnings, line_warnings
 from compd.configuration import load
 from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, SerialLine
 from tests.support.paths import CONFIG
@@ -135,6 +134,19 @@ def test_warnings_where_they_belong() -> None:
     assert warning_text(alone, 1.0) == ""
     hurried = budget_of_line("x", rtu(19200, poll_every_s=0.01), {"g": INT16})
     assert "the wanted rate cannot be reached" in warning_text(hurried, 1.0)
+
+
+def test_a_dead_unit_behind_a_gateway_costs_its_wait() -> None:
+    six = {f"g{i}": [(8, 7)] for i in range(6)}
+
+    def warned(**keys: Any) -> str:
+        line = ModbusTcpLine(kind="modbus_tcp", host="h", timeout_s=0.1, **keys)
+        return warning_text(budget_of_line("x", line, six), 0.5)
+
+    assert warned() == ""
+    assert "one absent device of 6 delays the others by 990 ms" in warned(gateway_wait_s=1.0)
+    assert "`gateway_wait_s`" in warned(gateway_wait_s=1.0)
+    assert warned(gateway_wait_s=0.1) == ""
 
 
 @pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])

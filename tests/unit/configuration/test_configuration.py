@@ -67,6 +67,11 @@ CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("gauge: cabinet.room}", "gauge: cabinet.t1}"), "needs a gauge in degC", "mm"),
     (lambda t: t.replace("usb-scale-2", "usb-scale-1"), "line `scale_1` has the same port", "one line per port"),
     (
+        lambda t: t.replace("/dev/serial/by-id/usb-rs485", "socket://GATEWAY:502").replace("192.168.10.20", "gateway"),
+        "line `frame_u` has the same port",
+        "one line per port",
+    ),
+    (
         lambda t: t.replace("role: Rb, gauge: joints.3", "role: B, gauge: joints.3"),
         "link 1 has comparators",
         "Ra and Rb",

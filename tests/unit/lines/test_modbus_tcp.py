@@ -1,4 +1,4 @@
-"""Modbus TCP: each of pymodbus's ways to fail has its name, and nothing old is left in a connection."""
+"""Modbus TCP: each way to fail has its name, and no old reply is taken for a new one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.lines.modbus_tcp import ModbusTcp
+from tests.support.serial_gateway import serial_gateway
 from tests.support.wire_rig import InstantClock, Rig, rig
 
 LINE = {"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}
@@ -119,3 +120,39 @@ def test_a_well_framed_reply_that_is_none_never_passes(message: bytes) -> None:
 def test_a_well_framed_reply_that_is_one_passes() -> None:
     with answering(bytes([7, 4, 2, 0, 1])) as line:
         assert line.read_registers(7, 4, 0, 1).registers == (1,)
+
+
+# --- Behind a gateway with one serial bus ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exceptions", [True, False], ids=["exception 11", "silence"])
+def test_a_reply_behind_a_dead_unit_comes_by_its_own_number_on_the_same_connection(exceptions: bool) -> None:
+    with serial_gateway(units=3, exchange_s=0.0, wait_s=0.5, exceptions=exceptions) as gateway:
+        gateway.dead.add(2)
+        line = ModbusTcp("127.0.0.1", gateway.port, 0.2, MonotonicClock(), gateway_wait_s=0.5)
+        for _ in range(2):
+            assert quality_of(line, unit=2) is Quality.TIMEOUT
+            assert line.read_registers(1, 4, 0, 2).registers == (1, 1), "the gateway has come to it"
+            assert line.read_registers(3, 4, 0, 1).registers == (3,)
+        line.close()
+        assert gateway.connections == 1
+        assert gateway.asked == {1: 2, 2: 2, 3: 2}
+
+
+def test_late_replies_of_others_are_never_taken_where_the_gateway_waits_for_longer_than_expected() -> None:
+    with serial_gateway(units=3, exchange_s=0.0, wait_s=0.5, exceptions=True) as gateway:
+        gateway.dead.add(2)
+        line = ModbusTcp("127.0.0.1", gateway.port, 0.1, MonotonicClock())
+        assert quality_of(line, unit=2) is Quality.TIMEOUT
+        answers: list[tuple[int, tuple[int, ...]]] = []
+        faults = set()
+        while len(answers) < 3:
+            unit = 1 + 2 * (len(answers) % 2)
+            try:
+                answers.append((unit, line.read_registers(unit, 4, 0, 1).registers))
+            except LineFault as fault:
+                faults.add(fault.quality)
+        line.close()
+        assert faults == {Quality.TIMEOUT}
+        assert answers == [(1, (1,)), (3, (3,)), (1, (1,))]
+        assert gateway.connections == 1

@@ -6,6 +6,7 @@ import json
 import math
 import threading
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -391,3 +392,83 @@ def test_stopping_cuts_a_back_off_short() -> None:
     assert tried.wait(PATIENCE_S)
     thread.stop()
     assert thread.join(PATIENCE_S)
+
+
+# --- A unit whose silence makes the others stale --------------------------------------------------------------
+
+
+class SlowBus:
+    """Six gauges in virtual time, 10 ms each, and `wait_s` for one that is dead; which snapshots had fresh readings."""
+
+    UNITS = 6
+
+    def __init__(self, wait_s: float, until_s: float, quality: Quality) -> None:
+        self.dead: set[int] = set()
+        self.asked: list[tuple[int, float]] = []
+        self.last_s = [0.0] * self.UNITS
+        self.stale: list[tuple[float, float]] = []  # from, to: one of those that live had no fresh reading
+        self._wait_s = wait_s
+        self._until_s = until_s
+        self._quality = quality
+        self.scripted = ScriptedThread(*[Scripted(lambda unit=unit: self.poll(unit)) for unit in range(self.UNITS)])
+        self.start_s = self.scripted.clock.now_s
+        self.last_s = [self.start_s] * self.UNITS
+        self.at: dict[float, Callable[[], None]] = {}
+
+    def poll(self, unit: int) -> list[Reading]:
+        clock = self.scripted.clock
+        for time_s in [time_s for time_s in self.at if clock.now_s - self.start_s >= time_s]:
+            self.at.pop(time_s)()
+        if clock.now_s - self.start_s > self._until_s:
+            self.scripted.thread.stop()
+        self.asked.append((unit, clock.now_s - self.start_s))
+        if unit in self.dead:
+            clock.now_s += self._wait_s
+            raise LineFault(self._quality, "no answer")
+        clock.now_s += 0.01
+        if clock.now_s - self.last_s[unit] > STALE_AFTER_S:
+            self.stale.append((self.last_s[unit] + STALE_AFTER_S - self.start_s, clock.now_s - self.start_s))
+        self.last_s[unit] = clock.now_s
+        return [good(1.0, clock.now_s)]
+
+    def times_s(self, unit: int) -> list[float]:
+        return [time_s for asked, time_s in self.asked if asked == unit]
+
+    def stale_share(self, from_s: float, to_s: float) -> float:
+        """Part of that time in which a gauge had no fresh reading; at most: several may have been stale at once."""
+        spans = [(max(begin, from_s), min(end, to_s)) for begin, end in self.stale]
+        instants = [from_s + 0.01 * k for k in range(int((to_s - from_s) / 0.01))]
+        return sum(any(a <= t < b for a, b in spans) for t in instants) / len(instants)
+
+
+@pytest.mark.parametrize("quality", [Quality.TIMEOUT, Quality.DEVICE_ERROR])
+def test_a_unit_that_makes_the_others_stale_is_asked_seldom(quality: Quality) -> None:
+    bus = SlowBus(1.0, 610.0, quality)
+    bus.at[10.0] = lambda: bus.dead.add(2)
+    with structlog.testing.capture_logs() as logs:
+        bus.scripted.run()
+    asked_s = [time_s for time_s in bus.times_s(2) if time_s > 10.0]
+    assert len(asked_s) == 2 + 5, "twice at first, then after a hundred times the second that each one costs"
+    assert bus.stale_share(10.0, 30.0) < 0.08
+    assert bus.stale_share(30.0, 600.0) < 0.01
+    (event,) = [entry for entry in logs if entry["event"] == "gauge is asked seldom"]
+    assert (event["gauge"], event["cost_s"], event["rest_s"]) == ("g2", pytest.approx(1.01), pytest.approx(101.0))
+
+
+def test_a_unit_that_misses_once_is_asked_again_within_a_second() -> None:
+    bus = SlowBus(1.0, 60.0, Quality.TIMEOUT)
+    for time_s in (10.0, 20.0, 30.0):
+        bus.at[time_s] = lambda: bus.dead.add(2)
+        bus.at[time_s + 0.5] = bus.dead.clear
+    bus.scripted.run()
+    asked_s = bus.times_s(2)
+    assert max(late - soon for soon, late in pairwise(asked_s)) < 2.0
+
+
+def test_units_that_come_back_together_are_all_asked_within_a_second() -> None:
+    bus = SlowBus(1.0, 100.0, Quality.TIMEOUT)
+    bus.at[10.0] = lambda: bus.dead.update(range(6))
+    bus.at[60.0] = bus.dead.clear
+    bus.scripted.run()
+    back_s = [min(time_s for time_s in bus.times_s(unit) if time_s > 60.0) for unit in range(6)]
+    assert max(back_s) < 63.0

@@ -1,0 +1,52 @@
+"""How seldom a gauge is asked that does not answer, and whose silence makes the others on its line stale.
+
+A gateway before a serial bus serves nobody while it waits for a unit that does not answer, whatever the line's timeout
+is. What such a request has cost is known when the next gauge answers. Where that gauge's reading has gone stale
+meanwhile, twice in a row, the silent gauge is asked again only after `TIMES_COST` as long. A gauge that costs nobody a
+reading rests as `PolledGauge` has it.
+"""
+
+from __future__ import annotations
+
+import structlog
+
+from compd.live.acquisition.polled_gauge import PolledGauge
+
+log = structlog.get_logger()
+
+# A gauge that is absent may take 1 % of its line's time.
+TIMES_COST = 100
+# One reply may get lost; the second miss in a row is an absence.
+MISSES = 2
+
+
+class AbsentGauges:
+    """Of one line; used by the line's thread."""
+
+    def __init__(self) -> None:
+        self._asked_s: dict[PolledGauge, float] = {}  # missed since any other answered: when they were asked
+        self._misses: dict[PolledGauge, int] = {}  # in a row, that cost another one its reading
+
+    def missed(self, gauge: PolledGauge, asked_s: float) -> None:
+        """`gauge` was asked at the monotonic time `asked_s` (s), and did not answer."""
+        self._asked_s[gauge] = asked_s
+
+    def answered(self, gauge: PolledGauge, now_s: float) -> None:
+        """`gauge` answers at the monotonic time `now_s` (s); its new readings are not published yet."""
+        self._misses.pop(gauge, None)
+        self._asked_s.pop(gauge, None)
+        if self._asked_s:
+            # those that were asked behind the first may have waited for it in the gateway's queue
+            absent, asked_s = next(iter(self._asked_s.items()))
+            if gauge.fresh(asked_s) and not gauge.fresh(now_s):
+                self._count(absent, now_s - asked_s, now_s)
+            self._asked_s.clear()
+
+    def _count(self, absent: PolledGauge, cost_s: float, now_s: float) -> None:
+        misses = self._misses[absent] = self._misses.get(absent, 0) + 1
+        if misses < MISSES:
+            return
+        rest_s = TIMES_COST * cost_s
+        absent.rests_until_s = now_s + rest_s
+        if misses == MISSES:
+            log.warning("gauge is asked seldom", gauge=absent.name, cost_s=round(cost_s, 3), rest_s=round(rest_s, 1))
