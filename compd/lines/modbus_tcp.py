@@ -164,6 +164,8 @@ class ModbusTcp:
             raise self._closed(Quality.MISMATCH, f"not to be decoded: {error}") from error
         self._last_reply_s = self._clock.monotonic()
         self._unanswered, self._busy_until_s = 0, -math.inf
+        if self._received:
+            self.close()  # behind the reply to the last request there is nothing that anybody has asked for
         if isinstance(reply, ExceptionResponse):
             raise exception_fault(reply.exception_code)
         if reply.function_code != request.function_code:
