@@ -255,7 +255,7 @@ def good_then(device: Publisher, latest: Any) -> int:
 
 
 def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker, device: Publisher) -> None:
-    with listening(broker, device, timed()) as (acquisition, latest):
+    with listening(broker, device, timed(), stale_after_s=30.0) as (acquisition, latest):
         since = good_then(device, latest)
         broker.kill()
         assert math.isnan(latest.wait_for("g.a", Quality.LINE_LOST, since).value)
