@@ -17,6 +17,8 @@ _SHARE = 0.8
 _REPEAT_EVERY_S = 0.1
 # The first loop starts with the daemon.
 _FIRST_WITHIN_S = 5.0
+# Of `time_s` in a setpoint's line. Two processes that go on after a pause read their clocks within less.
+_RESOLUTION_S = 1e-6
 
 
 class LoopWatch:
@@ -41,8 +43,11 @@ class LoopWatch:
         self._stop_s = -math.inf
 
     def admits(self, seq: int, time_s: float) -> bool:
-        """Whether a setpoint of the loop, with this number and time (s), may still be published."""
-        if seq <= self._seq or time_s <= self._stop_s:
+        """Whether a setpoint of the loop, with this number and time (s), may still be published.
+
+        Clients rely on number and time that grow from line to line.
+        """
+        if seq <= self._seq or time_s - self._stop_s <= _RESOLUTION_S:
             return False
         self._seq = seq
         return True
