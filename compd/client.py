@@ -306,6 +306,26 @@ class Client:
         """
         return self._ask({"class": "ACCEPT", "gauge": gauge}, "ACCEPT")
 
+    def poll(self, gauge: str) -> Message:
+        """Have a gauge polled at once that did not answer, and is asked seldom since. Unix socket only.
+
+        Parameters
+        ----------
+        gauge : str
+            Its name in the configuration. It is polled within a second, if its line is open; `status` counts its polls.
+
+        Returns
+        -------
+        dict
+            POLL.
+
+        Raises
+        ------
+        DaemonError
+            Where there is no such gauge, or its device sends by itself.
+        """
+        return self._ask({"class": "POLL", "gauge": gauge}, "POLL")
+
     def model(self, file: str | None = None, shadow: bool = False) -> Message:
         """Ask which models the daemon runs with; with `file`, adopt that model first. Unix socket only.
 

@@ -80,6 +80,11 @@ class ModbusTcp:
         self._last_bytes_s = -math.inf
         self._port: TcpPort | None = self._connect()
 
+    @property
+    def peer(self) -> str:
+        """Address and port of the device; "" where the connection is closed."""
+        return "" if self._port is None else self._port.peer
+
     def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
         """`count` registers from `address` of slave `unit` by function 3 or 4.
 

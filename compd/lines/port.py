@@ -195,6 +195,15 @@ class TcpPort:
         except OSError as error:
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {host}:{port}: {error}") from error
 
+    @property
+    def peer(self) -> str:
+        """Address and port of the other end; "" where the connection has ended."""
+        try:
+            address, port = self._socket.getpeername()[:2]
+        except OSError:
+            return ""
+        return f"[{address}]:{port}" if ":" in address else f"{address}:{port}"
+
     def read(self, timeout_s: float) -> bytes:
         try:
             if not select.select([self._socket], [], [], max(0.0, timeout_s))[0]:

@@ -21,6 +21,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.configuration.lines import powered
+from compd.configuration.pushed_lines import PushedLineSettings
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.votes.votes import Votes
@@ -31,6 +32,7 @@ from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
+from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.memory.trust_memory import TrustMemory
 from compd.live.pipeline import build_pipeline
@@ -119,6 +121,13 @@ class Daemon:
             clock,
         )
         self.trust = self._trust(before)
+        self._poll_requests = PollRequests(
+            [
+                name
+                for name, options in configuration.gauges.items()
+                if not isinstance(configuration.lines[options.line], PushedLineSettings)
+            ]
+        )
         self.acquisition = self._acquisition(gauges, self._votes(pipeline.settings.model), clock)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
         watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
@@ -182,6 +191,7 @@ class Daemon:
                 sockets.target,
                 access,
                 clock,
+                self._poll_requests.add,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
@@ -238,7 +248,13 @@ class Daemon:
             AcquisitionProcess(
                 name,
                 partial(
-                    Acquisition, {line: lines[line] for line in group}, stale_after_s, self.latest, clock, trust=trust
+                    Acquisition,
+                    {line: lines[line] for line in group},
+                    stale_after_s,
+                    self.latest,
+                    clock,
+                    trust=trust,
+                    poll_requests=self._poll_requests,
                 ),
                 self.control,
                 clock,

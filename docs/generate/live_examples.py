@@ -125,6 +125,7 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
         "RELEASE": client.ask({"class": "RELEASE"}, "RELEASE"),
         "ZERO": zero,
         "ACCEPT": client.ask({"class": "ACCEPT", "gauge": "all"}, "ACCEPT"),
+        "POLL": client.ask({"class": "POLL", "gauge": "scale_1"}, "POLL"),
         # this daemon wants no token; one that does greets with AUTH
         "AUTH": Exchange(authorized.sent, ({"class": "AUTH"}, *authorized.received)),
         "STATUS": client.ask({"class": "STATUS"}, "STATUS"),

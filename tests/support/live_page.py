@@ -13,6 +13,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from playwright.sync_api import Error as PlaywrightError
+from playwright.sync_api import sync_playwright
+
 from compd.demo.live import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.simulation.wires.control_client import ControlClient
@@ -103,8 +106,6 @@ def browser() -> Iterator[Any]:
     It takes no processor time from the simulated machine and its daemon: without a graphics processor it would take
     a whole one, and gauges would answer late.
     """
-    from playwright.sync_api import sync_playwright
-
     with sync_playwright() as playwright, TemporaryDirectory() as directory:
         last = Path(directory) / "chromium"
         last.write_text(f'#!/bin/sh\nexec nice -n 19 {CHROMIUM} "$@"\n')
@@ -140,9 +141,18 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
 
 
 def until(tab: Any, expression: str, within_s: float = 30.0) -> None:
-    """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)"""
+    """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)
+
+    An expression that fails is not true yet: after a click on a link the page may still be the one before, or be
+    without the element that the expression reads.
+    """
+    failure = ""
     for _ in range(round(within_s / _LOOK_EVERY_S)):
-        if tab.evaluate(expression):
-            return
+        try:
+            if tab.evaluate(expression):
+                return
+            failure = ""
+        except PlaywrightError as error:
+            failure = f": {error}"
         tab.wait_for_timeout(1e3 * _LOOK_EVERY_S)
-    raise AssertionError(f"not within {within_s:g} s: {expression}")
+    raise AssertionError(f"not within {within_s:g} s: {expression}{failure}")

@@ -52,8 +52,15 @@ class Broker:
 
     def kill(self) -> None:
         """End it as a crash does."""
+        self._end(signal.SIGKILL)
+
+    def stop(self) -> None:
+        """End it as a computer that is restarted does: with `persistence` it writes down what it has retained."""
+        self._end(signal.SIGTERM)
+
+    def _end(self, how: signal.Signals) -> None:
         if self._process is not None:
-            self._process.kill()
+            self._process.send_signal(how)
             self._process.wait(PATIENCE_S)
             self._log.join(PATIENCE_S)
             assert self._process.stderr is not None

@@ -53,7 +53,8 @@ class OpcUaServer:
             self.endpoint = f"opc.tcp://127.0.0.1:{probe.getsockname()[1]}/probes"
         self._users = users
         self._security = security
-        self._loop = asyncio.new_event_loop()
+        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
+        self._loop = self._runner.get_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="opc ua server", daemon=True)
         self._thread.start()
         self._server: Server | None = None
@@ -73,7 +74,7 @@ class OpcUaServer:
         self.stop()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(PATIENCE_S)
-        self._loop.close()
+        self._runner.close()  # with the tasks that asyncua leaves of sessions whose clients have not closed them
 
     def pause(self) -> None:
         """Let it stand still, its connections open."""

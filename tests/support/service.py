@@ -16,6 +16,7 @@ from compd.live.loop.commands import Commands
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
+from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.service.listeners import Listeners
 from compd.live.service.publisher import Publisher
@@ -120,6 +121,7 @@ class Service:
         self.zeros = []
         self.models = []
         self.distrusted = {"scale_1": ["scale_1.position"], "joints": ["joints.1", "joints.2"]}
+        self.poll_requests = PollRequests(["scale_1"])
         self.listeners = Listeners(sockets)
         self.ring = SharedRing()
         self.publisher = Publisher(
@@ -139,6 +141,7 @@ class Service:
                 targets=sockets.target,
                 access=TcpAccess.of(sockets.tcp),
                 clock=self.clock,
+                poll=self.poll_requests.add,
             )
         )
         self.stopping = threading.Event()

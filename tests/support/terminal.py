@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -29,6 +30,10 @@ START_S = 60.0
 POLL_EVERY_S = 0.05
 # Sockets that exist once these commands are ready for the next one.
 READY = {"simulate": "control.sock", "run": "compd.sock"}
+# Other programs that serve until they are ended. They are ready when they have printed what the page shows.
+SERVERS = ("mosquitto",)
+# The port of a broker that pages start; while a test runs, one that is free.
+BROKER_PORT = "1884"
 KILL = re.compile(r"kill %(\d+)")
 EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
 
@@ -94,10 +99,12 @@ class Terminal:
         self._logs: list[Path] = []
         for name in ("config", "drivers"):
             (directory / name).symlink_to(ROOT / name)
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            self._broker_port = str(probe.getsockname()[1])
 
     def run(self, console: str) -> None:
         """Run a console fence."""
-        for shown in shown_commands(console.replace(MACHINE, str(self.directory / "machine"))):
+        for shown in shown_commands(self._in_test(console)):
             print("$", shown.command, "&" * shown.beside)
             if shown.command.startswith("make "):
                 # minutes each: .ci/run runs them
@@ -113,7 +120,7 @@ class Terminal:
         """Write a file that the page shows."""
         path = self.directory / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.replace(MACHINE, str(self.directory / "machine")), encoding="utf-8")
+        path.write_text(self._in_test(text), encoding="utf-8")
 
     def close(self) -> None:
         """Wait for what ends by itself, stop what serves; raises where one has failed."""
@@ -129,20 +136,24 @@ class Terminal:
                 process.kill()
         assert not failed, f"failed beside the others: {failed}\n{self._log()}"
 
+    def _in_test(self, text: str) -> str:
+        """The text of a page with the directory and the port of this test."""
+        return text.replace(MACHINE, str(self.directory / "machine")).replace(BROKER_PORT, self._broker_port)
+
     def _start(self, shown: Shown) -> None:
         """Start a command that runs beside the rest; return when it is ready and has printed what the page shows."""
         command = shown.command
         words = shlex.split(command, comments=True)
-        socket = self._ready_socket(words)
+        ready = self._ready_socket(words)
         log = self.directory / f"beside-{len(self._logs) + 1}.log"
         self._logs.append(log)
         with log.open("wb") as output:
             process = self._popen(f"exec {command}", output.fileno())
-        self._beside.append((command, process, socket is not None))
+        self._beside.append((command, process, ready is not None or words[0] in SERVERS))
         end_s = time.monotonic() + START_S
-        while not ((socket is None or socket.exists()) and is_printed(shown, log.read_text(errors="replace"))):
+        while not ((ready is None or ready.exists()) and is_printed(shown, log.read_text(errors="replace"))):
             if process.poll() is not None or time.monotonic() > end_s:
-                assert socket is None or socket.exists(), f"{command} did not start\n{self._log()}"
+                assert ready is None or ready.exists(), f"{command} did not start\n{self._log()}"
                 check_printed(shown, log.read_text(errors="replace"))
                 return
             # until the process ends, or it is time to look again
@@ -199,7 +210,7 @@ class Terminal:
         return output + process.stdout.read().decode()
 
     def _popen(self, command: str, output: int) -> subprocess.Popen[bytes]:
-        paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
+        paths = [str(Path(sys.executable).parent), os.environ["PATH"], "/usr/sbin"]
         variables: dict[str, str] = {}
         if self._stage is not None:
             command = staged(command, self._stage)

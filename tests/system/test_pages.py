@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from tests.support.mosquitto import needs_mosquitto
 from tests.support.pages import RUN, SHOWN, fences, page_names, run_page
 from tests.support.paths import ROOT
 
@@ -17,12 +18,14 @@ TUTORIAL = "docs/tutorials/missing-effect.md"
 MACHINE = re.compile(r"^\$ (compd (simulate|run|demo|page)|make demo)\b", re.MULTILINE)
 PAGES = [name for name in page_names() if name != TUTORIAL]
 WITH_MACHINE = [name for name in PAGES if MACHINE.search((ROOT / name).read_text(encoding="utf-8"))]
+# Pages that start a program which is not of this project.
+NEEDS = {"docs/how-to/read-mqtt.md": needs_mosquitto}
 
 
 @pytest.mark.long
 @pytest.mark.sample
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("name", WITH_MACHINE)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=NEEDS.get(name, ())) for name in WITH_MACHINE])
 def test_everything_on_a_page_with_a_machine_runs(name: str) -> None:
     run_page(name)
 

@@ -23,14 +23,17 @@ from compd.configuration.pushed_lines import PushedLineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
 from compd.lines.echo import explained
+from compd.lines.modbus_tcp import ModbusTcp
 from compd.lines.stream import shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
-from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
+from compd.live.acquisition.peers import Peers
+from compd.live.acquisition.polled_gauge import LONGEST_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory.latest import Latest
+from compd.live.memory.poll_requests import PollRequests
 from compd.live.realtime import sharpen_timers
 
 log = structlog.get_logger()
@@ -93,11 +96,14 @@ class LineThread:
         clock: Clock,
         opener: Opener = open_line,
         trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+        peers: Peers | None = None,
+        poll_requests: PollRequests | None = None,
     ) -> None:
         """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel".
 
         `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: judges the readings of each
-        length channel that is wired, by "gauge.channel".
+        length channel that is wired, by "gauge.channel". `peers`: of the lines beside this one.
+        `poll_requests`: of clients.
         """
         self.name = name
         self.state = "opening"
@@ -118,6 +124,7 @@ class LineThread:
         self._poll_every_s = 0.0 if isinstance(settings, PushedLineSettings) else settings.poll_every_s
         self._clock = clock
         self._opener = opener
+        self._peers = Peers() if peers is None else peers
         self._trigger = settings.round_trigger
         self._line: Any = None  # an OpenLine; of another kind for each driver
         self._order = ReplyOrder([driver for _, driver in gauges], settings.timeout_s)
@@ -125,6 +132,8 @@ class LineThread:
         self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
         self._back_off = BackOff(*settings.back_off_s)
         self._absent = AbsentGauges()
+        self._poll_requests = PollRequests() if poll_requests is None else poll_requests
+        self._requested = {name: self._poll_requests.count(name) for name, _ in gauges}
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
 
@@ -188,6 +197,8 @@ class LineThread:
         self.opened += 1
         self.state, self.detail = "open", ""
         log.info("line is open", line=self.name)
+        if isinstance(self._line, ModbusTcp):
+            self._peers.connected(self.name, self._line.peer)
         self._order.opened(self._clock.monotonic())
         for gauge in self.gauges:
             gauge.resume()
@@ -206,6 +217,7 @@ class LineThread:
         line, self._line = self._line, None
         if line is None:
             return
+        self._peers.closed(self.name)
         try:
             line.close()
         except Exception as error:  # noqa: BLE001  of a lost port; it must not end the line's thread
@@ -215,6 +227,7 @@ class LineThread:
         """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
         self._dropped_before = line.unexpected_bytes
+        self._heed_requests(start_s)
         due = [gauge for gauge in self.gauges if gauge.rests_until_s <= start_s]
         latched_s = self._latch(due, line)
         for gauge in due:
@@ -228,6 +241,15 @@ class LineThread:
         wake_s = max(next_s, min((gauge.rests_until_s for gauge in self.gauges), default=next_s))
         if wake_s > end_s:
             self._clock.wait(self._stop, wake_s - end_s)
+
+    def _heed_requests(self, now_s: float) -> None:
+        """End the rest of every gauge that a client wants to be polled; a short one ends soon by itself."""
+        for gauge in self.gauges:
+            count = self._poll_requests.count(gauge.name)
+            if count != self._requested[gauge.name]:
+                self._requested[gauge.name] = count
+                if gauge.rests_until_s > now_s + LONGEST_REST_S:
+                    gauge.resume()
 
     def _publish_round(self) -> None:
         if self._round_buffer is not None:
@@ -370,13 +392,16 @@ class Acquisition:
         clock: Clock,
         opener: Opener = open_line,
         trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+        poll_requests: PollRequests | None = None,
     ) -> None:
         """`lines`: settings of each line and its gauges as (name, driver), by name of the line.
 
-        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: see `LineThread`.
+        `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`, `poll_requests`: as of
+        `LineThread`.
         """
+        peers = Peers()
         self.lines = {
-            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener, trust)
+            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener, trust, peers, poll_requests)
             for name, (settings, gauges) in lines.items()
         }
 

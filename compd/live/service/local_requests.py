@@ -48,6 +48,33 @@ class AcceptRequest(Request):
         return line({"class": self.wire_name, "gauges": channels})
 
 
+class PollKeys(SentMessage):
+    """Answers POLL: the gauge will be polled within a second, if its line is open. STATUS counts its polls."""
+
+    wire_name = "POLL"
+
+
+class PollRequest(Request):
+    """Has a gauge polled at once that did not answer, and that is asked seldom since because the others waited for it.
+
+    If it does not answer now either, it is asked as seldom as before.
+    """
+
+    wire_name = "POLL"
+    reply = PollKeys
+    asker = Asker.LOCAL
+    refusal = "gauges are polled at once over the Unix socket only"
+    gauge: Annotated[str, Field(min_length=1)] = Field(description="a gauge that is polled, by its name")
+
+    def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
+        try:
+            context.poll(self.gauge)
+        except ValueError as error:
+            raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
+        _log.info("poll requested", gauge=self.gauge, client=client.name)
+        return line({"class": self.wire_name})
+
+
 class ZeroKeys(SentMessage):
     """Answers ZERO when machine zero has been taken."""
 

@@ -42,6 +42,10 @@ def _accept_nothing(gauge: str) -> Sequence[str]:
     return ()
 
 
+def _poll_nothing(gauge: str) -> None:
+    return
+
+
 class RequestContext:
     """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`."""
 
@@ -61,6 +65,7 @@ class RequestContext:
         targets: TargetSettings | None = None,
         access: TcpAccess | None = None,
         clock: Clock | None = None,
+        poll: Callable[[str], None] = _poll_nothing,
     ) -> None:
         """`version`, `machine`: these messages; `status`, `budget`: make theirs; `readings`: makes READINGS messages;
         `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
@@ -69,7 +74,8 @@ class RequestContext:
         user who asks) to adopt a model; both answer later, and raise ProtocolError (busy) while another such request is
         being worked on. `accept` makes the acquisition believe a gauge, "gauge.channel" or "all" again, and returns the
         channels that it did not believe; it raises ValueError, with a text for the client, for a name that is none.
-        `access`: who may use TCP; None: everybody who reaches it.
+        `access`: who may use TCP; None: everybody who reaches it. `poll` has a gauge polled at once; it raises
+        ValueError, with a text for the client, for a name that is none.
         """
         self.version = line(version)
         self.target_keys = target_keys
@@ -82,6 +88,7 @@ class RequestContext:
         self.switch_model = switch_model
         self.models = models
         self.accept = accept
+        self.poll = poll
         self.controller: ClientSession | None = None
         self._targets = targets or TargetSettings()
         self.access = access

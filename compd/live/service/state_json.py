@@ -16,7 +16,7 @@ import numpy as np
 from compd.compensation import WarmStart
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.stale_policy import ComparatorSet
-from compd.model.apply_effects import EffectMemory
+from compd.model.effect_memory import EffectMemory
 from compd.model.motion import Motion
 
 # The tags are part of the recordings' format: they stay as they are when a class is renamed.
@@ -43,6 +43,9 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
     "tip_by_gauge": "tip_by_gauge",
 }
 
+# Of a set of comparators: not written where they are empty.
+_MAY_BE_EMPTY = ("group_times_s", "length_times_s", "drift_mm_per_s")
+
 
 def to_plain(value: Any) -> Any:
     """`value` as lists, dictionaries, numbers and texts.
@@ -63,7 +66,7 @@ def to_plain(value: Any) -> Any:
             if isinstance(value, CycleState) and value.tip_by_gauge is None:
                 names = {name: field for name, field in names.items() if name != "tip_by_gauge"}
             if isinstance(value, ComparatorSet):
-                names = {name: name for name in names if not name.endswith("_times_s") or getattr(value, name)}
+                names = {name: name for name in names if name not in _MAY_BE_EMPTY or getattr(value, name)}
             fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
         case tuple():

@@ -32,20 +32,24 @@ export class Orders {
   // First step: what the order will do.
   async ask(name, subject) {
     this.say("");
-    await this.inform(name, subject);
+    this.impossible = null;
+    this.question = { name, subject };
+    await this.inform(this.question);
   }
 
   // An order that was not possible may be so now: called whenever the daemon has told something new.
   async askAgain() {
-    if (this.impossible) await this.inform(this.impossible.name, this.impossible.subject);
+    if (this.impossible) await this.inform(this.question);
   }
 
-  async inform(name, subject) {
+  // impossible : why the order of the present question cannot be given, null where it can.
+  async inform(question) {
+    const { name, subject } = question;
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
     const consequence = await response.json();
-    const { impossible } = this;
-    if (impossible?.name === name && impossible.subject === subject && impossible.text === consequence.text) return;
-    this.impossible = consequence.possible ? null : { name, subject, text: consequence.text };
+    // an answer that comes after another question was asked, or this one was left, is not shown
+    if (question !== this.question || consequence.text === this.impossible) return;
+    this.impossible = consequence.possible ? null : consequence.text;
     const title = nameOf(name, subject);
     // what is shown is what is given: the file that a name stands for now, not later
     const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, consequence.subject || subject) }, title);
@@ -60,6 +64,7 @@ export class Orders {
   }
 
   leave() {
+    this.question = null;
     this.impossible = null;
     this.consequence.replaceChildren();
   }
@@ -68,6 +73,7 @@ export class Orders {
   async give(name, subject) {
     if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser may look only.");
     this.say("…");
+    this.question = null;
     const answer = await post(`orders/${name}`, { id: this.page.id, subject });
     if (answer.value === "zero_differs") {
       const { command } = await (await fetch("orders/zero?subject=replace")).json();

@@ -43,7 +43,8 @@ class OpcUaNodes(SimulatedPushedLine):
         with socket.socket() as free:
             free.bind((LOOPBACK, 0))
             self._port: int = free.getsockname()[1]
-        self._loop = asyncio.new_event_loop()
+        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
+        self._loop = self._runner.get_loop()
         self._loop_thread = threading.Thread(
             target=self._loop.run_forever, name=f"simulated {name} server", daemon=True
         )
@@ -59,7 +60,7 @@ class OpcUaNodes(SimulatedPushedLine):
         if self._loop_thread.ident is not None:
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._loop_thread.join()
-        self._loop.close()
+        self._runner.close()  # with the tasks that asyncua leaves of sessions whose clients have not closed them
 
     def plug_in(self) -> None:
         if self._loop_thread.ident is None:

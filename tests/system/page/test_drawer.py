@@ -79,6 +79,33 @@ def test_a_name_that_is_not_in_the_list_is_refused_and_an_absolute_path_is_the_d
     until(tab, "document.querySelector('.said').textContent.startsWith('Refused')")
 
 
+def test_an_answer_that_comes_after_another_question_is_not_shown(with_models):
+    """The page asks again whether an order that was not possible is so now, and an answer may come late."""
+    tab = with_models
+    tab.keyboard.press("o")
+    name = tab.locator("input[aria-label^='Model file']")
+    name.fill("../two.model.yaml")
+    tab.locator("#order-shadow").click()
+    until(tab, "document.querySelector('#confirm')?.disabled")
+    late = []
+
+    def hold(route):
+        late.append(route)
+
+    tab.route("**/orders/shadow?subject=*two*", hold)
+    while not late:
+        tab.wait_for_timeout(50.0)
+    name.fill("/etc/hostname")
+    tab.locator("#order-shadow").click()
+    until(tab, "document.querySelector('#confirm')?.disabled === false")
+    with tab.expect_response("**/orders/shadow?subject=*two*"):
+        late[0].continue_()
+    # the page has had its turn once an answer that was asked for later is read
+    tab.evaluate("fetch('orders/shadow?subject=').then((response) => response.json())")
+    assert "none of the model files" not in tab.locator(".consequence").inner_text()
+    assert tab.locator("#confirm").is_enabled()
+
+
 def test_the_command_lines_of_orders_and_recordings_are_copied(with_models, live, tmp_path):
     tab = with_models
     tab.keyboard.press("o")

@@ -35,12 +35,13 @@ def test_the_minute_before_is_there_when_the_page_opens(tab, chromium, live):
 
 
 def test_the_faults_of_a_gauge_are_counted_and_its_accept_button_stays_while_numbers_change(tab, live):
+    tab.locator("#gauge-table button").click()
     live.machine.ask("FAULT", line="frame_u", fault="unplugged")
+    row = "[...document.querySelectorAll('#gauge-table tr')].find((row) => row.textContent.includes('frame_u.u1'))"
     try:
-        recent = "Number(document.querySelector('#gauge-table tr.bad')?.lastChild.textContent)"
+        recent = f"Number({row}?.lastChild.textContent)"
         until(tab, f"{recent} > 0")
-        row = "document.querySelector('#gauge-table tr.bad')"
-        assert tab.evaluate(f"(() => {{ compd.row = {row}; return compd.row !== null; }})()")
+        tab.evaluate(f"compd.row = {row}; null")
         seen = tab.evaluate(recent)
         until(tab, f"{recent} > {seen}")
         assert tab.evaluate("compd.row.isConnected"), "what a person is about to press is not made anew"

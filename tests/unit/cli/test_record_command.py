@@ -31,7 +31,7 @@ NEVER_STALE_S = 1e6
 class DriftingGauges:
     """In the place of the lines: every gauge is good and wanders, new at every look of a thread."""
 
-    def __init__(self, lines, stale_after_s, latest, clock, trust):
+    def __init__(self, lines, stale_after_s, latest, clock, trust, poll_requests):
         self.lines = {}
         self.latest, self.clock = latest, clock
         self.stopping = threading.Event()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.commissioning.blind_spots import BLIND_SPOTS, drift_costs, figures_of
-from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cycle
+from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cycle, python_effect_times
 from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, named_together, reply_warnings
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
@@ -17,6 +17,7 @@ from compd.gauge import Gauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
 from compd.live.acquisition.reading_trust import tolerance_mm
 from tests.support.command import run_in_process
+from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
 
 TRIPOD = (CONFIG / "tripod-cmm.yaml").read_text()
@@ -140,3 +141,23 @@ def test_a_cycle_is_measured_as_the_daemon_runs_it() -> None:
     cycle = measure_cycle(load(CONFIG / "tripod-cmm.yaml"))
     assert 0 < cycle.median_s <= cycle.longest_s
     assert math.isfinite(cycle.longest_s)
+
+
+def test_what_an_effect_in_plain_python_takes_of_a_cycle_is_said(tmp_path: Path) -> None:
+    code = tmp_path / "mine.py"
+    code.write_text(
+        "from dataclasses import replace\n"
+        "import numpy as np\n"
+        "from compd.model.effect import memoryless_basis\n"
+        "from compd.model.library import load_library\n"
+        "MINE = replace(load_library()['link_zero'], id='mine',\n"
+        "    basis=memoryless_basis(lambda rows, _: np.ones((len(rows), rows.links, 1)) * np.eye(rows.links)))\n"
+    )
+    code.chmod(0o644)
+    model = file_with(tmp_path / "model.yaml", f"{code}:MINE", "backlash")
+    configuration = changed(
+        tmp_path, ("directory: /var/lib/compd ", f"model_file: {model}\n  directory: /var/lib/compd ")
+    )
+    times_s = python_effect_times(configuration)
+    assert list(times_s) == ["mine"]
+    assert times_s["mine"] > 0

@@ -19,7 +19,7 @@ from compd_drivers.preset_directory import PresetDirectory
 from tests.support.paths import ROOT
 from tests.support.transcripts import check_simulated_device, replay_transcript
 
-# Three gauges that do not exist, one on each protocol: the preset, and its transcript.
+# Gauges that do not exist, one at least on each protocol: the preset, and its transcript.
 MADE_UP = {
     "dial_100": (
         r"""
@@ -117,6 +117,41 @@ sample: {unit: 1, sensors: [top, bottom]}
 > 01 04 00 01 00 01 60 0A
 < 01 84 02 C2 C1
 ! device_error
+""",
+    ),
+    "gap_7": (
+        r"""
+title: "Gap 7: an eddy current probe on Modbus RTU."
+delivers: One probe, one channel `gap` in mm.
+source: |
+  a manual that does not exist, page 31: register 100 holds the type, 40, register 101 the serial number.
+
+base: modbus
+options:
+  unit: {whole: [1, 247], description: slave address}
+  serial_number: {whole: [0, 65535], description: on the label of the probe}
+gauge:
+  identity: {function: 3, address: 100, equals: [40, "{serial_number}"]}
+  channels:
+    - {name: gap, function: 4, address: 0, type: int32, scale: 0.00001, unit: mm, lowest: -1, highest: 1}
+sample: {unit: 1, serial_number: 10483}
+""",
+        r"""options {unit: 1, serial_number: 10483}
+
+# page 31: the type and the serial number, then 10000 counts of 10 nm
+> 01 03 00 64 00 02 85 D4
+<* 01 03 04 00 28 28 F3 24 7E
+> 01 04 00 00 00 02 71 CB
+<* 01 04 04 00 00 27 10 E1 B8
+= 0.1 mm
+
+# after a fault it is asked again who it is: another probe has no values
+> 01 04 00 00 00 02 71 CB
+< 01 84 04 42 C3
+! device_error
+> 01 03 00 64 00 02 85 D4
+< 01 03 04 00 28 28 F4 65 BC
+! mismatch
 """,
     ),
 }

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import structlog
 
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition.peers import Peers
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, Rig, WatchedLatest, rig
 from tests.unit.drivers.test_simulated import CASES, Case
 
@@ -111,6 +114,28 @@ def test_a_dead_line_does_not_delay_another(tmp_path: Path) -> None:
         assert a.wire.replies <= replies + 1, "the dead line hangs in one poll"
         assert acquisition.status()["a"]["gauges"]["ag"]["polls"] <= polls + 1
         a.wire.fault = "unplugged"  # ends the wait
+
+
+def test_two_lines_to_one_device_are_logged_whatever_its_names_are(tmp_path: Path) -> None:
+    case = CASES["modbus TCP"]
+    with structlog.testing.capture_logs() as logs, build_rig(tmp_path / "a", case) as a:
+        alias = replace(a, settings=a.settings.model_copy(update={"host": "127.1"}))
+        with build_rig(tmp_path / "c", case) as c, acquiring(a, alias, c) as (_, latest):
+            for gauge in ("ag", "bg", "cg"):
+                latest.wait_for(f"{gauge}.{next(iter(case.values))}", OK)
+    (event,) = [entry for entry in logs if entry["event"] == "lines share a device"]
+    assert {event["line"], *event["lines"]} == {"a", "b"}
+    assert event["peer"] == f"127.0.0.1:{a.settings.port}"
+
+
+def test_a_line_that_was_closed_shares_its_device_no_more() -> None:
+    peers = Peers()
+    with structlog.testing.capture_logs() as logs:
+        peers.connected("a", "10.0.0.1:502")
+        peers.closed("a")
+        peers.connected("b", "10.0.0.1:502")
+        peers.connected("b", "10.0.0.1:502")
+    assert logs == []
 
 
 @pytest.mark.parametrize("name", ["heidenhain 38400", "keyence", "modbus RTU", "modbus RTU over TCP", "modbus TCP"])

@@ -63,6 +63,7 @@ def test_answers_of_a_running_daemon(tmp_path):
         assert message["no_zero"]["next_step"]
         client._ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
         sent(client.zero())
+        sent(client.poll("scale_1"))
         assert sent(client.model())["applied"] == {"effects": []}
         assert sent(client.model(str(file), shadow=True))["shadow"]["file"] == str(file)
         assert sent(client.machine())["wiring"][0]["kind"] == "scale"

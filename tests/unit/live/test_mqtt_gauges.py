@@ -267,6 +267,29 @@ def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker,
         assert acquisition.status()["l"]["state"] == "open"
 
 
+def test_what_a_broker_had_kept_is_not_now_when_it_is_back(tmp_path: Path) -> None:
+    keeps = f"allow_anonymous true\npersistence true\npersistence_location {tmp_path}/\n"
+    with (
+        running_broker(tmp_path, keeps) as broker,
+        publisher(broker) as device,
+        listening(broker, device, plain(), stale_after_s=60.0) as (acquisition, latest),
+    ):
+        since = latest.now
+        device.publish("a", "1.5", retain=True)
+        assert latest.wait_for("g.a", OK, since).value == 1.5
+        since = latest.now
+        broker.stop()
+        latest.wait_for("g.a", Quality.LINE_LOST, since)
+        since = latest.now
+        broker.start()
+        assert "nobody knows how old" in latest.wait_for("g.a", Quality.STALE, since).detail
+        assert acquisition.status()["l"]["state"] == "open"
+        with publisher(broker) as again:
+            again.publish("a", "1.6")
+            assert latest.wait_for("g.a", OK, since).value == 1.6
+        assert not any(reading.value == 1.5 for _, reading in latest.history[since:])
+
+
 def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -> None:
     with listening(broker, device, timed()) as (_, latest):
         since = good_then(device, latest)

@@ -15,6 +15,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad, good
 from compd.live.acquisition.acquisition import LineThread
+from compd.live.memory.poll_requests import PollRequests
 from compd.live.service.message_keys.status import LineStatusKeys
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
 
@@ -72,7 +73,17 @@ class ScriptedThread:
         names = [(f"g{i}", driver) for i, driver in enumerate(drivers)]
         self.latest = WatchedLatest([f"{name}.{c.name}" for name, driver in names for c in driver.channels])
         stale_after_s = {name: STALE_AFTER_S for name, _ in names}
-        self.thread = LineThread("line", settings, names, stale_after_s, self.latest, self.clock, opener or self.open)
+        self.poll_requests = PollRequests([name for name, _ in names])
+        self.thread = LineThread(
+            "line",
+            settings,
+            names,
+            stale_after_s,
+            self.latest,
+            self.clock,
+            opener or self.open,
+            poll_requests=self.poll_requests,
+        )
 
     def open(self, settings: Any, clock: Clock) -> Line:
         self.lines.append(Line())
@@ -453,6 +464,20 @@ def test_a_unit_that_makes_the_others_stale_is_asked_seldom(quality: Quality) ->
     assert bus.stale_share(30.0, 600.0) < 0.01
     (event,) = [entry for entry in logs if entry["event"] == "gauge is asked seldom"]
     assert (event["gauge"], event["cost_s"], event["rest_s"]) == ("g2", pytest.approx(1.01), pytest.approx(101.0))
+
+
+def test_a_unit_that_is_asked_seldom_is_asked_at_once_where_a_client_wants_it() -> None:
+    bus = SlowBus(1.0, 90.0, Quality.TIMEOUT)
+    bus.at[10.0] = lambda: bus.dead.add(2)
+    for time_s in (40.0, 60.0):
+        bus.at[time_s] = lambda: bus.scripted.poll_requests.add("g2")
+    bus.at[50.0] = bus.dead.clear
+    bus.scripted.run()
+    asked_s = [time_s for time_s in bus.times_s(2) if time_s > 30.0]
+    assert asked_s[0] == pytest.approx(40.0, abs=0.2)
+    assert asked_s[1] == pytest.approx(60.0, abs=0.2), "it did not answer at 40 s, and rests again"
+    assert asked_s[2] < 60.5
+    assert bus.scripted.latest.wait_for("g2.c0", Quality.OK).ok
 
 
 def test_a_unit_that_misses_once_is_asked_again_within_a_second() -> None:

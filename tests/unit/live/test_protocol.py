@@ -176,6 +176,16 @@ def test_zero_over_tcp_is_refused_and_over_unix_answered_when_done(service):
     assert peer.read() == {"class": "ZERO", "taken_at": "now"}
 
 
+def test_a_poll_is_asked_for_over_the_unix_socket_alone(service):
+    assert service.tcp().ask({"class": "POLL", "gauge": "scale_1"})["code"] == "unix_only"
+    peer = service.unix()
+    assert peer.ask({"class": "POLL", "gauge": "scale_1"}) == {"class": "POLL"}
+    assert service.poll_requests.count("scale_1") == 1
+    unknown = peer.ask({"class": "POLL", "gauge": "scale_9"})
+    assert unknown["code"] == "bad_message"
+    assert unknown["text"] == "no gauge that is polled is called 'scale_9', allowed: scale_1"
+
+
 def test_gauges_are_accepted_over_the_unix_socket_alone(service):
     assert service.tcp().ask({"class": "ACCEPT", "gauge": "all"})["code"] == "unix_only"
     peer = service.unix()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -72,6 +73,19 @@ def test_an_opc_ua_server_with_the_nodes_of_its_gauges() -> None:
         check({"kind": "opc_ua", "endpoint": endpoint}, measured, twin)
     finally:
         twin.stop()
+
+
+def test_a_server_that_stops_under_its_clients_leaves_nothing_that_waits(caplog: pytest.LogCaptureFixture) -> None:
+    measured = gauge("opc_ua", channels=NODES)
+    twin = OpcUaNodes("l", [device("opc_ua", measured.options)])
+    line = {"kind": "opc_ua", "endpoint": twin.start()}
+    with acquiring(line, {"g": measured}) as (_, latest):
+        latest.wait_for("g.a", Quality.OK)
+        twin.stop()
+        latest.wait_for("g.a", Quality.LINE_LOST)
+    del twin
+    gc.collect()
+    assert [record.getMessage() for record in caplog.records if record.name == "asyncio"] == []
 
 
 @needs_mosquitto
