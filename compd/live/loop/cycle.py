@@ -189,7 +189,7 @@ def _compute(
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
-    u_tip_um = with_age(*u_tip, lambda: _age_uncertainty_mm(snapshot, target, settings))
+    u_tip_um = with_age(*u_tip, lambda: _age_uncertainty_mm(snapshot, comparators, target, settings))
     setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
@@ -270,10 +270,18 @@ def _uncertainty_is_due(
     return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
 
 
-def _age_uncertainty_mm(snapshot: Snapshot, target: Target | None, settings: CycleSettings) -> FloatArray:
-    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used."""
+def _age_uncertainty_mm(
+    snapshot: Snapshot, comparators: ComparatorSet, target: Target | None, settings: CycleSettings
+) -> FloatArray:
+    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used.
+
+    A held set is not carried on: since its oldest reading each of its lengths may have moved on.
+    """
     wires, extrapolate = settings.wires, settings.loop.extrapolate
     age_mm = wires.length_age_uncertainty_mm(snapshot, extrapolate)
+    if comparators.time_s < snapshot.time_s and comparators.drift_mm_per_s:
+        held_s = snapshot.time_s - comparators.oldest_s
+        age_mm[len(wires.scale.wires) :] = np.array(comparators.drift_mm_per_s) * held_s
     if target is not None:
         age_mm[: len(wires.scale.wires)] = 0.0
     return age_mm
@@ -303,7 +311,8 @@ def _comparators(
         quantities = applied.by_name(needed)
     if not lost:
         length_times_s = lengths.oldest_s, lengths.newest_s
-        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s)
+        drift_mm_per_s = () if settings.noise is None else wires.comparators.drift_mm_per_s(snapshot)
+        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s, drift_mm_per_s)
         return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
     if settings.loop.on_stale == "degrade":
         groups = (

@@ -19,7 +19,7 @@ from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
-from compd.model.apply_effects import EffectMemory
+from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.uncertainty import GaugeNoise
 

@@ -25,6 +25,15 @@ def extrapolated(reading: Reading, now_s: float) -> float:
     return value + (speed - 0.5 * (braking if speed > 0.0 else -braking) * carried_s) * carried_s
 
 
+def drift_mm_per_s(reading: Reading) -> float:
+    """How fast a length may move that is not read any more: its speed and the uncertainty of that; nan if unknown.
+
+    0 for a reading without motion, as in `age_uncertainty_mm`.
+    """
+    motion = reading.motion
+    return 0.0 if motion is None else abs(motion.speed_mm_per_s) + motion.u_mm_per_s
+
+
 def age_uncertainty_mm(reading: Reading, now_s: float, carried_on: bool) -> float:
     """Standard uncertainty (mm) of a length by the age of its reading; nan where its motion is not known yet.
 

@@ -10,7 +10,7 @@ from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import ShadowResult
 from compd.live.memory.latest import Snapshot
-from compd.model.apply_effects import EffectMemory, carry_over
+from compd.model.effect_memory import EffectMemory, carry_over
 from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
 

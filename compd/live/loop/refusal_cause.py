@@ -10,7 +10,7 @@ from compd.compensation import GaugeValues, WarmStart
 from compd.live.loop.commands import Target
 from compd.live.loop.models import compensate
 from compd.live.loop.wiring import MachineWires
-from compd.model.apply_effects import carry_over
+from compd.model.effect_memory import carry_over
 from compd.model.machine import MachineModel
 
 # A joint runs out and a frame grows by some hundredths of a millimetre: a change beyond this, mm, is no measurement.

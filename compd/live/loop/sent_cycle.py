@@ -22,7 +22,7 @@ from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.states import Mode, State
 from compd.live.memory.latest import Latest, Snapshot, unpack_readings
-from compd.model.apply_effects import EffectMemory
+from compd.model.effect_memory import EffectMemory
 
 _PICKLE_PROTOCOL = 5
 NO_MODELS = ModelNames({}, {})

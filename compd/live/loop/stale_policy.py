@@ -29,6 +29,8 @@ class ComparatorSet(NamedTuple):
     quantities : temperatures, forces and the rest that the effects of the applied model need.
     group_times_s : monotonic times from which joints, frame and quantities are, where they differ; else empty.
     length_times_s : monotonic times of the oldest and of the newest reading of a length; empty where that is not known.
+    drift_mm_per_s : (k + 9), how fast each may move while the set is held; empty where the tip's uncertainty is not
+        computed, in a recording of a release up to 0.2.0, and in sets that were degraded.
     """
 
     change_mm: FloatArray
@@ -37,6 +39,7 @@ class ComparatorSet(NamedTuple):
     quantities: Mapping[str, FloatArray] = _NO_QUANTITIES
     group_times_s: tuple[float, ...] = ()
     length_times_s: tuple[float, ...] = ()
+    drift_mm_per_s: tuple[float, ...] = ()
 
 
 class UsableComparators(NamedTuple):

@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
-from compd.model.apply_effects import EffectMemory
+from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observe import observe

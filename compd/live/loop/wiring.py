@@ -13,7 +13,7 @@ from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
-from compd.live.loop.extrapolation import age_uncertainty_mm, extrapolated
+from compd.live.loop.extrapolation import age_uncertainty_mm, drift_mm_per_s, extrapolated
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost
 from compd.live.memory.latest import Latest, Snapshot
@@ -78,6 +78,10 @@ class Wires:
             bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s) is not None]
             values[bad] = math.nan
         return WiredValues(values, oldest_s, newest_s, lost)
+
+    def drift_mm_per_s(self, snapshot: Snapshot) -> tuple[float, ...]:
+        """(k) how fast each length may move while it is held, mm/s."""
+        return tuple(drift_mm_per_s(snapshot.readings[slot]) for slot, _ in self._slots)
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which readings are not good or too old, and why."""

@@ -33,7 +33,7 @@ NEVER_STALE_S = 1e6
 class StillGauges:
     """In the place of the lines: every gauge is read once and stays good."""
 
-    def __init__(self, lines, stale_after_s, latest, clock, trust):
+    def __init__(self, lines, stale_after_s, latest, clock, trust, poll_requests):
         self.lines = {}
         self.latest = latest
 

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.gauge import Quality, ReadingMotion, good
+from compd.gauge import Quality, ReadingMotion, bad, good
 from compd.live.loop.commands import Target
+from compd.live.loop.states import State
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.message_keys.readings import ReadingsKeys
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
@@ -126,6 +127,56 @@ def test_a_silent_gauge_is_held_where_it_was_carried_to():
     assert np.linalg.norm(tips[-1] - first.values.tip_M_mm) > 1.0
 
 
+def held(live):
+    """The setpoint a second later, when all stand still and joint 4 is lost."""
+    live.now_s += 1.0
+    live.tick += 1
+    for channel, slot in live.latest.index.items():
+        fresh = good(RAW_AT_ZERO_MM if channel in live.change_mm else 20.0, live.now_s)
+        motion = ReadingMotion(0.0, 0.0, 0.0, 1.0) if channel in live.change_mm else None
+        live.latest.put(slot, fresh._replace(motion=motion))
+    live.latest.put(live.latest.index["joints.4"], bad(live.now_s, Quality.TIMEOUT))
+    setpoint = live.run_cycle()
+    assert setpoint.state is State.HOLD
+    return setpoint
+
+
+def test_the_uncertainty_of_the_tip_grows_while_a_set_of_comparators_is_held():
+    live = with_noise(machine(on_stale="hold"), 0.1)
+    moving(live, u=0.0)
+    u_um = [np.linalg.norm(held(live).values.u_tip_um) for _ in range(2)]
+    assert u_um[0] > 10.0, "joint 4 may have moved on by 0.05 mm/s for 1.17 s"
+    assert u_um[1] / u_um[0] == pytest.approx(2.17 / 1.17, rel=0.02)
+
+
+def test_how_uncertain_the_speeds_were_counts_while_a_set_is_held():
+    live_um = []
+    for u_mm_per_s in (0.0, 0.1):
+        live = with_noise(machine(on_stale="hold"), 0.1)
+        moving(live, u=u_mm_per_s)
+        live_um.append(held(live).values.u_tip_um)
+    assert (live_um[1] > 2.0 * live_um[0]).all()
+
+
+def test_a_set_held_before_its_motion_is_known_leaves_no_uncertainty():
+    live = with_noise(machine(on_stale="hold"), 0.1)
+    moving(live, u=float("nan"))
+    assert b"u_tip_um" not in held(live).to_json()
+
+
+def test_a_held_set_replays_bit_for_bit(tmp_path):
+    run = Run(with_noise(machine(on_stale="hold"), 0.1))
+    sent = []
+    with run.recorder(tmp_path / "run") as recorder:
+        for k in range(4):
+            setpoint = held(run.machine) if k else moving(run.machine, u=0.5)
+            line, message, _ = run.recorded(setpoint)
+            recorder.put(line, message)
+            sent.append(setpoint.to_json())
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    assert [cycle.replayed for cycle in replayed] == sent
+
+
 def test_a_run_on_the_move_replays_bit_for_bit_and_says_how_each_length_moves(tmp_path):
     run = Run(with_noise(machine(), 0.1))
     sent = []
@@ -158,6 +209,7 @@ def test_a_recording_of_a_release_without_motion_replays_as_it_was(tmp_path):
         del message["setpoint"]["skew_s"]
         message["carried"].pop("tip_by_gauge", None)
         message["carried"]["last_good"].pop("length_times_s", None)
+        message["carried"]["last_good"].pop("drift_mm_per_s", None)
         older.append(json.dumps(message, separators=(",", ":")))
     path.write_text("\n".join([first, watch, *older]) + "\n")
     replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
