@@ -9,27 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray, IntArray
-from compd.errors import KinematicsError, Problem
-from compd.model.apply_effects import EffectInputs, EffectMemory, apply_effects, final, final_array
-from compd.model.frame import Frame, solve_frame
-from compd.model.kernels.rotation import compose, rotation_matrix, to_inner
-from compd.model.kinematics import (
-    Pose,
-    forward_kinematics,
-    inverse_kinematics,
-    joint_shortening,
-    link_length_mm,
-    scale_for_length_mm,
-)
+from compd.errors import CompdError, KinematicsError, Problem
+from compd.model.effect import Memory
+from compd.model.effect_memory import EffectMemory
+from compd.model.frame import Frame
+from compd.model.kernels.compensation import compensate_rows
+from compd.model.kernels.rotation import compose, rotation_matrix
+from compd.model.kernels.solver_structures import RESULT, WORKSPACE
+from compd.model.kinematics import Pose
 from compd.model.machine import MachineModel
-from compd.model.prediction import PerturbedMachine
-from compd.model.tool import Contact
+from compd.model.motion import pack_motion, unpack_motion
+from compd.model.python_effects import EffectInputs, python_effects
 
 Sources: TypeAlias = Mapping[str, FloatArray]
 
@@ -119,26 +116,9 @@ def compensate_machine_tool(
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     Raises KinematicsError for an attitude asked of a tripod.
     """
-    attitude = _attitude(model, target_rotation_B0_rad, warm)
-    target = model.arrangement.target_contact(model.frame, target_mm)
-    frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
-    nominal = inverse_kinematics(model.mechanism(model.zero.base_joints_M_mm), *target, attitude)
-    compensated = inverse_kinematics(model.mechanism(frame.base_joints_M_mm), *target, attitude)
-    shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
-    nominal_scale_mm = nominal.link_length_mm - model.zero.link_length_mm
-    command = _command(model, nominal, nominal_scale_mm, compensated, shortening_mm)
-    reason = np.maximum(np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, compensated.reason))
-    warm_after = WarmStart(frame.supports_M_mm, compensated.origin_M_mm, compensated.rotation_M_P, warm.effects)
-    solution = _Solution(frame, compensated, target, target, command, reason)
-    if model.live_effects:
-        without_effects = solution
-        for _ in range(_EFFECT_PASSES):
-            setpoint_mm = solution.command.scale_setpoint_mm
-            inputs = _effect_inputs(values, setpoint_mm, frame, compensated, target)
-            machine, memory = apply_effects(model, inputs, warm.effects, commanded=True)
-            solution = _command_with_effects(model, without_effects, machine, attitude)
-        warm_after = warm_after._replace(effects=memory)
-    return _result(model, solution, warm, warm_after)
+    attitude_M_P = _attitude(model, target_rotation_B0_rad, warm)
+    contact = model.arrangement.target_contact(model.frame, target_mm)
+    return _compensate(model, values, warm, Wanted(*contact, attitude_M_P))
 
 
 def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) -> tuple[Compensation, WarmStart]:
@@ -148,117 +128,249 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     takes the tip to be.
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     """
-    zero_mm = model.zero.link_length_mm
-    shortening_mm, joint_reason = joint_shortening(model.joint_weights, values.joint_mm)
-    frame = solve_frame(model.frame, model.zero.distances_mm + values.frame_mm, warm.supports_M_mm)
-    mechanism = model.mechanism(frame.base_joints_M_mm)
-    length_mm = link_length_mm(zero_mm, values.scale_mm, shortening_mm)
-    pose = forward_kinematics(mechanism, length_mm, warm.origin_M_mm, warm.rotation_M_P)
-    nominal = forward_kinematics(
-        model.mechanism(model.zero.base_joints_M_mm), zero_mm + values.scale_mm, warm.origin_M_mm, warm.rotation_M_P
-    )
-    target = model.arrangement.contact_at(nominal)
-    compensated = inverse_kinematics(mechanism, *target, nominal.rotation_M_P)
-    command = _command(model, nominal, values.scale_mm, compensated, shortening_mm)
-    reason = np.maximum(
-        np.maximum(joint_reason, frame.reason), np.maximum(nominal.reason, np.maximum(pose.reason, compensated.reason))
-    )
-    warm_after = WarmStart(frame.supports_M_mm, pose.origin_M_mm, pose.rotation_M_P, warm.effects)
-    solution = _Solution(frame, pose, model.arrangement.contact_at(pose), target, command, reason)
-    if model.live_effects:
-        inputs = _effect_inputs(values, values.scale_mm, frame, pose, solution.contact)
-        machine, memory = apply_effects(model, inputs, warm.effects, commanded=False)
-        solution = _command_with_effects(model, solution, machine, nominal.rotation_M_P)
-        cumulative_mm = link_length_mm(zero_mm, values.scale_mm, machine.joint_shortening_mm)
-        pose = forward_kinematics(
-            final(machine.mechanism, mechanism),
-            final_array(cumulative_mm + machine.reading_to_length_mm, length_mm),
-            warm.origin_M_mm,
-            warm.rotation_M_P,
-        )
-        tool_mm = final_array(machine.tool_mm, model.arrangement.tool_mm)
-        solution = solution._replace(
-            pose=pose,
-            contact=model.arrangement.contact_at(pose, tool_mm),
-            reason=np.maximum(solution.reason, pose.reason),
-        )
-        warm_after = warm_after._replace(effects=memory)
-    return _result(model, solution, warm, warm_after)
+    return _compensate(model, values, warm, None)
 
 
-class _Command(NamedTuple):
-    """What the scales are to show, without compensation and with it; (..., n) mm each."""
+class Wanted(NamedTuple):
+    """What machine-tool mode is to reach: the contact, tip_M_mm (..., 3) and tip_P_mm (..., 3), and the attitude
+    (..., 3, 3) of {P} in {M}: a hexapod's; for a tripod the guess to start from."""
 
-    nominal_scale_mm: FloatArray
-    scale_setpoint_mm: FloatArray
-    correction_mm: FloatArray
-    sources: Sources
+    tip_M_mm: FloatArray
+    tip_P_mm: FloatArray
+    attitude_M_P: FloatArray
 
 
-class _Solution(NamedTuple):
-    """What a cycle computes, before rows that failed are blanked.
+class _Rows(NamedTuple):
+    """The arguments of a compensation as the kernel takes them: N rows, contiguous, of float64.
 
-    pose, contact : of the platform and of the tip: where they are (CMM mode), or will be at the setpoint.
-    target : the contact to which the command leads.
+    lead : the leading axes of the result; () for a single snapshot.
+    wanted : (N, 6) tip in {M} and in {P}.  warm : one row, or N.
     """
 
-    frame: Frame
-    pose: Pose
-    contact: Contact
-    target: Contact
-    command: _Command
-    reason: IntArray
+    lead: tuple[int, ...]
+    scale_mm: FloatArray
+    joint_mm: FloatArray
+    frame_mm: FloatArray
+    quantities: FloatArray
+    time_s: FloatArray
+    wanted_mm: FloatArray
+    attitude_M_P: FloatArray
+    warm: tuple[FloatArray, FloatArray, FloatArray]
 
 
-def _command(
-    model: MachineModel, nominal: Pose, nominal_scale_mm: FloatArray, compensated: Pose, joint_shortening_mm: FloatArray
-) -> _Command:
-    """The command by joints and frame alone. The joints' share is what they take from the links; the frame's is by how
-    much its displacement changes the lengths."""
-    setpoint_mm = scale_for_length_mm(model.zero.link_length_mm, compensated.link_length_mm, joint_shortening_mm)
-    sources = {"joints": joint_shortening_mm, "frame": compensated.link_length_mm - nominal.link_length_mm}
-    return _Command(nominal_scale_mm, setpoint_mm, setpoint_mm - nominal_scale_mm, sources)
+def _rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> _Rows:
+    readings = (values.joint_mm, values.frame_mm) if wanted else (values.scale_mm, values.joint_mm, values.frame_mm)
+    starts = (warm.supports_M_mm, 2), (warm.origin_M_mm, 1), (warm.rotation_M_P, 2)
+    targets = ((wanted.tip_M_mm, 1), (wanted.tip_P_mm, 1), (wanted.attitude_M_P, 2)) if wanted else ()
+    parts = [*((reading, 1) for reading in readings), *starts, *targets]
+    lead: tuple[int, ...] = ()
+    if any(part.ndim > core for part, core in parts):
+        lead = np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
+    count = math.prod(lead)
+    names = model.program.quantities
+    quantities = np.empty((count, len(names)))
+    for place, name in enumerate(names):
+        quantities[:, place] = _quantity(values.quantities, name)
+    wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
+    if wanted:
+        wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
+        wanted_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
+        attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
+    return _Rows(
+        lead,
+        _row_copy(values.scale_mm, lead, 1),
+        _row_copy(values.joint_mm, lead, 1),
+        _row_copy(values.frame_mm, lead, 1),
+        quantities,
+        _row_copy(np.asarray(values.time_s), lead, 0),
+        wanted_mm,
+        attitude_M_P,
+        (
+            _row_copy(warm.supports_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 2),
+            _row_copy(warm.origin_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 1),
+            _row_copy(warm.rotation_M_P, lead if warm.supports_M_mm.ndim > 2 else (), 2),
+        ),
+    )
+
+
+def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
+    """(N, ...), a copy: the kernel takes none that is read-only."""
+    if not lead:
+        return np.array(values, dtype=np.float64, ndmin=core + 1)
+    shape = values.shape[values.ndim - core :]
+    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
+
+
+def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:
+    if name not in quantities:
+        raise CompdError(
+            Problem(
+                where="rows for effects",
+                what="this quantity is not measured",
+                value=name,
+                allowed=", ".join(sorted(quantities)) or "nothing is",
+                next_step="add a gauge or a column of this name",
+            )
+        )
+    return quantities[name]
+
+
+def _compensate(
+    model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None
+) -> tuple[Compensation, WarmStart]:
+    """The compensation in machine-tool mode, or in CMM mode where nothing is wanted."""
+    rows = _rows(model, values, warm, wanted)
+    memory, machine_tool = warm.effects, wanted is not None
+    if not model.program.given:
+        passes = _EFFECT_PASSES if machine_tool else 1
+        solved = _solve(model, rows, memory, machine_tool, passes, None, None)
+        return _result(model, rows, solved, memory, {}, machine_tool)
+    # the kernel computes without effects, Python what its effects add there, and the kernel the whole
+    without = replace(model, effects=())
+    bare = _solve(without, rows, EffectMemory(), machine_tool, 1, None, None)
+    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.scale_mm
+    for _ in range(_EFFECT_PASSES if machine_tool else 1):
+        inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
+        given_mm, memories = python_effects(model, inputs, memory, machine_tool)
+        solved = _solve(model, rows, memory, machine_tool, 1, effects_at_mm, given_mm)
+        effects_at_mm = solved.results["scale_setpoint_mm"][:, : model.links].copy()
+    return _result(model, rows, solved, memory, memories, machine_tool)
+
+
+class _Solved(NamedTuple):
+    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and motion and memory after the last row."""
+
+    results: NDArray[np.void]
+    shares_mm: FloatArray
+    motion: FloatArray
+    memory: FloatArray
+
+
+def _solve(
+    model: MachineModel,
+    rows: _Rows,
+    memory: EffectMemory,
+    machine_tool: bool,
+    passes: int,
+    effects_at_mm: FloatArray | None,
+    given_mm: FloatArray | None,
+) -> _Solved:
+    program, structure = model.program, model.structure
+    count, links = rows.scale_mm.shape
+    solved = _Solved(
+        _room(count, RESULT),
+        np.empty((count, 2 + len(program.effects), links)),
+        pack_motion(memory.motion if model.needs_motion else None, links, rows.joint_mm.shape[1]),
+        program.pack_memories(memory.memories),
+    )
+    compensate_rows(
+        machine_tool,
+        passes,
+        memory.is_empty,
+        memory.motion is not None and memory.commanded != machine_tool,
+        structure,
+        program.machine,
+        program.effects,
+        program.theta,
+        program.numbers,
+        program.code,
+        program.quantity_places,
+        program.targets,
+        rows.scale_mm,
+        rows.joint_mm,
+        rows.frame_mm,
+        rows.quantities,
+        rows.time_s,
+        rows.wanted_mm,
+        rows.attitude_M_P,
+        np.full((count, links), np.nan) if effects_at_mm is None else effects_at_mm,
+        np.zeros((0, 0, program.size)) if given_mm is None else given_mm,
+        *rows.warm,
+        solved.motion,
+        solved.memory,
+        _room(1, WORKSPACE),
+        solved.results,
+        solved.shares_mm,
+    )
+    return solved
+
+
+def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
+    """So many structures, not filled; `np.empty` takes 5 us for nested ones."""
+    return np.ndarray(count, structure, np.empty(count * structure.itemsize, dtype=np.uint8))
 
 
 def _effect_inputs(
-    values: GaugeValues, scale_mm: FloatArray, frame: Frame, pose: Pose, contact: Contact
+    model: MachineModel, rows: _Rows, bare: NDArray[np.void], values: GaugeValues, effects_at_mm: FloatArray
 ) -> EffectInputs:
+    """What Python effects are computed from: the machine without effects."""
+    n, pose = model.links, bare["bare_pose"]
+    count = len(bare)
     return EffectInputs(
-        scale_mm, values.joint_mm, values.frame_mm, values.quantities, values.time_s, frame, pose, contact.tip_M_mm
+        effects_at_mm,
+        rows.joint_mm,
+        rows.frame_mm,
+        {
+            name: np.broadcast_to(quantity, rows.lead or (1,)).reshape(count)
+            for name, quantity in values.quantities.items()
+        },
+        rows.time_s,
+        bare["bare_frame"]["base_joints_M_mm"][:, :n],
+        Pose(
+            pose["origin_M_mm"],
+            pose["rotation_M_P"],
+            pose["link_length_mm"][:, :n],
+            pose["iterations"][:, 0],
+            pose["residual_mm"][:, 0],
+            pose["reason"][:, 0],
+        ),
+        bare["tip_M_mm"],
     )
 
 
-def _command_with_effects(
-    model: MachineModel, solution: _Solution, machine: PerturbedMachine, attitude: FloatArray
-) -> _Solution:
-    """The command that reaches the target on the machine with its effects.
-
-    solution : without effects.  machine : from `apply_effects`, entry k with effects 0 to k. Inverse kinematics solves
-    all of them at once; an effect's share is by how much it changes the setpoint of those before it.
-    """
-    command = solution.command
-    target = model.arrangement.with_tool(solution.target, machine.tool_mm)
-    cumulative = inverse_kinematics(machine.mechanism, *target, attitude)
-    setpoints_mm = scale_for_length_mm(
-        model.zero.link_length_mm, cumulative.link_length_mm - machine.reading_to_length_mm, machine.joint_shortening_mm
+def _result(
+    model: MachineModel,
+    rows: _Rows,
+    solved: _Solved,
+    memory: EffectMemory,
+    memories: Mapping[str, Memory],
+    machine_tool: bool,
+) -> tuple[Compensation, WarmStart]:
+    """The compensation and the next warm start. memories : of the Python effects."""
+    n, lead = model.links, rows.lead
+    results: Any = solved.results.reshape(lead) if lead else solved.results[0]
+    shares_mm = solved.shares_mm.reshape(*lead, *solved.shares_mm.shape[1:]) if lead else solved.shares_mm[0]
+    frame, pose = results["frame"], results["pose"]
+    compensation = Compensation(
+        results["tip_M_mm"],
+        results["tip_B0_mm"],
+        results["tip_P_mm"],
+        pose["rotation_M_P"],
+        Frame(
+            frame["supports_M_mm"],
+            frame["origin_M_mm"],
+            frame["rotation_M_B"],
+            frame["base_joints_M_mm"][..., :n, :],
+            frame["displacement_M_mm"],
+            frame["rotation_M_rad"],
+            frame["iterations"][..., 0],
+            frame["residual_mm"][..., 0],
+            frame["reason"][..., 0],
+        ),
+        pose["link_length_mm"][..., :n],
+        results["target_B_mm"],
+        results["nominal_scale_mm"][..., :n],
+        results["scale_setpoint_mm"][..., :n],
+        results["correction_mm"][..., :n],
+        dict(zip(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm, strict=True)),
+        results["reason"],
     )
-    shares_mm = setpoints_mm - np.concatenate([command.scale_setpoint_mm[None], setpoints_mm[:-1]])
-    ids = [fitted.effect.id for fitted in model.live_effects]
-    setpoint_mm = setpoints_mm[-1]
-    command = _Command(
-        command.nominal_scale_mm,
-        setpoint_mm,
-        setpoint_mm - command.nominal_scale_mm,
-        {**command.sources, **dict(zip(ids, shares_mm, strict=True))},
-    )
-    reasons = np.maximum(machine.reason, cumulative.reason)
-    reason = reasons.max(axis=0) if reasons.ndim > solution.reason.ndim else reasons
-    return solution._replace(
-        frame=final(machine.frame, solution.frame),
-        pose=final(cumulative, solution.pose),
-        command=command,
-        reason=np.maximum(solution.reason, reason),
-    )
+    if model.live_effects:
+        motion = unpack_motion(solved.motion, n, rows.joint_mm.shape[1]) if model.needs_motion else None
+        after = {**model.program.unpack_memories(solved.memory), **memories}
+        memory = EffectMemory(motion, after, machine_tool)
+    warm = WarmStart(results["warm_supports_M_mm"], results["warm_origin_M_mm"], results["warm_rotation_M_P"], memory)
+    return compensation, warm
 
 
 def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> FloatArray:
@@ -278,58 +390,3 @@ def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, war
     if target_rotation_B0_rad is None:
         return model.zero.rotation_M_P
     return np.asarray(compose(model.frame.zero_rotation_M_B, rotation_matrix(target_rotation_B0_rad)))
-
-
-def _result(
-    model: MachineModel, solution: _Solution, warm: WarmStart, warm_after: WarmStart
-) -> tuple[Compensation, WarmStart]:
-    """Everything together; where a row failed, all its numbers are nan and its warm start stays as it was."""
-    frame, pose, contact, target, command, reason = solution
-    result = Compensation(
-        tip_M_mm=contact.tip_M_mm,
-        tip_B0_mm=to_inner(model.frame.zero_rotation_M_B, model.frame.zero_origin_M_mm, contact.tip_M_mm),
-        tip_P_mm=contact.tip_P_mm,
-        rotation_M_P=pose.rotation_M_P,
-        frame=frame,
-        link_length_mm=pose.link_length_mm,
-        target_B_mm=to_inner(frame.rotation_M_B, frame.origin_M_mm, target.tip_M_mm),
-        nominal_scale_mm=command.nominal_scale_mm,
-        scale_setpoint_mm=command.scale_setpoint_mm,
-        correction_mm=command.correction_mm,
-        sources=command.sources,
-        reason=reason,
-    )
-    if not reason.any():
-        return result, warm_after
-    warm_after = WarmStart(
-        _replace_failed(reason, warm.supports_M_mm, warm_after.supports_M_mm, 2),
-        _replace_failed(reason, warm.origin_M_mm, warm_after.origin_M_mm, 1),
-        _replace_failed(reason, warm.rotation_M_P, warm_after.rotation_M_P, 2),
-        warm_after.effects,
-    )
-    return _blank_failed(result), warm_after
-
-
-def _blank_failed(result: Compensation) -> Compensation:
-    """nan for every number in the rows that failed; the frame has a reason of its own."""
-
-    def blank(vector: FloatArray) -> FloatArray:
-        return _replace_failed(result.reason, np.nan, vector, 1)
-
-    return result._replace(
-        tip_M_mm=blank(result.tip_M_mm),
-        tip_B0_mm=blank(result.tip_B0_mm),
-        tip_P_mm=blank(result.tip_P_mm),
-        rotation_M_P=_replace_failed(result.reason, np.nan, result.rotation_M_P, 2),
-        link_length_mm=blank(result.link_length_mm),
-        target_B_mm=blank(result.target_B_mm),
-        nominal_scale_mm=blank(result.nominal_scale_mm),
-        scale_setpoint_mm=blank(result.scale_setpoint_mm),
-        correction_mm=blank(result.correction_mm),
-        sources={name: blank(share) for name, share in result.sources.items()},
-    )
-
-
-def _replace_failed(reason: IntArray, replacement: FloatArray | float, values: FloatArray, core: int) -> FloatArray:
-    """`replacement` in the rows that failed; each row of `values` has `core` axes."""
-    return np.where(np.reshape(reason, np.shape(reason) + (1,) * core) != 0, replacement, values)

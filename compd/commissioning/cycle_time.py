@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from compd.clock import Clock, MonotonicClock
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good
@@ -20,6 +24,7 @@ from compd.live.loop.sent_cycle import CyclePacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.pipeline import build_pipeline
+from compd.model.machine import MachineModel
 
 _CYCLES = 200
 # Half a second in all, also for a loop that is slower; between two cycles the processor does something else.
@@ -28,6 +33,7 @@ _PERIOD_S = 2.5e-3
 LARGEST_SHARE = 0.5
 _RAW_MM = 10.0
 _NOISE_MM = 1e-4
+_QUANTITY = 20.0
 
 
 class CycleTime(NamedTuple):
@@ -71,6 +77,45 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     return CycleTime(timing.cost.quantile_us(0.5) * 1e-6, timing.cost.largest_us * 1e-6)
 
 
+def python_effect_times(configuration: Configuration, clock: Clock | None = None) -> dict[str, float]:
+    """What each effect in plain Python of `state.model_file` takes of a cycle in CMM mode, s, by the effect's id.
+
+    The effects of the library and formulas are compiled; all of them together take some microseconds. Raises CompdError
+    where the model cannot be used.
+    """
+    clock = clock or MonotonicClock()
+    file = configuration.state.model_file
+    if file is None:
+        return {}
+    pipeline = build_pipeline(configuration, configuration.gauge_objects())
+    model = pipeline.loader.load(ModelText.read(Path(file)))
+    without_s = _compensation_time(replace(model.machine, effects=()), model.quantities, clock)
+    return {
+        fitted.effect.id: _compensation_time(replace(model.machine, effects=(fitted,)), model.quantities, clock)
+        - without_s
+        for fitted in model.machine.live_effects
+        if callable(fitted.effect.basis)
+    }
+
+
+def _compensation_time(machine: MachineModel, quantities: Sequence[str], clock: Clock) -> float:
+    """Median time of a compensation at machine zero, s."""
+    values = GaugeValues(
+        np.zeros(machine.links),
+        np.zeros(machine.joint_weights.shape[1]),
+        np.zeros(9),
+        dict.fromkeys(quantities, np.array(_QUANTITY)),
+        0.0,
+    )
+    warm = WarmStart.at_zero(machine)
+    times_s = []
+    for _ in range(_CYCLES):
+        begin_s = clock.monotonic()
+        compensate_cmm(machine, values, warm)
+        times_s.append(clock.monotonic() - begin_s)
+    return float(np.median(times_s))
+
+
 def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Problem]:
     """A rate at which the loop would have no time left."""
     rate_hz = configuration.loop.rate_hz
@@ -89,4 +134,4 @@ def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Probl
 
 
 def _value(readings_mm: Mapping[str, float], channel: str) -> float:
-    return readings_mm.get(channel, 20.0)
+    return readings_mm.get(channel, _QUANTITY)

@@ -25,6 +25,7 @@ from compd.comparison.registration import (
 from compd.errors import CompdError
 from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
 from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
+from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_needs import unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
@@ -175,7 +176,7 @@ class AlignedRecording:
 
     def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
         """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
-        basis, _ = effect.basis(self.rows, shape, None)
+        basis, _ = evaluate_basis(effect, self.rows, shape, None)
         return self.propagated(effect, basis)
 
     def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:

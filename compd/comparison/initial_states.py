@@ -21,6 +21,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.model.effect import ConstantValues, Effect
+from compd.model.effect_basis import evaluate_basis
 from compd.model.observations import Observations
 from compd.units import UM_PER_MM
 
@@ -54,20 +55,20 @@ def _session_columns(
 
     The session begins with the first row in which the effect is known. States that move nothing are left out.
     """
-    basis, _ = effect.basis(rows.select(session), constants, None)
+    basis, _ = evaluate_basis(effect, rows.select(session), constants, None)
     known = np.isfinite(basis).all(axis=(1, 2))
     if not known.any():
         return
     session = session[int(np.argmax(known)) :]
-    _, memory = effect.basis(rows.select(session[:1]), constants, None)
+    _, memory = evaluate_basis(effect, rows.select(session[:1]), constants, None)
     assert memory is not None
     later = replace(rows.select(session), session_start=np.zeros(len(session), dtype=bool))
-    without, _ = effect.basis(later, constants, memory)
+    without, _ = evaluate_basis(effect, later, constants, memory)
     for place in effect.unknown_states:
         for state in range(len(memory[place])):
             greater = [array.copy() for array in memory]
             greater[place][state] += 1.0
-            moved = effect.basis(later, constants, tuple(greater))[0] - without
+            moved = evaluate_basis(effect, later, constants, tuple(greater))[0] - without
             for number in np.flatnonzero((np.nan_to_num(moved) != 0).any(axis=(0, 1))):
                 column = np.zeros((len(rows), moved.shape[1]))
                 column[session] = moved[:, :, number]

@@ -24,8 +24,8 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
-from compd.model.deltas import port_size
 from compd.model.effect import Constant, ConstantValues, Effect
+from compd.model.effect_basis import evaluate_basis, port_size
 from compd.model.formula.columns import column_values
 from compd.units import UM_PER_MM
 
@@ -123,7 +123,7 @@ def _at_places(
     """
     port = effect.ports[0]
     size = port_size(port, aligned.rows)
-    basis, _ = effect.basis(aligned.rows, {**others, constant.name: constant.high}, None)
+    basis, _ = evaluate_basis(effect, aligned.rows, {**others, constant.name: constant.high}, None)
     acts = (np.nan_to_num(basis[:, :size]) != 0).any(axis=(0, 2))
     one_each = np.broadcast_to(np.eye(basis.shape[1], size), (len(rows), basis.shape[1], size))
     derivatives = aligned.propagated(effect, one_each)[:, :, acts]

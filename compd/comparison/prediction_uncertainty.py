@@ -13,6 +13,7 @@ from compd.comparison.noise_floor import repeat_scatter
 from compd.comparison.statistics.last_digit import last_digit_um
 from compd.model.deltas import Deltas, split_by_port, sum_deltas
 from compd.model.effect import FittedEffect
+from compd.model.effect_basis import evaluate_basis
 from compd.model.sensitivity import base_joints_by_distances
 from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, gauge_variance, parameter_variance
 from compd.units import UM_PER_MM
@@ -95,7 +96,7 @@ def monte_carlo(
     assert aligned.model is not None
     rng = np.random.default_rng(seed)
     rows = aligned.rows.select(index)
-    bases = [effect.effect.basis(aligned.rows, effect.constants, None)[0][index] for effect in fitted]
+    bases = [evaluate_basis(effect.effect, aligned.rows, effect.constants, None)[0][index] for effect in fitted]
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in fitted)])
     root = _covariance_root(covariance)
     predicted = np.empty((trials, len(index), len(aligned.labels)))

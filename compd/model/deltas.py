@@ -10,29 +10,13 @@ from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
 from compd.model.effect import Effect, FittedEffect, Memory, Port
+from compd.model.effect_basis import evaluate_basis, port_size
 from compd.model.observations import Observations
 
 # (N, size) per port, in mm (rad for directions).
 Deltas: TypeAlias = dict[Port, FloatArray]
 # By effect id.
 Memories: TypeAlias = Mapping[str, Memory]
-
-
-def port_size(port: Port, rows: Observations) -> int:
-    """How many numbers a port takes on this machine."""
-    n = rows.links
-    return {
-        "scale": n,
-        "joint": int(rows.joint_mm.shape[1]),
-        "frame": 9,
-        "link": n,
-        "base_joint": 3 * n,
-        "platform_joint": 3 * n,
-        "revolute_axis": 3 * len(rows.revolute_axes_P),
-        "plate": 9,
-        "tool": 3,
-        "reference": 6,
-    }[port]
 
 
 def split_by_port(effect: Effect, rows: Observations, values: NDArray[np.float64]) -> Deltas:
@@ -45,7 +29,7 @@ def split_by_port(effect: Effect, rows: Observations, values: NDArray[np.float64
 
 def effect_deltas(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
     """What one effect adds at its ports, basis @ theta: (N, size) each; and its memory after the rows."""
-    basis, memory = fitted.effect.basis(rows, fitted.constants, memory)
+    basis, memory = evaluate_basis(fitted.effect, rows, fitted.constants, memory)
     # summed column by column: a matrix product may round differently for one row than for many
     total = np.zeros(basis.shape[:2])
     for column, value in enumerate(fitted.theta):

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.effect_dispatch import kernel_number
 from compd.model.observations import Observations
 
 Port: TypeAlias = Literal[
@@ -41,6 +42,47 @@ ConstantValues: TypeAlias = Mapping[str, float]
 Memory: TypeAlias = tuple[FloatArray, ...] | None
 # From rows, constants and memory to (N, sum of port sizes, P) and the memory after; see `Effect`.
 Basis: TypeAlias = Callable[[Observations, ConstantValues, Memory], tuple[FloatArray, Memory]]
+
+
+class BasisProgram(NamedTuple):
+    """A compiled basis as data: what `compd.model.kernels.effect_dispatch.set_basis` runs.
+
+    number : of the kernel.  code (L, 2), numbers : of a formula, empty for the library's effects; see
+    `compd.model.kernels.formula`. The nonlinear constants stand before these numbers.
+    states : length of each array of its memory.
+    """
+
+    number: int
+    code: IntArray
+    numbers: FloatArray
+    states: tuple[int, ...]
+
+
+class CompiledBasis(Protocol):
+    """A basis of which the machine code exists: of the library's effects, and of every formula."""
+
+    def program(self, effect: Effect, links: int, sizes: Mapping[Port, int]) -> BasisProgram:
+        """As data, for a machine with so many links. sizes : of all ports, from `port_sizes`."""
+        ...
+
+
+@dataclass(frozen=True)
+class KernelBasis:
+    """The basis of an effect whose equation is a kernel.
+
+    kernel : of `compd.model.kernels.effects`.  states : how many numbers it remembers of each link.
+    """
+
+    kernel: Any
+    states: int = 0
+
+    def program(self, effect: Effect, links: int, sizes: Mapping[Port, int]) -> BasisProgram:
+        """See `CompiledBasis`."""
+        return BasisProgram(kernel_number(self.kernel), _NO_CODE, _NO_NUMBERS, (links,) * self.states)
+
+
+_NO_CODE: IntArray = np.zeros((0, 2), dtype=np.int64)
+_NO_NUMBERS: FloatArray = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -173,9 +215,10 @@ class Effect:
         Ids of effects that look alike.
     separated_by : str
         Measurements that tell them apart.
-    basis : callable
+    basis : callable or CompiledBasis
         From N rows, constants and memory to the array (N, size, P) and the memory after: the ports' sizes one after
-        the other on axis 1, P fitted numbers on axis 2; mm (rad for directions) per unit of each number.
+        the other on axis 1, P fitted numbers on axis 2; mm (rad for directions) per unit of each number. Evaluate
+        either kind by `compd.model.effect_basis.evaluate_basis`.
     constants : tuple of Constant
         What the effect is not linear in.
     remembers : bool
@@ -220,7 +263,7 @@ class Effect:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     separated_by: str
-    basis: Basis
+    basis: Basis | CompiledBasis
     constants: tuple[Constant, ...] = ()
     remembers: bool = False
     unknown_states: tuple[int, ...] = ()
@@ -304,8 +347,3 @@ def memoryless_basis(columns: Callable[[Observations, ConstantValues], FloatArra
         return columns(rows, constants), memory
 
     return basis
-
-
-def columns_per_link(values: FloatArray) -> FloatArray:
-    """Basis (N, n, n) of an effect with one parameter per link, from its values (N, n)."""
-    return np.asarray(values[:, :, None] * np.eye(values.shape[1]))

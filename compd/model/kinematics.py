@@ -9,7 +9,6 @@ tip_M that moves; a tool on the plate (figure 15) has a fixed tip_M, and tip_P i
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from numpy.typing import ArrayLike
@@ -18,9 +17,6 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.closure import closure
 from compd.model.kernels.forward import forward
 from compd.model.kernels.inverse import inverse
-from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, kernel
-from compd.model.kernels.linear import all_finite
-from compd.model.kernels.reason_codes import NOT_FINITE, OK
 
 
 class Mechanism(NamedTuple):
@@ -70,25 +66,6 @@ class Closure(NamedTuple):
     offset_by_displacement: FloatArray
     offset_by_rotation_mm: FloatArray
     reason: IntArray
-
-
-@kernel([MATRIX, VECTOR, VECTOR, INTEGERS], "(n,k),(k)->(n),()")
-def joint_shortening(
-    joint_weights: FloatArray, joint_mm: FloatArray, shortening_mm: FloatArray, reason: IntArray
-) -> None:
-    """gB_i + gS_i of equation (1), (..., n), in mm, and the reason (...): OK or NOT_FINITE.
-
-    joint_weights : (n, k), what comparator k counts for link i: 1 for S and B, 1/2 for Ra and Rb.
-    joint_mm : (..., k), change since machine zero. One that is not finite takes its whole row with it.
-    """
-    reason[0] = OK if all_finite(joint_mm) else NOT_FINITE
-    if reason[0] != OK:
-        shortening_mm[:] = math.nan
-        return
-    for i in range(shortening_mm.shape[0]):
-        shortening_mm[i] = 0.0
-        for k in range(joint_mm.shape[0]):
-            shortening_mm[i] += joint_weights[i, k] * joint_mm[k]
 
 
 def link_length_mm(zero_length_mm: FloatArray, scale_mm: FloatArray, joint_shortening_mm: FloatArray) -> FloatArray:

@@ -7,13 +7,15 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
 from compd.model.effect import FittedEffect
+from compd.model.effect_program import EffectProgram, build_program
 from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_frame
 from compd.model.kernels.rotation import compose, to_inner, to_outer
+from compd.model.kernels.solver_structures import MODEL
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
 from compd.model.observations import MachineConstants, MachineDetails
 from compd.model.solve_status import require
@@ -77,9 +79,41 @@ class MachineModel:
         return tuple(fitted for fitted in self.effects if fitted.effect.live)
 
     @cached_property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the parts of a correction: joints, frame, and each live effect."""
+        return ("joints", "frame", *(fitted.effect.id for fitted in self.live_effects))
+
+    @cached_property
     def needs_motion(self) -> bool:
         """Whether an effect depends on the links' direction of travel or velocity."""
         return any({"direction", "motion"} & set(fitted.effect.needs) for fitted in self.live_effects)
+
+    @cached_property
+    def program(self) -> EffectProgram:
+        """The live effects as the compensation's kernel reads them."""
+        return build_program(
+            self.live_effects, self.constants, self.links, self.joint_weights.shape[1], len(self.revolute_axes_P)
+        )
+
+    @cached_property
+    def structure(self) -> NDArray[np.void]:
+        """(1,) The machine as the compensation's kernel reads it; see `compd.model.kernels.solver_structures.MODEL`."""
+        structure = np.zeros(1, dtype=MODEL)
+        model, n, k = structure[0], self.links, self.joint_weights.shape[1]
+        model["links"], model["joints"], model["axes"] = n, k, len(self.revolute_axes_P)
+        model["tool_on_plate"], model["needs_motion"] = self.arrangement.on_plate, self.needs_motion
+        model["tool_mm"] = self.arrangement.tool_mm
+        for name in ("plate_points_M_mm", "zero_supports_M_mm", "zero_origin_M_mm", "zero_rotation_M_B"):
+            model[name] = getattr(self.frame, name)
+        model["joint_offsets_B_mm"][:n] = self.frame.joint_offsets_B_mm
+        model["support_of_joint"][:n] = self.frame.support_of_joint
+        model["platform_joints_P_mm"][:n] = self.platform_joints_P_mm
+        model["revolute_axes_P"][: len(self.revolute_axes_P)] = self.revolute_axes_P
+        model["joint_weights"][:n, :k] = self.joint_weights
+        model["zero_base_joints_M_mm"][:n] = self.zero.base_joints_M_mm
+        model["zero_link_length_mm"][:n] = self.zero.link_length_mm
+        model["zero_distances_mm"] = self.zero.distances_mm
+        return structure
 
     def with_effect_weight(self, weight: float) -> Self:
         """The same machine with all fitted numbers of its effects times `weight`, 0 to 1: a model that is faded in."""

@@ -5,16 +5,14 @@ The live loop and a recorded run use the same recursion, so that a replay gives 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.travel_direction import Travel, advance
-
-# Time constant of the average velocity: unaveraged, one step of a scale, 10 nm, within a cycle of 1 ms is 10 um/s.
-VELOCITY_WINDOW_S = 0.02
+from compd.model.kernels.motion import track_motions
 
 
 class Motion(NamedTuple):
@@ -23,7 +21,7 @@ class Motion(NamedTuple):
     time_s.  scale_mm (n,), joint_mm (k,): the last readings.
     turning_mm (n,): the farthest reading of each scale in its present direction, from which a reversal is measured.
     direction (n,): +1, -1, 0 until the link has moved.
-    velocity_mm_per_s (n,), joint_velocity_mm_per_s (k,): averaged over VELOCITY_WINDOW_S.
+    velocity_mm_per_s (n,), joint_velocity_mm_per_s (k,): averaged over `compd.model.kernels.motion.VELOCITY_WINDOW_S`.
     """
 
     time_s: float
@@ -65,42 +63,58 @@ def update_motion(before: Motion | None, time_s: float, scale_mm: FloatArray, jo
     """The motion after one more snapshot: scale_mm (n,), joint_mm (k,), all finite.
 
     before : None at the start, where the direction is unknown and the velocity zero.
-    The direction follows the rule of `compd.travel_direction`.
-    Velocity is a first-order average, v += (1 - exp(-dt / VELOCITY_WINDOW_S)) (dx / dt - v).
     """
-    if before is None:
-        still = np.zeros_like(scale_mm)
-        return Motion(time_s, scale_mm, joint_mm, scale_mm, still, still, np.zeros_like(joint_mm))
-    turning_mm, direction = _advance_links(before, scale_mm)
-    elapsed_s = time_s - before.time_s
-    if elapsed_s <= 0.0:
-        return before._replace(turning_mm=turning_mm, direction=direction, scale_mm=scale_mm, joint_mm=joint_mm)
-    share = -np.expm1(-elapsed_s / VELOCITY_WINDOW_S)
-    speed = before.velocity_mm_per_s
-    speed = speed + share * ((scale_mm - before.scale_mm) / elapsed_s - speed)
-    joint_speed = before.joint_velocity_mm_per_s
-    joint_speed = joint_speed + share * ((joint_mm - before.joint_mm) / elapsed_s - joint_speed)
-    return Motion(time_s, scale_mm, joint_mm, turning_mm, direction, speed, joint_speed)
-
-
-def _advance_links(before: Motion, scale_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Turning points and directions (n,) after one more reading of each scale; few links: plain floats are faster."""
-    links = zip(before.turning_mm.tolist(), before.direction.tolist(), scale_mm.tolist(), strict=True)
-    travels = [advance(Travel(turning_mm, direction), here_mm) for turning_mm, direction, here_mm in links]
-    return np.array([travel.turning_mm for travel in travels]), np.array([travel.direction for travel in travels])
+    _, after = track_motion(before, np.array([time_s]), scale_mm[None], joint_mm[None])
+    assert after is not None, "there is a snapshot"
+    return after
 
 
 def track_motion(
     motion: Motion | None, time_s: FloatArray, scale_mm: FloatArray, joint_mm: FloatArray
 ) -> tuple[Movement, Motion | None]:
-    """The movement in each row, and the motion after the last one.
+    """The movement in each row, and the motion after the last one; see `compd.model.kernels.motion.advance_motion`.
 
     motion : before the first row.  time_s (N,), scale_mm (N, n), joint_mm (N, k).
-    A row with a reading that is nan leaves the motion as it was.
     """
-    motions = []
-    for k, time in enumerate(time_s.tolist()):
-        if motion is None or (np.isfinite(scale_mm[k]).all() and np.isfinite(joint_mm[k]).all()):
-            motion = update_motion(motion, time, scale_mm[k], joint_mm[k])
-        motions.append(motion)
-    return Movement.from_motions(motions), motion
+    links, joints = scale_mm.shape[1], joint_mm.shape[1]
+    packed = pack_motion(motion, links, joints)
+    motions = np.empty((len(time_s), len(packed)))
+    track_motions(
+        packed,
+        np.ascontiguousarray(time_s, dtype=np.float64),
+        np.ascontiguousarray(scale_mm),
+        np.ascontiguousarray(joint_mm),
+        motions,
+    )
+    direction = 1 + 2 * links + joints
+    movement = Movement(
+        motions[:, direction : direction + links],
+        motions[:, direction + links : direction + 2 * links],
+        motions[:, direction + 2 * links :],
+    )
+    return movement, unpack_motion(packed, links, joints)
+
+
+def pack_motion(motion: Motion | None, links: int, joints: int) -> FloatArray:
+    """A motion as the row of numbers of `compd.model.kernels.motion`."""
+    if motion is None:
+        return np.full(1 + 4 * links + 2 * joints, np.nan)
+    return np.concatenate([[motion.time_s], *motion[1:]])
+
+
+def unpack_motion(packed: FloatArray, links: int, joints: int) -> Motion | None:
+    """The motion in such a row; None before the first snapshot."""
+    time_s = float(packed[0])
+    if math.isnan(time_s):
+        return None
+    turning = 1 + links + joints
+    velocity = turning + 2 * links
+    return Motion(
+        time_s,
+        packed[1 : 1 + links],
+        packed[1 + links : turning],
+        packed[turning : turning + links],
+        packed[turning + links : velocity],
+        packed[velocity : velocity + links],
+        packed[velocity + links :],
+    )

@@ -14,13 +14,9 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
+from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.model.statics import link_forces
 from compd.model.tool import Arrangement
-
-# ISO 1: lengths are stated at 20 degC.
-REFERENCE_TEMPERATURE_degC = 20.0
-# ISO 2533 standard atmosphere: at this pressure interferometers' tables have their zero.
-REFERENCE_PRESSURE_hPa = 1013.25
 
 # What a machine of known kinematics gives in every recording and live: its pose with all lengths and directions, the
 # scales, which way the links last moved and how fast, and the rows' order in time.

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import BoolArray, FloatArray
 from compd.model.frame import solve_frame
+from compd.model.kernels.joints import joint_shortening
 from compd.model.kernels.rotation import to_outer
-from compd.model.kinematics import Pose, forward_kinematics, joint_shortening, link_length_mm
+from compd.model.kinematics import Pose, forward_kinematics, link_length_mm
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import MachineConstants, Observations

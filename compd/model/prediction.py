@@ -10,8 +10,9 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.deltas import Deltas
 from compd.model.effect import Port
 from compd.model.frame import Frame, solve_frame
+from compd.model.kernels.joints import joint_shortening
 from compd.model.kernels.rotation import compose, rotation_matrix
-from compd.model.kinematics import Mechanism, forward_kinematics, joint_shortening, link_length_mm
+from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
 

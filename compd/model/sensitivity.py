@@ -25,8 +25,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.deltas import port_size, split_by_port
+from compd.model.deltas import split_by_port
 from compd.model.effect import Effect, Port
+from compd.model.effect_basis import port_size
 from compd.model.frame import solve_frame
 from compd.model.kinematics import Mechanism, Pose, closure_at
 from compd.model.machine import MachineModel

@@ -17,6 +17,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.deltas import Deltas, Memories, deltas_by_effect, sum_deltas
 from compd.model.effect import FittedEffect, Port
+from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_needs import needed_quantities
 from compd.model.machine import MachineModel
 from compd.model.observations import Observations
@@ -105,7 +106,7 @@ def _variance_by_effects(
     for fitted in model.effects:
         end = begin + len(fitted.theta)
         if fitted.effect.live:
-            basis, _ = fitted.effect.basis(rows, fitted.constants, memories.get(fitted.effect.id))
+            basis, _ = evaluate_basis(fitted.effect, rows, fitted.constants, memories.get(fitted.effect.id))
             derivatives.append(effect_sensitivity(fitted.effect, rows, basis, by_port).tip)
             live += range(begin, end)
         begin = end

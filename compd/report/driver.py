@@ -13,7 +13,7 @@ from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.covariates import Covariate, covariates
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
-from compd.model.observations import REFERENCE_TEMPERATURE_degC
+from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.report.error_part import ErrorPart
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of

@@ -16,9 +16,10 @@ from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel, machine_constants
 from compd.model.motion import Movement, update_motion
-from compd.model.observations import MachineDetails, Observations, REFERENCE_PRESSURE_hPa
+from compd.model.observations import MachineDetails, Observations
 from compd.model.observe import observe
 from compd.model.prediction import predict
+from compd.model.reference_conditions import REFERENCE_PRESSURE_hPa
 from compd.units import UM_PER_MM
 
 # The workspace that is drawn: as far from machine zero as the shipped machines go comfortably.

@@ -12,7 +12,7 @@ import yaml
 from compd.model.effect import FittedEffect
 from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, READING_PORTS
 from compd.model.formula.declaration import formula_effect
-from compd.model.formula.evaluator import FUNCTIONS, LAG
+from compd.model.formula.functions import FUNCTIONS, LAG
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter
 from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
 from compd.model.library import find_effect

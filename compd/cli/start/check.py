@@ -109,6 +109,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
     from compd.commissioning.line_budget import line_budgets
     from compd.commissioning.line_warnings import budget_warnings
     from compd.commissioning.pushed_periods import period_warnings
+    from compd.commissioning.shared_addresses import shared_address_warnings
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
@@ -116,6 +117,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
     _print_jumps(jumps)
     return [
         *budget_warnings(configuration, budgets),
+        *shared_address_warnings(configuration),
         *period_warnings(configuration),
         *jump_warnings(configuration, jumps),
         *reply_warnings(configuration),
@@ -124,13 +126,15 @@ def print_lines(configuration: Configuration) -> list[Problem]:
 
 def _print_cycle(configuration: Configuration) -> list[Problem]:
     """Print what a cycle takes on this computer; the warning that follows."""
-    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle
+    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle, python_effect_times
 
     cycle = measure_cycle(configuration)
     typer.echo(
         f"A cycle takes {cycle.median_s * 1e3:.2f} ms on this computer, "
         f"and one is due every {1e3 / configuration.loop.rate_hz:.2f} ms."
     )
+    for effect, seconds in python_effect_times(configuration).items():
+        typer.echo(f"Effect {effect} is plain Python and takes {seconds * 1e3:.2f} ms of it.")
     return cycle_warnings(configuration, cycle)
 
 

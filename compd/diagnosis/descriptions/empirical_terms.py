@@ -23,6 +23,7 @@ from compd.diagnosis.descriptions.search_covariates import (
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
 from compd.diagnosis.descriptions.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
 from compd.model.effect import Effect, Port
+from compd.model.effect_basis import evaluate_basis
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
@@ -104,7 +105,7 @@ class EmpiricalTerm:
         aligned, constants = aligned.gaps_filled, self.constant_values(value)
         if self.axes == ("",):
             return aligned.columns(effect, constants) * UM_PER_MM
-        basis, _ = effect.basis(aligned.rows, constants, None)
+        basis, _ = evaluate_basis(effect, aligned.rows, constants, None)
         factors = basis[:, "xyz".index(self.axes[0])] * UM_PER_MM
         along = self._measured_along_axes(aligned)
         return np.asarray((along[:, :, :, None] * factors[:, None, None, :]).reshape(*along.shape[:2], -1))

@@ -17,8 +17,9 @@ from compd.model.effect_needs import needed_quantities
 from compd.model.kinematics import inverse_kinematics
 from compd.model.machine import MachineModel
 from compd.model.motion import Movement
-from compd.model.observations import MachineConstants, Observations, REFERENCE_TEMPERATURE_degC
+from compd.model.observations import MachineConstants, Observations
 from compd.model.observe import observe
+from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.model.solve_status import Reason
 from compd.recording.plan_file import plan_row
 

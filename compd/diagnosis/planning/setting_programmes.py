@@ -16,6 +16,7 @@ from compd.diagnosis.planning.measurement_settings import MOST_COMBINATIONS, Set
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.errors import CompdError, Problem
 from compd.model.effect import Effect
+from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_needs import needed_quantities
 from compd.model.observations import Observations
 from compd.recording.columns import approach_columns, scale_columns
@@ -102,7 +103,9 @@ def _depends_on(effect: Effect, rows: Observations, field: str, k: int) -> bool:
     grid = effect.constant_grid(rows)
     # at one end of its grid an effect may be so quick or so short that it forgets everything between two rows
     for constants in (grid[0], grid[-1]):
-        (here, _), (there, _) = (effect.basis(known, constants, None) for known in (rows, replace(rows, **moved)))
+        (here, _), (there, _) = (
+            evaluate_basis(effect, known, constants, None) for known in (rows, replace(rows, **moved))
+        )
         if not np.array_equal(here, there, equal_nan=True):
             return True
     return False

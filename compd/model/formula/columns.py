@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem
 from compd.model.effect import Port
+from compd.model.formula.program import Columns
+from compd.model.kernels import formula as machine_code
 from compd.model.observations import Observations
 
 PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
@@ -67,6 +69,46 @@ def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
 def link_column(quantity: str) -> str:
     """How a formula names a quantity that each link has: temperature_link_2_degC as temperature_link_degC."""
     return _OF_ONE_LINK.sub("_link_", quantity, count=1)
+
+
+_OF_PLACE: Mapping[str, int] = {
+    "scale_mm": machine_code.SCALE,
+    "link_mm": machine_code.LINK,
+    "direction": machine_code.DIRECTION,
+    "velocity_mm_per_s": machine_code.VELOCITY,
+    "axial_force_N": machine_code.AXIAL_FORCE,
+}
+_READINGS: Mapping[Port, int] = {
+    "scale": machine_code.SCALE,
+    "joint": machine_code.JOINT,
+    "frame": machine_code.FRAME,
+}
+
+
+def column_codes(names: Sequence[str], port: Port, links: int, quantities: Sequence[str]) -> Columns:
+    """What formulas' columns are to a kernel.
+
+    quantities : those that the effect needs, in their order, on a machine with so many links.
+    """
+    codes: dict[str, tuple[int, int]] = {}
+    own: set[str] = set()
+    for name in names:
+        if name == "reading_mm" or name in _OF_PLACE:
+            kind = _READINGS[port] if name == "reading_mm" else _OF_PLACE[name]
+            codes[name] = (kind, quantities.index("force_x_N") if name == "axial_force_N" else 0)
+            own.add(name)
+        elif name == "time_s":
+            codes[name] = (machine_code.TIME, 0)
+        elif name in ANYWHERE:
+            codes[name] = (machine_code.TIP, "xyz".index(name[4]))
+        elif name == "temperature_link" or _PER_LINK_COLUMN.match(name):
+            quantity = "temperature_link_degC" if name == "temperature_link" else name
+            first = quantity.replace("_link_", "_link_1_", 1)
+            codes[name] = (machine_code.QUANTITY_OF_PLACE, quantities.index(first) if links else 0)
+            own.add(name)
+        else:
+            codes[name] = (machine_code.QUANTITY, quantities.index(name))
+    return Columns(codes, frozenset(own))
 
 
 def column_values(rows: Observations, name: str, port: Port) -> FloatArray:

@@ -14,13 +14,14 @@ from compd.model.effect import Constant, Effect, Parameter
 from compd.model.formula.basis import (
     SENSITIVITY_PORTS,
     VECTORS,
-    formula_basis,
+    FormulaBasis,
     lagged_states,
     sensitivity_basis,
     sensitivity_columns,
 )
 from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, column_needs
-from compd.model.formula.evaluator import NUMBERS, Formula
+from compd.model.formula.formula import Formula
+from compd.model.formula.functions import NUMBERS
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
 from compd.model.formula.parser import LARGEST_EXPONENT, parse_together
 from compd.model.formula.periods import find_periods
@@ -70,7 +71,6 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
     if problems:
         raise ConfigurationError(problems)
     linear = [name for name in declaration.parameters if name not in constants]
-    per_link = [name for name in linear if declaration.parameters[name].per == "link"]
     columns = dict.fromkeys(name for formula in parsed for name in formula.columns)
     periods = {name: column for formula in parsed for name, column in find_periods(formula).items()}
     return _effect(
@@ -79,9 +79,7 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
         columns=dict.fromkeys(columns, "as measured or modelled"),
         needs=tuple(dict.fromkeys(needs)),
         linear=linear,
-        basis=formula_basis(
-            dict(zip(texts, parsed, strict=True)), declaration.port, TO_MM[declaration.gives], linear, per_link
-        ),
+        basis=FormulaBasis(dict(zip(texts, parsed, strict=True)), TO_MM[declaration.gives]),
         constants=tuple(_constant(name, declaration.parameters[name], periods.get(name, "")) for name in constants),
         remembers=any(formula.lags for formula in parsed),
         unknown_states=lagged_states(sum(formula.lags for formula in parsed)),

@@ -1,7 +1,7 @@
 """Formulas as people write them, checked: a few arithmetic nodes of Python's syntax tree, nothing else.
 
 Nothing is ever compiled or executed: a formula is text until `parse` has checked every node of its tree against a
-list, and then numbers (`compd.model.formula.evaluator`). An effect must be linear in its fitted parameters; a
+list, and then numbers (`compd.model.formula.formula`). An effect must be linear in its fitted parameters; a
 parameter in which the formula is not linear becomes a nonlinear constant, which is searched.
 """
 
@@ -14,7 +14,8 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 
 from compd.errors import ConfigurationError, Problem
-from compd.model.formula.evaluator import FUNCTIONS, NUMBERS, OPERATORS, Formula, to_float
+from compd.model.formula.formula import Formula
+from compd.model.formula.functions import FUNCTIONS, NUMBERS, OPERATORS, to_float
 
 # A formula that a person reads at a glance; the bounds keep any text from taking time or stack.
 LONGEST = 300

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.formula.evaluator import Formula
+from compd.model.formula.formula import Formula
 
 # Rounding of the numbers in a formula, 2 * 3.141593 for instance, in turns.
 ROUNDING = 1e-6
@@ -49,7 +49,7 @@ def _turns(formula: Formula, argument: ast.expr, constant: str, column: str, val
     scaled = ast.BinOp(ast.Name("factor"), ast.Mult(), argument)
     phase = Formula(formula.text, scaled, ("factor",), formula.constants, (column,), 0)
     columns, constants = {column: value * SHARES[:, None]}, dict.fromkeys(formula.constants, 1.0) | {constant: value}
-    factors, _ = phase.evaluate(columns, constants, np.zeros(len(SHARES)), np.zeros(len(SHARES), dtype=bool), ())
-    phase_rad = np.broadcast_to(factors["factor"], (len(SHARES), 1))[:, 0]
+    factors = phase.evaluate(columns, constants, np.zeros(len(SHARES)), np.zeros(len(SHARES), dtype=bool))
+    phase_rad = factors["factor"][:, 0]
     with np.errstate(invalid="ignore"):
         return np.asarray((phase_rad - phase_rad[0]) / (2 * math.pi))

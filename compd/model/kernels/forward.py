@@ -128,11 +128,8 @@ def _pose_from(
     return NO_CONVERGENCE if residual_mm[0] > RESIDUAL_TOLERANCE_MM else reason
 
 
-@kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
-    "(n,d),(n,d),(k,d),(n),(d),(d,d)->(d),(d,d),(n),(),(),()",
-)
-def forward(
+@helper
+def solve_forward(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
@@ -168,3 +165,9 @@ def forward(
         origin_M[:] = math.nan
         R[:, :] = math.nan
         closed_lengths_mm[:] = math.nan
+
+
+forward = kernel(
+    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(n),(d),(d,d)->(d),(d,d),(n),(),(),()",
+)(solve_forward)

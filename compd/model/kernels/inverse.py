@@ -111,11 +111,8 @@ def _lengths_at(
     return OK
 
 
-@kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
-    "(n,d),(n,d),(k,d),(d),(d),(d,d)->(d),(d,d),(n),(),(),()",
-)
-def inverse(
+@helper
+def solve_inverse(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
@@ -150,3 +147,9 @@ def inverse(
         origin_M[:] = math.nan
         R[:, :] = math.nan
         lengths_mm[:] = math.nan
+
+
+inverse = kernel(
+    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(d),(d),(d,d)->(d),(d,d),(n),(),(),()",
+)(solve_inverse)

@@ -10,8 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
-from numba import float64, guvectorize, int64, njit
+from numba import boolean, float64, guvectorize, int64, njit
 from numba.core import config as numba_config
+
+from compd import travel_direction
 
 Kernel: TypeAlias = Callable[..., Any]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
@@ -25,6 +27,14 @@ SCALAR = float64
 VECTOR = float64[:]
 MATRIX = float64[:, :]
 INTEGERS = int64[:]
+# Of a loop's arguments: contiguous, with the axis of the rows in front where there is one.
+NUMBERS = float64[::1]
+ROWS = float64[:, ::1]
+ROW_MATRICES = float64[:, :, ::1]
+INDICES = int64[::1]
+INDEX_ROWS = int64[:, ::1]
+COUNT = int64
+FLAG = boolean
 
 
 def _cache_directory() -> str:
@@ -33,9 +43,11 @@ def _cache_directory() -> str:
     numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
     limit count as well: no machine runs last version's kernels.
     """
-    here = Path(__file__).parents[1]  # kernels and helpers are anywhere below model/
-    texts = [file.read_bytes() for file in sorted(here.rglob("*.py"))]
-    compiled = [text for text in texts if b"@kernel" in text or b"@helper" in text or b"_LIMIT = " in text]
+    here = Path(__file__).parents[1]  # kernels and helpers are anywhere below model/, but for the rule of a reversal
+    texts = [file.read_bytes() for file in [Path(travel_direction.__file__), *sorted(here.rglob("*.py"))]]
+    compiled = [
+        text for text in texts if b"@helper" in text or b"kernel(" in text or b"@loop" in text or b"_LIMIT = " in text
+    ]
     digest = hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
     user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
     places = [Path(_config.CACHE_DIR)] if _config.CACHE_DIR else [here / "__pycache__", user]
@@ -81,12 +93,29 @@ def helper(function: FunctionT) -> FunctionT:
 def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]], Kernel]:
     """Compile a function of one row into a ufunc; `layout` as for numpy.vectorize, e.g. "(n,d),(d)->(n)".
 
-    Compilation (or loading from the cache) happens here, at import, never inside a running loop.
+    Compilation (or loading from the cache) happens here, at import, never inside a running loop. The function may be a
+    helper, which other kernels use as well.
     """
 
     def compile_(function: Callable[..., None]) -> Kernel:
+        function = getattr(function, "py_func", function)
         with _kept():
             compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=bool(CACHE_DIRECTORY))(function)
         return cast(Kernel, compiled.ufunc)  # the plain NumPy ufunc: numba's wrapper costs 0.4 us a call
+
+    return compile_
+
+
+def loop(arguments: list[Any]) -> Callable[[FunctionT], FunctionT]:
+    """Compile a function that goes through rows in their order: a row needs what the rows before it left behind.
+
+    It takes contiguous arrays of exactly the types in `arguments` and broadcasts nothing. Compilation, or loading from
+    the cache, happens here as in `kernel`.
+    """
+
+    def compile_(function: FunctionT) -> FunctionT:
+        with _kept():
+            compiled = njit([tuple(arguments)], error_model="numpy", cache=bool(CACHE_DIRECTORY))(function)
+        return cast(FunctionT, compiled)
 
     return compile_

@@ -218,28 +218,8 @@ def _compare(
     set_rotation_vector(turned, rotation_M)
 
 
-@kernel(
-    [
-        VECTOR,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        INTEGERS,
-        VECTOR,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-        MATRIX,
-        MATRIX,
-        VECTOR,
-        VECTOR,
-        INTEGERS,
-        VECTOR,
-        INTEGERS,
-    ],
-    "(l),(s,d),(s,d),(n,d),(n),(d),(d,d)->(s,d),(d),(d,d),(n,d),(d),(d),(),(),()",
-)
-def octahedron(
+@helper
+def solve_octahedron(
     lengths_mm: FloatArray,
     plate_points_M: FloatArray,
     guess_supports_M: FloatArray,
@@ -283,3 +263,26 @@ def octahedron(
         x, y, z = joint_offsets_B[i, 0], joint_offsets_B[i, 1], joint_offsets_B[i, 2]
         for j in range(3):
             base_joints_M[i, j] = supports_M[s, j] + (R[j, 0] * x + R[j, 1] * y + R[j, 2] * z)
+
+
+octahedron = kernel(
+    [
+        VECTOR,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        INTEGERS,
+        VECTOR,
+        MATRIX,
+        MATRIX,
+        VECTOR,
+        MATRIX,
+        MATRIX,
+        VECTOR,
+        VECTOR,
+        INTEGERS,
+        VECTOR,
+        INTEGERS,
+    ],
+    "(l),(s,d),(s,d),(n,d),(n),(d),(d,d)->(s,d),(d),(d,d),(n,d),(d),(d),(),(),()",
+)(solve_octahedron)

@@ -109,8 +109,8 @@ def compose(first: FloatArray, second: FloatArray, product: FloatArray) -> None:
             product[i, j] = first[i, 0] * second[0, j] + first[i, 1] * second[1, j] + first[i, 2] * second[2, j]
 
 
-@kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
-def to_outer(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, outer_mm: FloatArray) -> None:
+@helper
+def to_outer_frame(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, outer_mm: FloatArray) -> None:
     """Point in the inner frame -> in the outer one: origin + R point, equation (2).
 
     R (..., 3, 3) and origin (..., 3): the inner frame's axes and origin in the outer one; point (..., 3).
@@ -123,8 +123,11 @@ def to_outer(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, outer_m
         outer_mm[i] = origin_mm[i] + (R[i, 0] * point_mm[0] + R[i, 1] * point_mm[1] + R[i, 2] * point_mm[2])
 
 
-@kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")
-def to_inner(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, inner_mm: FloatArray) -> None:
+to_outer = kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")(to_outer_frame)
+
+
+@helper
+def to_inner_frame(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, inner_mm: FloatArray) -> None:
     """Point in the outer frame -> in the inner one: R^T (point - origin); the inverse of `to_outer`.
 
     nan if the point is not finite.
@@ -135,3 +138,6 @@ def to_inner(R: FloatArray, origin_mm: FloatArray, point_mm: FloatArray, inner_m
     x, y, z = point_mm[0] - origin_mm[0], point_mm[1] - origin_mm[1], point_mm[2] - origin_mm[2]
     for i in range(3):
         inner_mm[i] = R[0, i] * x + R[1, i] * y + R[2, i] * z
+
+
+to_inner = kernel([MATRIX, VECTOR, VECTOR, VECTOR], "(d,d),(d),(d)->(d)")(to_inner_frame)

@@ -2,38 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import Constant, ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
-
-UM = 1e-3  # mm
-
-
-def _position(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.broadcast_to(UM * np.eye(3 * rows.links), (len(rows), 3 * rows.links, 3 * rows.links))
-
-
-def _runout(rows: Observations, constants: ConstantValues) -> FloatArray:
-    """Columns: angle and wave outside, links inside; each moves its own joint along the revolute axis.
-
-    One harmonic will do: over the 10 or 15 degrees that a joint turns, a second and a third one look like the first
-    to within a hundredth, and fitted together they could not be told apart.
-    """
-    n = rows.links
-    angles_rad = rows.joint_angles_rad
-    waves = [
-        wave
-        for angle_rad in (angles_rad[:, :, 0], angles_rad[:, :, 1])
-        for wave in (np.sin(angle_rad), np.cos(angle_rad) - constants["z"])
-    ]
-    basis = np.zeros((len(rows), n, 3, len(waves), n))
-    for column, values in enumerate(waves):
-        for i in range(n):
-            basis[:, i, :, column, i] = UM * values[:, i, None] * rows.revolute_axes_M[:, i]
-    return basis.reshape(len(rows), 3 * n, len(waves) * n)
-
+from compd.model.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import base_joint
 
 EFFECTS = (
     Effect(
@@ -47,7 +17,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um", -100, 100, "machining and assembly", "link_axis"),),
         mistaken_for=("link_zero", "platform_joint_position"),
         separated_by="the whole workspace to its edges; measuring the joints on a coordinate measuring machine",
-        basis=memoryless_basis(_position),
+        basis=KernelBasis(base_joint.position),
     ),
     Effect(
         id="joint_runout",
@@ -68,7 +38,7 @@ EFFECTS = (
         ),
         mistaken_for=("tool_offset",),
         separated_by="points in a ring and along a radius: runout follows the joints' angles, an offset does not",
-        basis=memoryless_basis(_runout),
+        basis=KernelBasis(base_joint.runout),
         constants=(Constant("z", "1", 0, 1, "how the joints' places were found", (1.0, 0.0)),),
     ),
 )

@@ -2,22 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
-
-PPM = 1e-6
-
-
-def _gain(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return -rows.frame_mm[:, :, None]
-
-
-def _rods(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.asarray(PPM * rows.constants.frame_zero_mm * rows.warming_K("frame")[:, None])[:, :, None]
-
+from compd.model.effect import Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import frame
 
 EFFECTS = (
     Effect(
@@ -31,7 +17,7 @@ EFFECTS = (
         parameters=(Parameter("k", "1", -0.05, 0.05, "inductive comparators 0.5-5 % where not adjusted"),),
         mistaken_for=(),
         separated_by="a gauge block of known thickness under a comparator",
-        basis=memoryless_basis(_gain),
+        basis=KernelBasis(frame.gain),
         follows_reading=True,
     ),
     Effect(
@@ -49,6 +35,6 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 12, "Super-Invar 0-0.8 (Oiwa, section 2.2), Invar 1.2, steel 11-12"),),
         mistaken_for=("platform_expansion", "joint_comparator_drift"),
         separated_by="warm the frame while the platform keeps its temperature",
-        basis=memoryless_basis(_rods),
+        basis=KernelBasis(frame.rod_expansion),
     ),
 )

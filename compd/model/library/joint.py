@@ -2,23 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
-
-UM = 1e-3  # mm
-
-
-def _gain(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return -rows.joint_mm[:, :, None]
-
-
-def _drift(rows: Observations, constants: ConstantValues) -> FloatArray:
-    drift_mm = -UM * rows.warming_K("platform")
-    return np.repeat(drift_mm[:, None], rows.joint_mm.shape[1], axis=1)[:, :, None]
-
+from compd.model.effect import Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import joint
 
 EFFECTS = (
     Effect(
@@ -32,7 +17,7 @@ EFFECTS = (
         parameters=(Parameter("k", "1", -0.2, 0.2, "a lever or conditioner set up wrongly: 20 %"),),
         mistaken_for=("joint_runout",),
         separated_by="a gauge block of known thickness under a comparator",
-        basis=memoryless_basis(_gain),
+        basis=KernelBasis(joint.gain),
         follows_reading=True,
     ),
     Effect(
@@ -49,6 +34,6 @@ EFFECTS = (
         parameters=(Parameter("c", "um/K", -0.5, 0.5, "40 mm of steel between ball and plunger: 0.46 um/K"),),
         mistaken_for=("frame_rod_expansion", "platform_expansion"),
         separated_by="warm the platform alone, at places where the links point differently",
-        basis=memoryless_basis(_drift),
+        basis=KernelBasis(joint.drift),
     ),
 )

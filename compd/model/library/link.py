@@ -2,47 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, columns_per_link, memoryless_basis
-from compd.model.memory import lag
-from compd.model.observations import Observations
-
-PPM = 1e-6
-UM = 1e-3  # mm
-SAG_LENGTH_MM = 500.0  # the length at which a link's sag is stated
-
-
-def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.asarray(PPM * rows.link_mm * rows.link_warming_K)[:, :, None]
-
-
-def _lagged(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
-    warming_K, memory = lag(rows.time_s, rows.link_warming_K, rows.session_start, constants["tau"], memory)
-    return np.asarray(PPM * rows.link_mm * warming_K)[:, :, None], memory
-
-
-def _elasticity(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return UM * (rows.axial_force_N - rows.constants.zero_axial_force_N)[:, :, None]
-
-
-def _hertz(force_N: FloatArray) -> FloatArray:
-    return np.asarray(np.sign(force_N) * np.cbrt(force_N * force_N))
-
-
-def _contact(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return UM * (_hertz(rows.axial_force_N) - _hertz(rows.constants.zero_axial_force_N))[:, :, None]
-
-
-def _sag(rows: Observations, constants: ConstantValues) -> FloatArray:
-    leaning = 1 - rows.directions_M[:, :, 2] ** 2
-    return np.asarray(-UM * leaning * (rows.link_mm / SAG_LENGTH_MM) ** constants["n"])[:, :, None]
-
-
-def _zero(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return columns_per_link(np.full_like(rows.link_mm, UM))
-
+from compd.model.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import link
 
 _EXPANSION_RANGE = "Super-Invar rod 0-0.8, steel 11-12.5, aluminium 23"
 
@@ -62,7 +23,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
         mistaken_for=("link_expansion_lag", "link_zero"),
         separated_by="a change of temperature by 3 K, fast enough that a lag would show",
-        basis=memoryless_basis(_expansion),
+        basis=KernelBasis(link.expansion),
     ),
     Effect(
         id="link_expansion_lag",
@@ -81,7 +42,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 23, _EXPANSION_RANGE),),
         mistaken_for=("link_expansion", "reference_drift"),
         separated_by="a step of temperature, watched for three time constants",
-        basis=_lagged,
+        basis=KernelBasis(link.lagged_expansion, states=3),
         constants=(
             Constant(
                 "tau",
@@ -119,7 +80,7 @@ EFFECTS = (
         ),
         mistaken_for=("joint_contact",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
-        basis=memoryless_basis(_elasticity),
+        basis=KernelBasis(link.elasticity),
     ),
     Effect(
         id="joint_contact",
@@ -136,7 +97,7 @@ EFFECTS = (
         parameters=(Parameter("c", "um/N^(2/3)", 0.01, 1, "steel balls of 25 mm 0.05, of 5 mm on flats 0.5"),),
         mistaken_for=("link_elasticity",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
-        basis=memoryless_basis(_contact),
+        basis=KernelBasis(link.contact),
     ),
     Effect(
         id="link_sag",
@@ -155,7 +116,7 @@ EFFECTS = (
         parameters=(Parameter("s", "um", 0, 20, "stiff tube 0, slender spindle 20"),),
         mistaken_for=("scale_gain",),
         separated_by="equally long links at different inclinations",
-        basis=memoryless_basis(_sag),
+        basis=KernelBasis(link.sag),
         constants=(Constant("n", "1", 3, 7, "catenary 3, beam 7", (3.0, 7.0)),),
     ),
     Effect(
@@ -169,6 +130,6 @@ EFFECTS = (
         parameters=(Parameter("z", "um", -50, 50, "adjustment of machine zero", "link"),),
         mistaken_for=("tool_offset",),
         separated_by="the edges of the workspace, where the links point differently than in the middle",
-        basis=memoryless_basis(_zero),
+        basis=KernelBasis(link.zero),
     ),
 )

@@ -2,33 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
-
-PPM = 1e-6
-UM = 1e-3  # mm
-URAD = 1e-6
-
-
-def _position(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.broadcast_to(UM * np.eye(3 * rows.links), (len(rows), 3 * rows.links, 3 * rows.links))
-
-
-def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
-    joints = rows.constants.platform_joints_P_mm.ravel()
-    return np.asarray(PPM * joints * rows.warming_K("platform")[:, None])[:, :, None]
-
-
-def _tilt(rows: Observations, constants: ConstantValues) -> FloatArray:
-    axes = rows.revolute_axes_P
-    basis = np.zeros((len(rows), len(axes), 3, len(axes)))
-    for i, (x, y, _) in enumerate(axes):
-        basis[:, i, :, i] = URAD * np.array([-y, x, 0.0])  # z_P x e_i
-    return basis.reshape(len(rows), 3 * len(axes), len(axes))
-
+from compd.model.effect import Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import platform_joint
 
 EFFECTS = (
     Effect(
@@ -42,7 +17,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um", -100, 100, "machining and assembly", "link_axis"),),
         mistaken_for=("base_joint_position",),
         separated_by="the whole workspace to its edges; measuring the joints on a coordinate measuring machine",
-        basis=memoryless_basis(_position),
+        basis=KernelBasis(platform_joint.position),
     ),
     Effect(
         id="platform_expansion",
@@ -59,7 +34,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 25, "Super-Invar 0.5, cast iron 10, steel 12, aluminium 23-25"),),
         mistaken_for=("frame_rod_expansion",),
         separated_by="warm the platform while the frame keeps its temperature",
-        basis=memoryless_basis(_expansion),
+        basis=KernelBasis(platform_joint.expansion),
     ),
     Effect(
         id="revolute_axis_tilt",
@@ -76,6 +51,6 @@ EFFECTS = (
         parameters=(Parameter("w", "urad", -500, 500, "20 um over 40 mm between the ball shanks", "link"),),
         mistaken_for=("base_joint_position",),
         separated_by="the edges of the workspace, where the platform has yawed",
-        basis=memoryless_basis(_tilt),
+        basis=KernelBasis(platform_joint.axis_tilt),
     ),
 )

@@ -2,51 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import Constant, ConstantValues, Effect, Memory, Parameter, columns_per_link, memoryless_basis
-from compd.model.memory import friction
-from compd.model.observations import Observations
-from compd.travel_direction import REVERSAL_MM
-
-PPM = 1e-6
-UM = 1e-3  # mm
-MS = 1e-3  # s
+from compd.model.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import scale
 
 # Gratings on the market, from interferential (2 um) to magnetic (1 mm and more).
 PERIODS_MM = (0.002, 0.004, 0.008, 0.010, 0.020, 0.040, 0.050, 0.080, 0.100, 0.200, 0.400, 0.500, 1.0, 2.0)
-
-
-def _gain(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return columns_per_link(PPM * rows.scale_mm)
-
-
-def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.asarray(PPM * rows.scale_mm * rows.link_warming_K)[:, :, None]
-
-
-def _cyclic(rows: Observations, constants: ConstantValues) -> FloatArray:
-    phase_rad = 2 * np.pi / constants["p"] * rows.scale_mm
-    waves = (np.sin(phase_rad), np.cos(phase_rad), np.sin(2 * phase_rad), np.cos(2 * phase_rad))
-    return np.concatenate([columns_per_link(UM * wave) for wave in waves], axis=2)
-
-
-def _backlash(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return columns_per_link(-UM / 2 * np.sign(rows.direction))
-
-
-def _hysteresis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[FloatArray, Memory]:
-    strain, memory = friction(
-        rows.scale_mm, rows.direction, rows.session_start, constants["d"], constants["r"], REVERSAL_MM, memory
-    )
-    return -UM * strain[:, :, None], memory
-
-
-def _latency(rows: Observations, constants: ConstantValues) -> FloatArray:
-    velocity_mm_per_s = np.concatenate([rows.velocity_mm_per_s, rows.joint_velocity_mm_per_s], axis=1)
-    return np.asarray(MS * velocity_mm_per_s)[:, :, None]
-
 
 EFFECTS = (
     Effect(
@@ -62,7 +22,7 @@ EFFECTS = (
         ),
         mistaken_for=("link_sag", "scale_expansion"),
         separated_by="long and short links in several attitudes, at two temperatures",
-        basis=memoryless_basis(_gain),
+        basis=KernelBasis(scale.gain),
     ),
     Effect(
         id="scale_expansion",
@@ -79,7 +39,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 23, "Zerodur 0, glass 8, steel 10.5-12, aluminium 23"),),
         mistaken_for=("scale_gain", "link_expansion"),
         separated_by="the same long and short links at two temperatures 3 K apart",
-        basis=memoryless_basis(_expansion),
+        basis=KernelBasis(scale.expansion),
     ),
     Effect(
         id="scale_cyclic",
@@ -102,7 +62,7 @@ EFFECTS = (
         ),
         mistaken_for=(),
         separated_by="twenty steps of a twentieth of a period on one link; what looks like noise repeats",
-        basis=memoryless_basis(_cyclic),
+        basis=KernelBasis(scale.cyclic),
         constants=(
             Constant(
                 "p",
@@ -130,7 +90,7 @@ EFFECTS = (
         parameters=(Parameter("b", "um", 0, 20, "preloaded ball screw 0.1-1, worn or plain screw 20", "link"),),
         mistaken_for=("friction_hysteresis", "gauge_latency"),
         separated_by="approach each point from both sides, by long and by short moves, at two speeds and at rest",
-        basis=memoryless_basis(_backlash),
+        basis=KernelBasis(scale.backlash),
     ),
     Effect(
         id="friction_hysteresis",
@@ -151,7 +111,7 @@ EFFECTS = (
         parameters=(Parameter("h", "um", -5, 5, "rolling guides 0.1-1, plain guides 5; either sign"),),
         mistaken_for=("backlash",),
         separated_by="small reversals in growing steps: backlash jumps at once, friction builds up over d",
-        basis=_hysteresis,
+        basis=KernelBasis(scale.hysteresis, states=2),
         constants=(
             Constant(
                 "d",
@@ -176,6 +136,6 @@ EFFECTS = (
         parameters=(Parameter("tau", "ms", 0, 50, "polling 1-16 ms, averaging in displays up to 50 ms"),),
         mistaken_for=("backlash",),
         separated_by="moving rows at two speeds: latency grows with speed and is nil at rest",
-        basis=memoryless_basis(_latency),
+        basis=KernelBasis(scale.latency),
     ),
 )

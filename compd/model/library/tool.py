@@ -7,33 +7,8 @@ from the arrangement (`compd.model.tool`), so that a parameter has the same mean
 
 from __future__ import annotations
 
-import numpy as np
-
-from compd.arrays import FloatArray
-from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
-
-PPM = 1e-6
-UM = 1e-3  # mm
-
-
-def _expansion(rows: Observations, constants: ConstantValues) -> FloatArray:
-    """Along the tool vector, from the origin of its frame: the platform's, or the plate's."""
-    return np.asarray(PPM * rows.constants.arrangement.tool_mm * rows.warming_K("tool")[:, None])[:, :, None]
-
-
-def _offset(rows: Observations, constants: ConstantValues) -> FloatArray:
-    return np.broadcast_to(UM * np.eye(3), (len(rows), 3, 3))
-
-
-def _bending(rows: Observations, constants: ConstantValues) -> FloatArray:
-    """Along the force that acts on the tool.
-
-    The external force F acts on what the platform carries. A tool on the platform gives way along F, R^T F in {P}. A
-    tool on the plate loads the work with F, is pressed back with -F, and gives way along that in {M}.
-    """
-    return np.asarray(UM * rows.force_on_tool_N[:, :, None])
-
+from compd.model.effect import Effect, KernelBasis, Parameter
+from compd.model.kernels.effects import tool
 
 EFFECTS = (
     Effect(
@@ -51,7 +26,7 @@ EFFECTS = (
         parameters=(Parameter("a", "ppm/K", 0, 25, "carbon fibre 0, tungsten carbide 5, steel 12, aluminium 23-25"),),
         mistaken_for=("plate_bending",),
         separated_by="two tools of different length, or warm the tool alone",
-        basis=memoryless_basis(_expansion),
+        basis=KernelBasis(tool.expansion),
     ),
     Effect(
         id="tool_offset",
@@ -64,7 +39,7 @@ EFFECTS = (
         parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis"),),
         mistaken_for=("link_zero",),
         separated_by="the edges of the workspace, where the platform tilts; a tool of another length",
-        basis=memoryless_basis(_offset),
+        basis=KernelBasis(tool.offset),
     ),
     Effect(
         id="tool_bending",
@@ -80,6 +55,6 @@ EFFECTS = (
         parameters=(Parameter("C", "um/N", 0.01, 1, "end mill of 20 mm 0.01, stylus of 50 mm 1"),),
         mistaken_for=("link_elasticity",),
         separated_by="the same force in several directions at the middle and the edges; a tool of another length",
-        basis=memoryless_basis(_bending),
+        basis=KernelBasis(tool.bending),
     ),
 )

@@ -12,12 +12,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from compd.errors import Problem, StateError
-from compd.model.deltas import port_size
 from compd.model.effect import PORTS
+from compd.model.effect_basis import port_size
 from compd.model.effect_needs import external_ports
 from compd.model.formula.basis import AXES, VECTORS
 from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, column_needs, link_column
-from compd.model.formula.evaluator import FUNCTIONS, LAG, NUMBERS
+from compd.model.formula.functions import FUNCTIONS, LAG, NUMBERS
 from compd.model.formula.keys import FormulaDeclaration
 from compd.model.formula.parser import LONGEST
 from compd.model.observations import Observations

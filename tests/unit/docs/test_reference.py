@@ -22,7 +22,7 @@ from compd.live.service.messages import ErrorCode
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
 from compd.model.effect_needs import NEEDS
 from compd.model.formula.declaration import FormulaDeclaration, FormulaParameter
-from compd.model.formula.evaluator import FUNCTIONS
+from compd.model.formula.functions import FUNCTIONS
 from compd.model.library import BUNDLED
 from compd.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
 from compd.plugins import GAUGES, load, names

@@ -14,6 +14,7 @@ import compd.model.library
 from compd.errors import CompdError, PluginError
 from compd.model.deltas import deltas_by_effect, port_size
 from compd.model.effect import PORTS, Effect, FittedEffect
+from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_needs import can_concern, needed_quantities, unmet_needs
 from compd.model.library import BUNDLED, find_effect, load_library
 from compd.model.motion import update_motion
@@ -118,7 +119,7 @@ def test_every_effect_reads_no_more_than_it_declares() -> None:
         arguments = random_inputs(TRIPOD, 2)
         declared = set(needed_quantities(effect, 3))
         arguments["quantities"] = {k: v for k, v in arguments["quantities"].items() if k in declared}
-        effect.basis(observe_rows(TRIPOD, arguments), constants_of(effect), None)
+        evaluate_basis(effect, observe_rows(TRIPOD, arguments), constants_of(effect), None)
 
 
 def test_a_hexapod_has_no_revolute_axes() -> None:
@@ -144,7 +145,7 @@ def test_of_links_of_an_external_model_the_scales_can_err() -> None:
     usable = {effect.id for effect in BUNDLED if not unmet_needs(effect, rows.available, rows.links)}
     assert usable == {effect.id for effect in BUNDLED if "scale" in effect.ports} | {"link_zero"}
     for effect_id in usable:
-        basis, _ = LIBRARY[effect_id].basis(rows, constants_of(LIBRARY[effect_id]), None)
+        basis, _ = evaluate_basis(LIBRARY[effect_id], rows, constants_of(LIBRARY[effect_id]), None)
         assert np.isfinite(basis).all()
     assert {effect.id for effect in BUNDLED if can_concern(effect, rows.available, rows.links)} == usable
     bare = external_rows(nowhere, {}, links=2, recorded=())
@@ -165,7 +166,7 @@ def test_of_an_external_model_only_the_reference_can_err() -> None:
     assert LIBRARY["plate_bending"] not in usable, "the temperatures of the plate are not measured"
     concerning = {effect.id for effect in BUNDLED if can_concern(effect, rows.available, rows.links)}
     assert concerning == {"reference_drift", "reference_air_index", "reference_registration"}
-    basis, _ = LIBRARY["reference_air_index"].basis(rows, {}, None)
+    basis, _ = evaluate_basis(LIBRARY["reference_air_index"], rows, {}, None)
     np.testing.assert_allclose(basis[0, :3, 0], tip[0] * (-0.93e-6 - 2.7e-6), rtol=1e-12)
 
 
@@ -255,7 +256,7 @@ def as_matrix(values: Floats) -> Floats:
 
 def test_columns_are_named_in_the_order_of_the_basis() -> None:
     names = [column.name for column in LIBRARY["base_joint_position"].columns(3)]
-    basis, _ = LIBRARY["base_joint_position"].basis(row_at_zero(), {}, None)
+    basis, _ = evaluate_basis(LIBRARY["base_joint_position"], row_at_zero(), {}, None)
     assert names[4] == "d_2y"
     assert np.flatnonzero(as_matrix(basis)[:, 4]).tolist() == [4]
     names = [column.name for column in LIBRARY["scale_cyclic"].columns(3)]

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import compd
 from compd.model.effect import Effect
+from compd.model.effect_basis import evaluate_basis
 from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED
@@ -33,7 +34,7 @@ def moved_um(
     time_s = np.arange(count, dtype=float) if time_s is None else time_s
     tip_M_mm = np.broadcast_to(np.asarray(tip_mm, dtype=float), (count, 3))
     rows = external_rows(tip_M_mm, quantities, time_s=time_s)
-    basis, _ = compd.load_effects(library)[id_].basis(rows, constants or {}, None)
+    basis, _ = evaluate_basis(compd.load_effects(library)[id_], rows, constants or {}, None)
     assert not basis[:, 2:].any()
     return np.asarray(basis[:, :2] * 1e3)
 

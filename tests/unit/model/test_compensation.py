@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -251,15 +249,3 @@ def test_a_long_run_of_warm_starts_does_not_drift() -> None:
     for _ in range(10_000):
         _, warm = compensate_cmm(model, values, warm)
     np.testing.assert_allclose(warm.rotation_M_P.T @ warm.rotation_M_P, np.eye(3), atol=1e-15)
-
-
-def test_a_model_with_tool_rows_broadcasts() -> None:
-    """A tool vector that differs from row to row, as an effect at the tool would make it."""
-    model = MACHINES["tripod"]
-    tools = model.zero.contact.tip_P_mm + np.random.default_rng(3).normal(0, 0.01, (ROWS, 3))
-    bent = replace(model, arrangement=replace(model.arrangement, tool_P_mm=tools))
-    values = gauges(model, scale_mm=np.zeros((ROWS, 3)))
-    found, _ = compensate_cmm(bent, values, WarmStart.at_zero(model))
-    straight, _ = compensate_cmm(model, values, WarmStart.at_zero(model))
-    shift = np.einsum("nij,nj->ni", straight.rotation_M_P, tools - model.zero.contact.tip_P_mm)
-    np.testing.assert_allclose(found.tip_M_mm - straight.tip_M_mm, shift, atol=1e-9)

@@ -10,19 +10,18 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from compd.errors import ConfigurationError
-from compd.model.formula.evaluator import Formula
+from compd.model.formula.formula import Formula
 from compd.model.formula.parser import DEEPEST, LONGEST, parse
 from tests.support.formulas import written
 
 
 def value_of(formula: Formula, **at: float) -> float:
     """The factor of the parameter k with the other names at these values."""
-    found, _ = formula.evaluate(
+    found = formula.evaluate(
         {name: np.array([[value]]) for name, value in at.items()},
         {},
         np.zeros(1),
         np.ones(1, bool),
-        (None,) * formula.lags,
     )
     return float(found["k"][0, 0])
 
@@ -83,7 +82,7 @@ def test_parameters_are_linear_or_searched(text: str, linear: list[str], shape: 
 
 def test_each_parameter_gets_its_own_factor() -> None:
     formula = parse("x_mm * k / 4 - (k - b) * 2", ("k", "b"), "test")
-    found, _ = formula.evaluate({"x_mm": np.array([[8.0], [12.0]])}, {}, np.zeros(2), np.ones(2, bool), ())
+    found = formula.evaluate({"x_mm": np.array([[8.0], [12.0]])}, {}, np.zeros(2), np.ones(2, bool))
     np.testing.assert_allclose(found["k"][:, 0], [0.0, 1.0])
     np.testing.assert_allclose(np.broadcast_to(found["b"], (2, 1))[:, 0], 2.0)
 

@@ -11,6 +11,7 @@ import pytest
 from compd.errors import ConfigurationError
 from compd.model.deltas import effect_deltas
 from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import find_effect
@@ -68,7 +69,7 @@ def test_a_formula_serves_every_port_and_moves_the_tip(model: object, more: dict
     theta = np.array([1.0, -2.0, 0.5])
     found, _ = effect_deltas(FittedEffect(effect, theta, shape), rows)
     moved = predict(machine, rows, found).tip_mm - predict(machine, rows, {}).tip_mm
-    basis, _ = effect.basis(rows, shape, None)
+    basis, _ = evaluate_basis(effect, rows, shape, None)
     by = effect_sensitivity(effect, rows, basis, sensitivities(machine, rows, effect.ports))
     np.testing.assert_allclose(by.tip @ theta, moved, atol=1e-3 * np.abs(moved).max())
     if more["port"] == "reference":
@@ -118,7 +119,7 @@ def test_a_parameter_that_one_axis_is_not_linear_in_is_searched_on_all() -> None
     assert [parameter.name for parameter in effect.parameters] == ["a", "b"]
     assert [constant.name for constant in effect.constants] == ["w"]
     rows = row_at_zero(values={"x_mm": 0.5})
-    basis, memory = effect.basis(rows, {"w": 3.0}, None)
+    basis, memory = evaluate_basis(effect, rows, {"w": 3.0}, None)
     np.testing.assert_allclose(basis[0], 1e-3 * np.array([[math.sin(1.5), 0], [0, 0], [3.0, 0.5]]))
     assert len(memory or ()) == 3
     with pytest.raises(ConfigurationError, match="formula of mine, z: a term of the formula holds no parameter"):
@@ -133,7 +134,7 @@ def test_formulas_on_all_axes_of_each_joint_with_one_parameter_per_link() -> Non
     effect = formula_effect(
         {"id": "mine", "port": "base_joint", "formula": {"x": "k * direction", "y": "m"}, "parameters": declared}, "a"
     )
-    basis, _ = effect.basis(row_at_zero(), {}, None)
+    basis, _ = evaluate_basis(effect, row_at_zero(), {}, None)
     expected = np.zeros((9, 4))
     expected[[0, 3, 6], [0, 1, 2]] = 1e-3
     expected[[1, 4, 7], 3] = 1e-3
@@ -152,7 +153,7 @@ def test_a_sensitivity_is_a_parameter_times_recorded_derivatives() -> None:
     of_links = sensitive(port="link")
     assert of_links.needs == ("d_radius_link_{link}_mm",)
     rows = row_at_zero(values={f"d_radius_link_{i}_mm": float(i) for i in (1, 2, 3)})
-    np.testing.assert_allclose(of_links.basis(rows, {}, None)[0][0, :, 0], [1, 2, 3])
+    np.testing.assert_allclose(evaluate_basis(of_links, rows, {}, None)[0][0, :, 0], [1, 2, 3])
 
 
 def sensitive(**more: Any) -> Effect:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compd.errors import ConfigurationError
-from compd.model.formula.evaluator import FUNCTIONS
+from compd.model.formula.functions import FUNCTIONS
 from compd.model.formula.parser import LONGEST, parse
 from tests.support.formulas import written
 
@@ -144,12 +144,11 @@ def nothing_but_arithmetic(text: str) -> None:
         if isinstance(node, ast.Constant):
             assert type(node.value) in (int, float)
     assert not any(name.startswith(("reference_", "model_")) for name in formula.columns)
-    found, _ = formula.evaluate(
+    found = formula.evaluate(
         {name: np.array([[0.5], [-2.0]]) for name in formula.columns},
         dict.fromkeys(formula.constants, 3.0),
         np.array([0.0, 10.0]),
         np.array([True, False]),
-        (None,) * formula.lags,
     )
     assert set(found) == set(formula.linear)
     assert all(value.dtype == np.float64 for value in found.values())

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.model.deltas import deltas_by_effect, effect_deltas, port_size, sum_deltas
+from compd.model.deltas import deltas_by_effect, effect_deltas, sum_deltas
 from compd.model.effect import PORTS, FittedEffect, Port
+from compd.model.effect_basis import evaluate_basis, port_size
 from compd.model.kernels.rotation import compose, rotation_vector
 from compd.model.kinematics import inverse_kinematics, scale_for_length_mm
 from compd.model.machine import MachineModel
@@ -79,7 +80,7 @@ def test_an_effects_columns_are_what_its_numbers_do(id_: str) -> None:
     """G theta is the prediction's change for a small theta, whatever the ports."""
     effect = LIBRARY[id_]
     rows = observe_rows(TRIPOD, random_inputs(TRIPOD, 5))
-    basis, _ = effect.basis(rows, constants_of(effect), None)
+    basis, _ = evaluate_basis(effect, rows, constants_of(effect), None)
     theta = 1e-3 * np.array([sum(one.parameter.theta_range) / 2 or one.parameter.high for one in effect.columns(3)])
     found, _ = effect_deltas(FittedEffect(effect, theta, constants_of(effect)), rows)
     moved = predict(TRIPOD, rows, found).tip_mm - predict(TRIPOD, rows, {}).tip_mm
@@ -180,7 +181,10 @@ def test_the_hidden_effects_come_out_with_their_numbers(name: str, part: str) ->
     answer = json.loads((folder / "answer.json").read_text())["effects"]
     rows, residual_um = recorded(folder / f"{part}.csv")
     by = sensitivities(TRIPOD, rows, list(PORTS))
-    blocks = [effect_sensitivity(LIBRARY[id_], rows, LIBRARY[id_].basis(rows, {}, None)[0], by).tip for id_ in answer]
+    blocks = [
+        effect_sensitivity(LIBRARY[id_], rows, evaluate_basis(LIBRARY[id_], rows, {}, None)[0], by).tip
+        for id_ in answer
+    ]
     G = 1e3 * np.concatenate(blocks, axis=2).reshape(residual_um.size, -1)
     theta, _, rank, _ = np.linalg.lstsq(G, residual_um.ravel(), rcond=None)
     left_um = residual_um.ravel() - G @ theta

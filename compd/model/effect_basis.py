@@ -1,0 +1,130 @@
+"""An effect's basis in N rows: what it adds at its ports per unit of each fitted number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compd.arrays import FloatArray
+from compd.errors import CompdError, Problem
+from compd.model.effect import BasisProgram, ConstantValues, Effect, Memory, Port
+from compd.model.effect_needs import needed_quantities
+from compd.model.kernels.effect_row import MACHINE, MOST_LINKS, ROW
+from compd.model.kernels.effect_rows import basis_of_rows
+from compd.model.observations import MachineConstants, Observations
+
+# Rows whose structures exist at the same time: of 4000, they take 8 MB.
+_ROWS_AT_ONCE = 4000
+
+
+def port_sizes(links: int, joints: int, axes: int) -> dict[Port, int]:
+    """How many numbers each port takes on a machine with so many links, joint comparators and revolute axes."""
+    return {
+        "scale": links,
+        "joint": joints,
+        "frame": 9,
+        "link": links,
+        "base_joint": 3 * links,
+        "platform_joint": 3 * links,
+        "revolute_axis": 3 * axes,
+        "plate": 9,
+        "tool": 3,
+        "reference": 6,
+    }
+
+
+def port_size(port: Port, rows: Observations) -> int:
+    """How many numbers a port takes on the machine of these rows."""
+    return port_sizes(rows.links, rows.joint_mm.shape[1], len(rows.revolute_axes_P))[port]
+
+
+def evaluate_basis(
+    effect: Effect, rows: Observations, constants: ConstantValues, memory: Memory
+) -> tuple[FloatArray, Memory]:
+    """The basis (N, sum of port sizes, P), mm (rad for directions) per unit, and the memory after the rows.
+
+    memory : None at the start.  Raises CompdError where a quantity that the effect needs is not measured.
+    """
+    if callable(effect.basis):
+        return effect.basis(rows, constants, memory)
+    sizes = port_sizes(rows.links, rows.joint_mm.shape[1], len(rows.revolute_axes_P))
+    program = effect.basis.program(effect, rows.links, sizes)
+    basis = np.zeros((len(rows), sum(sizes[port] for port in effect.ports), len(effect.columns(rows.links))))
+    remembered = pack_memory(program.states, memory)
+    numbers = program_numbers(effect, program, constants)
+    machine = machine_structure(rows.constants)
+    quantities = np.zeros((len(rows), len(names := needed_quantities(effect, rows.links))))
+    for place, name in enumerate(names):
+        quantities[:, place] = rows.quantity(name)
+    for begin in range(0, len(rows), _ROWS_AT_ONCE):
+        chunk = slice(begin, begin + _ROWS_AT_ONCE)
+        basis_of_rows(
+            program.number,
+            row_structures(rows, chunk),
+            machine,
+            quantities[chunk],
+            program.code,
+            numbers,
+            remembered,
+            basis[chunk],
+        )
+    return basis, unpack_memory(program.states, remembered)
+
+
+def program_numbers(effect: Effect, program: BasisProgram, constants: ConstantValues) -> FloatArray:
+    """The nonlinear constants in the order of the effect's entry, then the program's own numbers."""
+    return np.concatenate([[constants[constant.name] for constant in effect.constants], program.numbers])
+
+
+def pack_memory(states: Sequence[int], memory: Memory) -> FloatArray:
+    """The arrays of a memory behind one another; nan at the start."""
+    if memory is None:
+        return np.full(sum(states), np.nan)
+    return np.concatenate(memory)
+
+
+def unpack_memory(states: Sequence[int], packed: FloatArray) -> Memory:
+    """The arrays of a memory; None for an effect that remembers nothing."""
+    if not states:
+        return None
+    return tuple(np.split(packed, np.cumsum(states)[:-1]))
+
+
+def row_structures(rows: Observations, chunk: slice) -> NDArray[np.void]:
+    """These rows as kernels read them. Raises CompdError for a machine with more links than there is room for."""
+    if rows.links > MOST_LINKS:
+        raise CompdError(
+            Problem(
+                where="rows for effects",
+                what="has too many links",
+                value=str(rows.links),
+                allowed=f"{MOST_LINKS} at most",
+                next_step="record the tip instead of the links' lengths",
+            )
+        )
+    structures = np.zeros(len(rows.time_s[chunk]), dtype=ROW)
+    structures["links"] = rows.links
+    for name in (ROW.names or ())[1:]:
+        values = getattr(rows, name)[chunk]
+        if ROW[name].shape and values.shape[1:] != ROW[name].shape:
+            structures[name][:, : values.shape[1]] = values
+        else:
+            structures[name] = values
+    return structures
+
+
+def machine_structure(constants: MachineConstants) -> NDArray[np.void]:
+    """What all rows of a machine have in common, (1,), as kernels read it."""
+    structure = np.zeros(1, dtype=MACHINE)
+    machine = structure[0]
+    machine["links"], machine["axes"] = len(constants.platform_joints_P_mm), len(constants.revolute_axes_P)
+    machine["tool_mm"], machine["tool_on_plate"] = constants.arrangement.tool_mm, constants.arrangement.on_plate
+    for name in ("weight_N", "weight_at_P_mm", "frame_zero_mm", "plate_points_M_mm", "plate_thickness_mm"):
+        machine[name] = getattr(constants, name)
+    machine["instrument_M_mm"] = constants.instrument_M_mm
+    for name in ("platform_joints_P_mm", "revolute_axes_P", "zero_directions_M", "zero_axes_M", "zero_axial_force_N"):
+        values = getattr(constants, name)
+        machine[name][: len(values)] = values
+    return structure

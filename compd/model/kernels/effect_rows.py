@@ -1,0 +1,31 @@
+"""An effect's basis in N rows, each of which may need what the rows before it left behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.effect_dispatch import set_basis
+from compd.model.kernels.effect_row import EFFECT_MACHINE, EFFECT_ROWS
+from compd.model.kernels.jit import COUNT, INDEX_ROWS, NUMBERS, ROW_MATRICES, ROWS, loop
+
+
+@loop([COUNT, EFFECT_ROWS, EFFECT_MACHINE, ROWS, INDEX_ROWS, NUMBERS, NUMBERS, ROW_MATRICES])
+def basis_of_rows(
+    number: int,
+    rows: Any,
+    machine: Any,
+    quantities: FloatArray,
+    code: IntArray,
+    numbers: FloatArray,
+    memory: FloatArray,
+    basis: FloatArray,
+) -> None:
+    """Fill basis (N, size, P), zero on entry; `memory` is that before the first row, and after the last.
+
+    number, code, numbers : of the effect, see `compd.model.effect.BasisProgram`.
+    rows (N,), machine (1,) : structures of `compd.model.kernels.effect_row`.
+    quantities (N, q) : those that the effect needs, in the order of `compd.model.effect_needs.needed_quantities`.
+    """
+    for k in range(rows.shape[0]):
+        set_basis(number, rows[k], machine[0], quantities[k], code, numbers, memory, basis[k])

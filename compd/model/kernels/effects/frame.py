@@ -1,0 +1,36 @@
+"""Kernels of the effects at the port `frame`; see `compd.model.library.frame`."""
+
+from __future__ import annotations
+
+from compd.arrays import FloatArray
+from compd.model.kernels.effect_row import EffectMachine, EffectRow
+from compd.model.kernels.jit import helper
+from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
+
+PPM = 1e-6
+
+
+@helper
+def gain(
+    row: EffectRow,
+    machine: EffectMachine,
+    quantities: FloatArray,
+    constants: FloatArray,
+    memory: FloatArray,
+    basis: FloatArray,
+) -> None:
+    for k in range(9):
+        basis[k, 0] = -row.frame_mm[k]
+
+
+@helper
+def rod_expansion(
+    row: EffectRow,
+    machine: EffectMachine,
+    quantities: FloatArray,
+    constants: FloatArray,
+    memory: FloatArray,
+    basis: FloatArray,
+) -> None:
+    for k in range(9):
+        basis[k, 0] = PPM * machine.frame_zero_mm[k] * (quantities[0] - REFERENCE_TEMPERATURE_degC)

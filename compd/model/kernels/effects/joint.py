@@ -1,0 +1,36 @@
+"""Kernels of the effects at the port `joint`; see `compd.model.library.joint`."""
+
+from __future__ import annotations
+
+from compd.arrays import FloatArray
+from compd.model.kernels.effect_row import EffectMachine, EffectRow
+from compd.model.kernels.jit import helper
+from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
+
+UM = 1e-3  # mm
+
+
+@helper
+def gain(
+    row: EffectRow,
+    machine: EffectMachine,
+    quantities: FloatArray,
+    constants: FloatArray,
+    memory: FloatArray,
+    basis: FloatArray,
+) -> None:
+    for k in range(basis.shape[0]):
+        basis[k, 0] = -row.joint_mm[k]
+
+
+@helper
+def drift(
+    row: EffectRow,
+    machine: EffectMachine,
+    quantities: FloatArray,
+    constants: FloatArray,
+    memory: FloatArray,
+    basis: FloatArray,
+) -> None:
+    for k in range(basis.shape[0]):
+        basis[k, 0] = -UM * (quantities[0] - REFERENCE_TEMPERATURE_degC)

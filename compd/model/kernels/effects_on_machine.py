@@ -1,0 +1,198 @@
+"""What effects add at the ports of a machine, and the command that reaches the target there all the same.
+
+What effects add stands in one row of numbers, port by port in the order of `_add_to_machine`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.effect_dispatch import set_basis
+from compd.model.kernels.jit import helper
+from compd.model.kernels.joints import shorten_by_joints
+from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
+from compd.model.kernels.reason_codes import OK
+from compd.model.kernels.rotation import to_outer_frame
+from compd.model.kernels.solver_structures import FRAME, LENGTHS
+
+
+@helper
+def set_row(
+    model: Any,
+    base_joints_M_mm: FloatArray,
+    pose: Any,
+    tip_M_mm: FloatArray,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    time_s: float,
+    starts: bool,
+    motion: FloatArray,
+    row: Any,
+) -> None:
+    """The instant from which effects are computed, at the pose without effects."""
+    n, k = model.links, joint_mm.shape[0]
+    row.links = n
+    row.time_s = time_s
+    row.session_start = 1 if starts else 0
+    joint_M_mm = np.empty(3)
+    for i in range(n):
+        row.scale_mm[i] = scale_mm[i]
+        row.link_mm[i] = pose.link_length_mm[i]
+        to_outer_frame(pose.rotation_M_P, pose.origin_M_mm, model.platform_joints_P_mm[i], joint_M_mm)
+        for j in range(3):
+            row.base_joints_M_mm[i, j] = base_joints_M_mm[i, j]
+            row.directions_M[i, j] = (joint_M_mm[j] - base_joints_M_mm[i, j]) / pose.link_length_mm[i]
+    for i in range(k):
+        row.joint_mm[i] = joint_mm[i]
+    for i in range(9):
+        row.frame_mm[i] = frame_mm[i]
+    for i in range(3):
+        row.origin_M_mm[i] = pose.origin_M_mm[i]
+        row.tip_M_mm[i] = tip_M_mm[i]
+        for j in range(3):
+            row.rotation_M_P[i, j] = pose.rotation_M_P[i, j]
+    direction = 1 + 2 * n + k
+    for i in range(n):
+        row.direction[i] = motion[direction + i] if model.needs_motion else 0.0
+        row.velocity_mm_per_s[i] = motion[direction + n + i] if model.needs_motion else math.nan
+    for i in range(k):
+        row.joint_velocity_mm_per_s[i] = motion[direction + 2 * n + i] if model.needs_motion else math.nan
+
+
+@helper
+def add_effect(
+    effect: Any,
+    row: Any,
+    machine: Any,
+    quantities: FloatArray,
+    quantity_places: IntArray,
+    code: IntArray,
+    numbers: FloatArray,
+    theta: FloatArray,
+    targets: IntArray,
+    memory: FloatArray,
+    added: FloatArray,
+) -> None:
+    """Add basis @ theta of one effect to the row of numbers `added`."""
+    needed = np.empty(effect.quantities_end - effect.quantities_begin)
+    for i in range(needed.shape[0]):
+        needed[i] = quantities[quantity_places[effect.quantities_begin + i]]
+    parameters = effect.theta_end - effect.theta_begin
+    basis = np.zeros((effect.size, parameters))
+    set_basis(
+        effect.number,
+        row,
+        machine,
+        needed,
+        code[effect.code_begin : effect.code_end],
+        numbers[effect.numbers_begin : effect.numbers_end],
+        memory[effect.memory_begin : effect.memory_end],
+        basis,
+    )
+    for i in range(effect.size):
+        total = 0.0
+        for p in range(parameters):
+            total += basis[i, p] * theta[effect.theta_begin + p]
+        added[targets[effect.targets_begin + i]] += total
+
+
+@helper
+def _add_to_machine(
+    model: Any,
+    added: FloatArray,
+    level: int,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    nominal_frame: Any,
+    frame: Any,
+    altered: Any,
+) -> None:
+    """The machine with what effects add at its ports, the frame solved anew where its distances or its plate change.
+
+    The ports' order in `added`: scale (n), joint (k), frame (9), link (n), base_joint (n x 3), platform_joint (n x 3),
+    revolute_axis (3 each), plate (9), tool (3).
+    """
+    n, k, a = model.links, joint_mm.shape[0], model.axes
+    link = n + k + 9
+    base = link + n
+    platform, axis = base + 3 * n, base + 6 * n
+    plate = axis + 3 * a
+    tool = plate + 9
+    reading_mm = np.empty(k)
+    for i in range(k):
+        reading_mm[i] = joint_mm[i] + added[n + i]
+    shorten_by_joints(model.joint_weights[:n, :k], reading_mm, altered.joint_shortening_mm[:n], altered.joint_reason)
+    for i in range(n):
+        altered.reading_to_length_mm[i] = added[i] + added[link + i]
+    if level == FRAME:
+        plate_points_M_mm = np.empty((3, 3))
+        distances_mm = np.empty(9)
+        for i in range(9):
+            plate_points_M_mm[i // 3, i % 3] = model.plate_points_M_mm[i // 3, i % 3] + added[plate + i]
+            distances_mm[i] = model.zero_distances_mm[i] + (frame_mm[i] + added[n + k + i])
+        solve_frame(model, plate_points_M_mm, distances_mm, nominal_frame.supports_M_mm, frame)
+    for j in range(3):
+        for i in range(n):
+            altered.base_joints_M_mm[i, j] = frame.base_joints_M_mm[i, j] + added[base + 3 * i + j]
+            altered.platform_joints_P_mm[i, j] = model.platform_joints_P_mm[i, j] + added[platform + 3 * i + j]
+        for i in range(a):
+            altered.revolute_axes_P[i, j] = model.revolute_axes_P[i, j] + added[axis + 3 * i + j]
+        altered.tool_mm[j] = model.tool_mm[j] + added[tool + j]
+
+
+@helper
+def add_effects(
+    model: Any,
+    effects: Any,
+    added_mm: FloatArray,
+    every: bool,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    attitude_M_P: FloatArray,
+    work: Any,
+    result: Any,
+    shares_mm: FloatArray,
+    setpoint_mm: FloatArray,
+) -> int:
+    """The command that reaches the target on the machine with its effects; returns the reason.
+
+    added_mm (K, size) : what each effect adds.  every : compute each effect's share, by how much it changes the
+    setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without effects, and
+    afterwards with them.
+    """
+    n = model.links
+    total_mm = np.zeros(added_mm.shape[1])
+    tip_M_mm, tip_P_mm = np.empty(3), np.empty(3)
+    level = LENGTHS
+    reason = OK
+    copy_frame(result.bare_frame, result.frame)
+    copy_pose(work.command, work.with_effects)
+    for e in range(effects.shape[0]):
+        for i in range(total_mm.shape[0]):
+            total_mm[i] += added_mm[e, i]
+        level = max(level, effects[e].level)
+        if not every and e < effects.shape[0] - 1:
+            continue
+        altered = work.altered
+        _add_to_machine(model, total_mm, level, joint_mm, frame_mm, result.bare_frame, result.frame, altered)
+        if level > LENGTHS:
+            tip_M_mm[:] = result.target_M_mm
+            tip_P_mm[:] = result.target_P_mm
+            if model.tool_on_plate:
+                tip_M_mm[:] = altered.tool_mm
+            else:
+                tip_P_mm[:] = altered.tool_mm
+            inverse_pose(model, altered.base_joints_M_mm, altered, tip_M_mm, tip_P_mm, attitude_M_P, work.with_effects)
+        for i in range(n):
+            length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
+            setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
+            shares_mm[2 + e, i] = setpoint - setpoint_mm[i]
+            setpoint_mm[i] = setpoint
+        reason = max(reason, altered.joint_reason[0], result.frame.reason[0], work.with_effects.reason[0])
+        level = LENGTHS
+    return reason

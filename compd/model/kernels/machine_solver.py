@@ -1,0 +1,127 @@
+"""Frame, pose and contact of a machine whose parts are C structures; see `solver_structures`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from compd.arrays import FloatArray
+from compd.model.kernels.forward import solve_forward
+from compd.model.kernels.inverse import solve_inverse
+from compd.model.kernels.jit import helper
+from compd.model.kernels.octahedron import solve_octahedron
+from compd.model.kernels.rotation import to_inner_frame, to_outer_frame
+
+
+@helper
+def solve_frame(
+    model: Any, plate_points_M_mm: FloatArray, distances_mm: FloatArray, guess_M_mm: FloatArray, frame: Any
+) -> None:
+    """Equation (3); see `compd.model.frame.solve_frame`."""
+    n = model.links
+    solve_octahedron(
+        distances_mm,
+        plate_points_M_mm,
+        guess_M_mm,
+        model.joint_offsets_B_mm[:n],
+        model.support_of_joint[:n],
+        model.zero_origin_M_mm,
+        model.zero_rotation_M_B,
+        frame.supports_M_mm,
+        frame.origin_M_mm,
+        frame.rotation_M_B,
+        frame.base_joints_M_mm[:n],
+        frame.displacement_M_mm,
+        frame.rotation_M_rad,
+        frame.iterations,
+        frame.residual_mm,
+        frame.reason,
+    )
+
+
+@helper
+def forward_pose(
+    model: Any,
+    base_joints_M_mm: FloatArray,
+    machine: Any,
+    length_mm: FloatArray,
+    guess_origin_M_mm: FloatArray,
+    guess_rotation_M_P: FloatArray,
+    pose: Any,
+) -> None:
+    """`machine`: that has the platform joints and revolute axes, a model or a machine with effects."""
+    n, k = model.links, model.axes
+    solve_forward(
+        base_joints_M_mm[:n],
+        machine.platform_joints_P_mm[:n],
+        machine.revolute_axes_P[:k],
+        length_mm[:n],
+        guess_origin_M_mm,
+        guess_rotation_M_P,
+        pose.origin_M_mm,
+        pose.rotation_M_P,
+        pose.link_length_mm[:n],
+        pose.iterations,
+        pose.residual_mm,
+        pose.reason,
+    )
+
+
+@helper
+def inverse_pose(
+    model: Any,
+    base_joints_M_mm: FloatArray,
+    machine: Any,
+    tip_M_mm: FloatArray,
+    tip_P_mm: FloatArray,
+    attitude_M_P: FloatArray,
+    pose: Any,
+) -> None:
+    n, k = model.links, model.axes
+    solve_inverse(
+        base_joints_M_mm[:n],
+        machine.platform_joints_P_mm[:n],
+        machine.revolute_axes_P[:k],
+        tip_M_mm,
+        tip_P_mm,
+        attitude_M_P,
+        pose.origin_M_mm,
+        pose.rotation_M_P,
+        pose.link_length_mm[:n],
+        pose.iterations,
+        pose.residual_mm,
+        pose.reason,
+    )
+
+
+@helper
+def set_contact(model: Any, pose: Any, tool_mm: FloatArray, tip_M_mm: FloatArray, tip_P_mm: FloatArray) -> None:
+    """Where the tool touches at a pose; see `compd.model.tool`."""
+    if model.tool_on_plate:
+        tip_M_mm[:] = tool_mm
+        to_inner_frame(pose.rotation_M_P, pose.origin_M_mm, tool_mm, tip_P_mm)
+    else:
+        tip_P_mm[:] = tool_mm
+        to_outer_frame(pose.rotation_M_P, pose.origin_M_mm, tool_mm, tip_M_mm)
+
+
+@helper
+def copy_frame(source: Any, copy: Any) -> None:
+    copy.supports_M_mm[:, :] = source.supports_M_mm
+    copy.origin_M_mm[:] = source.origin_M_mm
+    copy.rotation_M_B[:, :] = source.rotation_M_B
+    copy.base_joints_M_mm[:, :] = source.base_joints_M_mm
+    copy.displacement_M_mm[:] = source.displacement_M_mm
+    copy.rotation_M_rad[:] = source.rotation_M_rad
+    copy.iterations[:] = source.iterations
+    copy.residual_mm[:] = source.residual_mm
+    copy.reason[:] = source.reason
+
+
+@helper
+def copy_pose(source: Any, copy: Any) -> None:
+    copy.origin_M_mm[:] = source.origin_M_mm
+    copy.rotation_M_P[:, :] = source.rotation_M_P
+    copy.link_length_mm[:] = source.link_length_mm
+    copy.iterations[:] = source.iterations
+    copy.residual_mm[:] = source.residual_mm
+    copy.reason[:] = source.reason
