@@ -30,6 +30,8 @@ LARGEST_BYTES = 1_000_000
 # A configuration has 6 levels and 2000 nodes, aliases unfolded; these leave room for every file that a person writes.
 DEEPEST_LEVEL = 50
 MOST_NODES = 100_000
+# PyYAML 6.0.4 reads ahead of the levels that are counted here, and has a limit of its own (1000): its words.
+_LIBRARYS_LIMIT = "maximum nesting depth"
 _LONGEST_KEY = 60
 
 _TAG = "tag:yaml.org,2002:"
@@ -134,6 +136,8 @@ def parse_yaml(text: str, path: Path, dumped: bool = False) -> tuple[Any, dict[L
         data = reading.plain(root, ())
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
+        if _LIBRARYS_LIMIT in (error.problem or ""):
+            raise _too_deep(path, line) from error
         what = f"not YAML: {error.problem or error.context}"
         raise _unusable(
             f"{path}:{line}", what, next_step="mend this line; indent with spaces, write `key: value`"
@@ -256,8 +260,7 @@ def _check_structure(text: str, path: Path) -> None:
             if isinstance(event, yaml.CollectionStartEvent):
                 anchors.append(event.anchor)
                 if len(anchors) > DEEPEST_LEVEL:
-                    what = f"more than {DEEPEST_LEVEL} levels, one within the other"
-                    raise _unusable(f"{path}:{line}", what, next_step="close the brackets, or indent less")
+                    raise _too_deep(path, line)
             elif isinstance(event, yaml.CollectionEndEvent):
                 anchors.pop()
             elif isinstance(event, yaml.AliasEvent) and event.anchor in anchors:
@@ -316,6 +319,11 @@ def _key_text(key: object) -> str:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST_KEY else f"{text[:_LONGEST_KEY]} ..."
+
+
+def _too_deep(path: Path, line: int) -> Exception:
+    what = f"more than {DEEPEST_LEVEL} levels, one within the other"
+    return _unusable(f"{path}:{line}", what, next_step="close the brackets, or indent less")
 
 
 def _unusable(where: Path | str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> Exception:
