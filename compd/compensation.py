@@ -1,7 +1,7 @@
 """From gauge values and a model to a compensated tip and a scale setpoint: pure functions, shared by daemon and replay.
 
 Both modes go the same way: machine frame (3), joints (1), kinematics, and then the effects of the model
-(`compd.model.apply_effects`), if it has any. In both, the correction is what is added to the command, and the command
+(`compd.model.effect_program`), if it has any. In both, the correction is what is added to the command, and the command
 is what a controller that knows nothing of joints and frame would send to bring the tip to its target.
 """
 
@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray, IntArray
+from compd.correction_shares import CorrectionShares
 from compd.errors import CompdError, KinematicsError, Problem
 from compd.model.effect import Memory
 from compd.model.effect_memory import EffectMemory
@@ -27,8 +28,6 @@ from compd.model.kinematics import Pose
 from compd.model.machine import MachineModel
 from compd.model.motion import pack_motion, unpack_motion
 from compd.model.python_effects import EffectInputs, python_effects
-
-Sources: TypeAlias = Mapping[str, FloatArray]
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
 # error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
@@ -82,7 +81,7 @@ class Compensation(NamedTuple):
     nominal_scale_mm : (..., n), the command without compensation.
     scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
     correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
-    sources : the correction by cause, (..., n) each; their sum is correction_mm but for rounding.
+    sources : the correction by cause, (..., n) each.
     reason : (...), a Reason, of the step that failed first.
     """
 
@@ -96,7 +95,7 @@ class Compensation(NamedTuple):
     nominal_scale_mm: FloatArray
     scale_setpoint_mm: FloatArray
     correction_mm: FloatArray
-    sources: Sources
+    sources: CorrectionShares
     reason: IntArray
 
 
@@ -362,7 +361,7 @@ def _result(
         results["nominal_scale_mm"][..., :n],
         results["scale_setpoint_mm"][..., :n],
         results["correction_mm"][..., :n],
-        dict(zip(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm, strict=True)),
+        CorrectionShares(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm),
         results["reason"],
     )
     if model.live_effects:

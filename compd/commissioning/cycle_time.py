@@ -56,7 +56,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     try_model(settings.model, (), str(configuration.path))
     zero = MachineZero(configuration.zero_hash, "", dict.fromkeys(wires.length_channels, _RAW_MM))
     commands = Commands(zero, Models(model))
-    packer = CyclePacker(latest, Directions(wires.scale.wires))
+    packer = CyclePacker(Directions(wires.scale.wires))
     numbers = count()
     timing = LoopTiming(min(settings.period_s, _PERIOD_S))
 

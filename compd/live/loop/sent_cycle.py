@@ -21,7 +21,8 @@ from compd.live.loop.model_loader import ModelNames, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.states import Mode, State
-from compd.live.memory.latest import Latest, Snapshot, unpack_readings
+from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 from compd.model.effect_memory import EffectMemory
 
 _PICKLE_PROTOCOL = 5
@@ -93,9 +94,8 @@ class SentCycle(NamedTuple):
 class CyclePacker:
     """Packs cycles as entries of the ring, in the loop's process."""
 
-    def __init__(self, latest: Latest, directions: Directions) -> None:
-        """`latest`: of which the cycle took its snapshot; `directions`: follows the links in every cycle."""
-        self._latest = latest
+    def __init__(self, directions: Directions) -> None:
+        """`directions`: follows the links in every cycle."""
         self._directions = directions
         self._zero: MachineZero | StateError | None = None
         self._models: Models | None = None
@@ -116,7 +116,7 @@ class CyclePacker:
             self._names = NO_MODELS if inputs.models is None else inputs.models.names
         return pickle.dumps(
             (
-                (inputs.tick, inputs.snapshot.time_s, self._latest.image, self._zero_bytes),
+                (inputs.tick, inputs.snapshot.time_s, inputs.snapshot.readings.image, self._zero_bytes),
                 (inputs.target, inputs.ending),
                 (_state_fields(state), state.zero is inputs.zero),
                 line,
@@ -142,7 +142,7 @@ class CycleUnpacker:
             self._zero = pickle.loads(zero_bytes)
             self._zero_bytes = zero_bytes
         target, ending = commands
-        inputs = CycleInputs(tick, Snapshot(time_s, unpack_readings(image)), self._zero, target, None, ending)
+        inputs = CycleInputs(tick, Snapshot(time_s, Readings.checked(image)), self._zero, target, None, ending)
         zero = self._zero if has_zero and isinstance(self._zero, MachineZero) else None
         return SentCycle(inputs, _state(fields, zero), line, ModelNames(*names), approach)
 
