@@ -47,18 +47,23 @@ def main() -> None:
                 for part, durations in _cycles(measured).items()
             ]
     show(f"Cycle cost over {CYCLES} cycles", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
-    rows = []
-    for name in ("tripod-cmm.yaml", "hexapod.yaml"):
-        for mode in ("cmm", "machine_tool"):
-            for count in (0, 3, len(EFFECTS)):
-                measured = machine(name)
-                if mode == "machine_tool":
-                    measured.commands.target = _target(measured)
-                measured.commands.models = _with_effects(measured, count)
-                measured.settle()
-                durations = _cycles(measured)["snapshot to bytes"]
-                rows.append([f"{name.removesuffix('.yaml')}, {mode}, {count} effects", *_row(durations)])
+    rows = [
+        [f"{name.removesuffix('.yaml')}, {mode}, {count} effects", *_row(whole_cycles(name, mode, count))]
+        for name in ("tripod-cmm.yaml", "hexapod.yaml")
+        for mode in ("cmm", "machine_tool")
+        for count in (0, 3, len(EFFECTS))
+    ]
     show("Snapshot to bytes, with effects", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+
+
+def whole_cycles(name: str, mode: str, count: int) -> list[float]:
+    """Durations (s) from snapshot to bytes, with so many effects."""
+    measured = machine(name)
+    if mode == "machine_tool":
+        measured.commands.target = _target(measured)
+    measured.commands.models = _with_effects(measured, count)
+    measured.settle()
+    return _cycles(measured)["snapshot to bytes"]
 
 
 def _target(measured: Machine) -> Target:
