@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import numpy as np
 from compd.gauge import good
 from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
+from compd.live.realtime import QuietCollector
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
 from compd.model.library import load_library
@@ -98,6 +100,8 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
         "snapshot to bytes": [],
     }
     config_hash = bytes(8)
+    collector = QuietCollector()  # as in the loop
+    collector.start(time.monotonic())
     for tick in range(CYCLES):
         measured.now_s += 0.005
         for channel, slot in measured.latest.index.items():
@@ -116,6 +120,9 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
             durations_s.values(), (computed - begin, encoded - computed, packed - encoded, encoded - begin), strict=True
         ):
             durations.append(seconds)
+        collector.collect_if_due(time.monotonic())
+    gc.enable()
+    gc.unfreeze()
     return durations_s
 
 

@@ -10,8 +10,8 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
+from compd.compensation_values import CorrectionShares
 from compd.configuration.operation import SocketSettings
-from compd.correction_shares import CorrectionShares
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.sent_cycle import SentSetpoint
