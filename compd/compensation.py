@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +20,13 @@ from compd.compensation_rows import Rows, kernel_rows
 from compd.compensation_values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
 from compd.errors import KinematicsError, Problem
 from compd.model.effect import Memory
-from compd.model.effect_memory import EffectMemory
+from compd.model.effect_memory import EffectMemory, PackedMemory
 from compd.model.frame import Frame
 from compd.model.kernels.compensation import compensate_rows
 from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kernels.solver_structures import RESULT, WORKSPACE
 from compd.model.kinematics import Pose
 from compd.model.machine import MachineModel
-from compd.model.motion import pack_motion, unpack_motion
 from compd.model.python_effects import EffectInputs, python_effects
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
@@ -88,12 +88,11 @@ def _compensate(
 
 
 class _Solved(NamedTuple):
-    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and motion and memory after the last row."""
+    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and the memory after the last row."""
 
     results: NDArray[np.void]
     shares_mm: FloatArray
-    motion: FloatArray
-    memory: FloatArray
+    memory: PackedMemory
 
 
 def _solve(
@@ -110,14 +109,13 @@ def _solve(
     solved = _Solved(
         _room(count, RESULT),
         np.empty((count, 2 + len(program.effects), links)),
-        pack_motion(memory.motion if model.needs_motion else None, links, rows.joint_mm.shape[1]),
-        program.pack_memories(memory.memories),
+        memory.pack(model, rows.joint_mm.shape[1]),
     )
     compensate_rows(
         machine_tool,
         passes,
         memory.is_empty,
-        memory.motion is not None and memory.commanded != machine_tool,
+        memory.commanded != machine_tool,
         structure,
         program.machine,
         program.effects,
@@ -133,16 +131,21 @@ def _solve(
         rows.time_s,
         rows.wanted_mm,
         rows.attitude_M_P,
-        np.full((count, links), np.nan) if effects_at_mm is None else effects_at_mm,
-        np.zeros((0, 0, program.size)) if given_mm is None else given_mm,
+        _not_given(count, links) if effects_at_mm is None else effects_at_mm,
+        np.empty((0, 0, program.size)) if given_mm is None else given_mm,
         *rows.warm,
-        solved.motion,
-        solved.memory,
+        solved.memory.motion,
+        solved.memory.memories,
         _room(1, WORKSPACE),
         solved.results,
         solved.shares_mm,
     )
     return solved
+
+
+@lru_cache(maxsize=8)
+def _not_given(count: int, links: int) -> FloatArray:
+    return np.full((count, links), np.nan)
 
 
 def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
@@ -216,9 +219,9 @@ def _result(
         results["reason"],
     )
     if model.live_effects:
-        motion = unpack_motion(solved.motion, n, rows.joint_mm.shape[1]) if model.needs_motion else None
-        after = {**model.program.unpack_memories(solved.memory), **memories}
-        memory = EffectMemory(motion, after, machine_tool)
+        memory = EffectMemory(commanded=machine_tool, packed=solved.memory)
+        if memories:
+            memory = EffectMemory(memory.motion, {**memory.memories, **memories}, machine_tool)
     warm = WarmStart(results["warm_supports_M_mm"], results["warm_origin_M_mm"], results["warm_rotation_M_P"], memory)
     return compensation, warm
 

@@ -154,13 +154,13 @@ def _state_fields(state: CycleState) -> tuple[Any, ...]:
     tip_by_gauge = state.tip_by_gauge
     return (
         (supports_M_mm.tobytes(), origin_M_mm.tobytes(), rotation_M_P.tobytes()),
-        None if effects == _NO_MEMORY else effects,
+        None if effects.is_empty else effects,
         state.correction_mm.tobytes(),
         None
         if last_good is None
         else (last_good.change_mm.tobytes(), *last_good[1:3], dict(last_good.quantities), *last_good[4:]),
         state.scales_seen,
-        None if state.shadow_memory == _NO_MEMORY else state.shadow_memory,
+        None if state.shadow_memory.is_empty else state.shadow_memory,
         state.adopting,
         None if u_tip_um is None else u_tip_um.tobytes(),
         None if tip_correction_mm is None else tip_correction_mm.tobytes(),

@@ -236,7 +236,8 @@ def _json_values(values: SetpointValues) -> dict[str, Any]:
 
 
 def _rounded(values: FloatArray, decimals: int) -> list[Any]:
-    """The values as lists, rounded. Raises ValueError where one is not finite: JSON has no such number."""
-    if not math.isfinite(values.sum()):
+    """The values (k,) or (l, k) as rounded lists. Raises ValueError where one is not finite, which JSON lacks."""
+    lists: list[Any] = values.round(decimals).tolist()
+    if not math.isfinite(sum(lists) if values.ndim == 1 else sum(map(sum, lists))):
         raise ValueError("a value of the setpoint is not finite")
-    return values.round(decimals).tolist()  # type: ignore[no-any-return]
+    return lists
