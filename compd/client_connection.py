@@ -7,6 +7,8 @@ import socket
 from contextlib import suppress
 from typing import Any
 
+import orjson
+
 from compd.errors import DaemonError, Problem
 
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
@@ -63,7 +65,7 @@ class ClientConnection:
         if not line.endswith(b"\n"):
             raise self._lost("it closed the connection")
         try:
-            message: Message = json.loads(line)
+            message: Message = orjson.loads(line)
             error_code = message["code"] if message["class"] == "ERROR" else None
         except (ValueError, TypeError, KeyError) as error:
             raise DaemonError(

@@ -1,103 +1,37 @@
 """From gauge values and a model to a compensated tip and a scale setpoint: pure functions, shared by daemon and replay.
 
 Both modes go the same way: machine frame (3), joints (1), kinematics, and then the effects of the model
-(`compd.model.apply_effects`), if it has any. In both, the correction is what is added to the command, and the command
+(`compd.model.effect_program`), if it has any. In both, the correction is what is added to the command, and the command
 is what a controller that knows nothing of joints and frame would send to bring the tip to its target.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple, TypeAlias
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compd.arrays import FloatArray, IntArray
-from compd.errors import CompdError, KinematicsError, Problem
+from compd.arrays import FloatArray
+from compd.compensation_rows import Rows, kernel_rows
+from compd.compensation_values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
+from compd.errors import KinematicsError, Problem
 from compd.model.effect import Memory
-from compd.model.effect_memory import EffectMemory
+from compd.model.effect_memory import EffectMemory, PackedMemory
 from compd.model.frame import Frame
 from compd.model.kernels.compensation import compensate_rows
 from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kernels.solver_structures import RESULT, WORKSPACE
 from compd.model.kinematics import Pose
 from compd.model.machine import MachineModel
-from compd.model.motion import pack_motion, unpack_motion
 from compd.model.python_effects import EffectInputs, python_effects
-
-Sources: TypeAlias = Mapping[str, FloatArray]
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
 # error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
 _EFFECT_PASSES = 2
-
-
-class GaugeValues(NamedTuple):
-    """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
-
-    scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6.
-    quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
-    time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
-    """
-
-    scale_mm: FloatArray
-    joint_mm: FloatArray
-    frame_mm: FloatArray
-    quantities: Mapping[str, FloatArray]
-    time_s: FloatArray | float = math.nan
-
-
-class WarmStart(NamedTuple):
-    """Where the last cycle ended and the next one's Newton starts; rows that failed keep what they came with.
-
-    supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
-    effects : what the model's effects remember; of N rows, after the last one.
-    """
-
-    supports_M_mm: FloatArray
-    origin_M_mm: FloatArray
-    rotation_M_P: FloatArray
-    effects: EffectMemory = EffectMemory()
-
-    @classmethod
-    def at_zero(cls, model: MachineModel) -> WarmStart:
-        """Machine zero: the first start, and the one that depends on no history."""
-        zero = model.zero
-        return cls(model.frame.zero_supports_M_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
-
-
-class Compensation(NamedTuple):
-    """What one cycle computes; where reason is not OK every number is nan (frame has a reason of its own).
-
-    tip_M_mm, tip_B0_mm : (..., 3), the tip in {M}, and in {B0} by equation (9). In CMM mode where it is now, in
-        machine-tool mode where it will be when the setpoint is reached.
-    tip_P_mm : (..., 3), the same place in {P}: with the tool on the plate, the place on the work that it touches.
-    rotation_M_P : (..., 3, 3), attitude of the moving platform.
-    frame : the machine frame now, with its displacement since machine zero.
-    link_length_mm : (..., n): in CMM mode those measured, equation (1); in machine-tool mode those needed.
-    target_B_mm : (..., 3), the target in today's {B}, equation (8).
-    nominal_scale_mm : (..., n), the command without compensation.
-    scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
-    correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
-    sources : the correction by cause, (..., n) each; their sum is correction_mm but for rounding.
-    reason : (...), a Reason, of the step that failed first.
-    """
-
-    tip_M_mm: FloatArray
-    tip_B0_mm: FloatArray
-    tip_P_mm: FloatArray
-    rotation_M_P: FloatArray
-    frame: Frame
-    link_length_mm: FloatArray
-    target_B_mm: FloatArray
-    nominal_scale_mm: FloatArray
-    scale_setpoint_mm: FloatArray
-    correction_mm: FloatArray
-    sources: Sources
-    reason: IntArray
 
 
 def compensate_machine_tool(
@@ -131,95 +65,11 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     return _compensate(model, values, warm, None)
 
 
-class Wanted(NamedTuple):
-    """What machine-tool mode is to reach: the contact, tip_M_mm (..., 3) and tip_P_mm (..., 3), and the attitude
-    (..., 3, 3) of {P} in {M}: a hexapod's; for a tripod the guess to start from."""
-
-    tip_M_mm: FloatArray
-    tip_P_mm: FloatArray
-    attitude_M_P: FloatArray
-
-
-class _Rows(NamedTuple):
-    """The arguments of a compensation as the kernel takes them: N rows, contiguous, of float64.
-
-    lead : the leading axes of the result; () for a single snapshot.
-    wanted : (N, 6) tip in {M} and in {P}.  warm : one row, or N.
-    """
-
-    lead: tuple[int, ...]
-    scale_mm: FloatArray
-    joint_mm: FloatArray
-    frame_mm: FloatArray
-    quantities: FloatArray
-    time_s: FloatArray
-    wanted_mm: FloatArray
-    attitude_M_P: FloatArray
-    warm: tuple[FloatArray, FloatArray, FloatArray]
-
-
-def _rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> _Rows:
-    readings = (values.joint_mm, values.frame_mm) if wanted else (values.scale_mm, values.joint_mm, values.frame_mm)
-    starts = (warm.supports_M_mm, 2), (warm.origin_M_mm, 1), (warm.rotation_M_P, 2)
-    targets = ((wanted.tip_M_mm, 1), (wanted.tip_P_mm, 1), (wanted.attitude_M_P, 2)) if wanted else ()
-    parts = [*((reading, 1) for reading in readings), *starts, *targets]
-    lead: tuple[int, ...] = ()
-    if any(part.ndim > core for part, core in parts):
-        lead = np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
-    count = math.prod(lead)
-    names = model.program.quantities
-    quantities = np.empty((count, len(names)))
-    for place, name in enumerate(names):
-        quantities[:, place] = _quantity(values.quantities, name)
-    wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
-    if wanted:
-        wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
-        wanted_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
-        attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
-    return _Rows(
-        lead,
-        _row_copy(values.scale_mm, lead, 1),
-        _row_copy(values.joint_mm, lead, 1),
-        _row_copy(values.frame_mm, lead, 1),
-        quantities,
-        _row_copy(np.asarray(values.time_s), lead, 0),
-        wanted_mm,
-        attitude_M_P,
-        (
-            _row_copy(warm.supports_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 2),
-            _row_copy(warm.origin_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 1),
-            _row_copy(warm.rotation_M_P, lead if warm.supports_M_mm.ndim > 2 else (), 2),
-        ),
-    )
-
-
-def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
-    """(N, ...), a copy: the kernel takes none that is read-only."""
-    if not lead:
-        return np.array(values, dtype=np.float64, ndmin=core + 1)
-    shape = values.shape[values.ndim - core :]
-    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
-
-
-def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:
-    if name not in quantities:
-        raise CompdError(
-            Problem(
-                where="rows for effects",
-                what="this quantity is not measured",
-                value=name,
-                allowed=", ".join(sorted(quantities)) or "nothing is",
-                next_step="add a gauge or a column of this name",
-            )
-        )
-    return quantities[name]
-
-
 def _compensate(
     model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None
 ) -> tuple[Compensation, WarmStart]:
     """The compensation in machine-tool mode, or in CMM mode where nothing is wanted."""
-    rows = _rows(model, values, warm, wanted)
+    rows = kernel_rows(model, values, warm, wanted)
     memory, machine_tool = warm.effects, wanted is not None
     if not model.program.given:
         passes = _EFFECT_PASSES if machine_tool else 1
@@ -238,17 +88,16 @@ def _compensate(
 
 
 class _Solved(NamedTuple):
-    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and motion and memory after the last row."""
+    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and the memory after the last row."""
 
     results: NDArray[np.void]
     shares_mm: FloatArray
-    motion: FloatArray
-    memory: FloatArray
+    memory: PackedMemory
 
 
 def _solve(
     model: MachineModel,
-    rows: _Rows,
+    rows: Rows,
     memory: EffectMemory,
     machine_tool: bool,
     passes: int,
@@ -260,14 +109,13 @@ def _solve(
     solved = _Solved(
         _room(count, RESULT),
         np.empty((count, 2 + len(program.effects), links)),
-        pack_motion(memory.motion if model.needs_motion else None, links, rows.joint_mm.shape[1]),
-        program.pack_memories(memory.memories),
+        memory.pack(model, rows.joint_mm.shape[1]),
     )
     compensate_rows(
         machine_tool,
         passes,
         memory.is_empty,
-        memory.motion is not None and memory.commanded != machine_tool,
+        memory.commanded != machine_tool,
         structure,
         program.machine,
         program.effects,
@@ -283,16 +131,21 @@ def _solve(
         rows.time_s,
         rows.wanted_mm,
         rows.attitude_M_P,
-        np.full((count, links), np.nan) if effects_at_mm is None else effects_at_mm,
-        np.zeros((0, 0, program.size)) if given_mm is None else given_mm,
+        _not_given(count, links) if effects_at_mm is None else effects_at_mm,
+        np.empty((0, 0, program.size)) if given_mm is None else given_mm,
         *rows.warm,
-        solved.motion,
-        solved.memory,
+        solved.memory.motion,
+        solved.memory.memories,
         _room(1, WORKSPACE),
         solved.results,
         solved.shares_mm,
     )
     return solved
+
+
+@lru_cache(maxsize=8)
+def _not_given(count: int, links: int) -> FloatArray:
+    return np.full((count, links), np.nan)
 
 
 def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
@@ -301,7 +154,7 @@ def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
 
 
 def _effect_inputs(
-    model: MachineModel, rows: _Rows, bare: NDArray[np.void], values: GaugeValues, effects_at_mm: FloatArray
+    model: MachineModel, rows: Rows, bare: NDArray[np.void], values: GaugeValues, effects_at_mm: FloatArray
 ) -> EffectInputs:
     """What Python effects are computed from: the machine without effects."""
     n, pose = model.links, bare["bare_pose"]
@@ -330,7 +183,7 @@ def _effect_inputs(
 
 def _result(
     model: MachineModel,
-    rows: _Rows,
+    rows: Rows,
     solved: _Solved,
     memory: EffectMemory,
     memories: Mapping[str, Memory],
@@ -362,13 +215,13 @@ def _result(
         results["nominal_scale_mm"][..., :n],
         results["scale_setpoint_mm"][..., :n],
         results["correction_mm"][..., :n],
-        dict(zip(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm, strict=True)),
+        CorrectionShares(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm),
         results["reason"],
     )
     if model.live_effects:
-        motion = unpack_motion(solved.motion, n, rows.joint_mm.shape[1]) if model.needs_motion else None
-        after = {**model.program.unpack_memories(solved.memory), **memories}
-        memory = EffectMemory(motion, after, machine_tool)
+        memory = EffectMemory(commanded=machine_tool, packed=solved.memory)
+        if memories:
+            memory = EffectMemory(memory.motion, {**memory.memories, **memories}, machine_tool)
     warm = WarmStart(results["warm_supports_M_mm"], results["warm_origin_M_mm"], results["warm_rotation_M_P"], memory)
     return compensation, warm
 

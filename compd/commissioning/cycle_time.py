@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.clock import Clock, MonotonicClock
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.compensation import compensate_cmm
+from compd.compensation_values import GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good
@@ -56,7 +57,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     try_model(settings.model, (), str(configuration.path))
     zero = MachineZero(configuration.zero_hash, "", dict.fromkeys(wires.length_channels, _RAW_MM))
     commands = Commands(zero, Models(model))
-    packer = CyclePacker(latest, Directions(wires.scale.wires))
+    packer = CyclePacker(Directions(wires.scale.wires))
     numbers = count()
     timing = LoopTiming(min(settings.period_s, _PERIOD_S))
 

@@ -2,31 +2,82 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
+from compd.arrays import FloatArray
 from compd.model.deltas import Memories
+from compd.model.effect_program import EffectProgram
 from compd.model.machine import MachineModel
-from compd.model.motion import Motion
+from compd.model.motion import Motion, pack_motion, unpack_motion
 
 _NO_MEMORIES: Memories = {}
 
 
-class EffectMemory(NamedTuple):
-    """What effects hand from one snapshot to the next; nothing in it is ever changed in place.
+class PackedMemory(NamedTuple):
+    """What the kernel of one program leaves; see `compd.model.kernels.motion` and `compd.model.effect_program`.
 
+    links : n.  motion : a row of numbers.  memories : those of all effects, behind one another.
+    """
+
+    program: EffectProgram
+    links: int
+    motion: FloatArray
+    memories: FloatArray
+
+
+class EffectMemory:
+    """What effects hand from one snapshot to the next; it is never changed in place.
+
+    From one cycle to the next it stays packed, as the kernel left it.
+
+    Attributes
+    ----------
     motion : of the links, where an effect depends on it; None before the first snapshot.
     memories : by effect id.
     commanded : whether that motion is of commanded scales (machine-tool mode) and not of scales as read.
     """
 
-    motion: Motion | None = None
-    memories: Memories = _NO_MEMORIES
-    commanded: bool = False
+    def __init__(
+        self,
+        motion: Motion | None = None,
+        memories: Memories = _NO_MEMORIES,
+        commanded: bool = False,
+        packed: PackedMemory | None = None,
+    ) -> None:
+        """`packed`: in the place of motion and memories."""
+        self.commanded = commanded
+        self._packed = packed
+        if packed is None:
+            self.motion = motion
+            self.memories = memories
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        assert self._packed is not None
+        _, links, row, _ = self._packed
+        return unpack_motion(row, links, (len(row) - 1 - 4 * links) // 2)
+
+    @cached_property
+    def memories(self) -> Memories:
+        assert self._packed is not None
+        return self._packed.program.unpack_memories(self._packed.memories)
 
     @property
     def is_empty(self) -> bool:
         """Whether no snapshot was before."""
-        return self.motion is None and not self.memories
+        return self._packed is None and self.motion is None and not self.memories
+
+    def pack(self, model: MachineModel, joints: int) -> PackedMemory:
+        """A copy for the kernel of this machine with k joint comparators, which changes it."""
+        program, links = model.program, model.links
+        if self._packed is not None and self._packed.program is program:
+            return PackedMemory(program, links, self._packed.motion.copy(), self._packed.memories.copy())
+        motion = pack_motion(self.motion if model.needs_motion else None, links, joints)
+        return PackedMemory(program, links, motion, program.pack_memories(self.memories))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return EffectMemory, (self.motion, self.memories, self.commanded)
 
 
 def carry_over(memory: EffectMemory, old: MachineModel, new: MachineModel) -> EffectMemory:
@@ -40,4 +91,4 @@ def carry_over(memory: EffectMemory, old: MachineModel, new: MachineModel) -> Ef
         and before[fitted.effect.id].effect is fitted.effect
         and before[fitted.effect.id].constants == fitted.constants
     }
-    return memory._replace(memories=memories)
+    return EffectMemory(memory.motion, memories, memory.commanded)

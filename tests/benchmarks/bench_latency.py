@@ -45,7 +45,7 @@ with connect(sys.argv[1]) as client:
 class AllAtOnce:
     """In the place of the lines: all gauges have a new reading at the same moment, again and again."""
 
-    def __init__(self, lines: object, stale_after_s: object, latest: Latest, clock: Clock, trust: object) -> None:
+    def __init__(self, lines: object, stale_after_s: object, latest: Latest, clock: Clock, **others: object) -> None:
         self.lines: dict[str, object] = {}
         self._latest = latest
         self._clock = clock

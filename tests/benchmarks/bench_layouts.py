@@ -40,6 +40,7 @@ from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
 from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import machine
@@ -70,7 +71,7 @@ MEASURED = machine()
 Figures = dict[str, list[float]]
 
 
-class Readings:
+class LatestReadings:
     """The newest reading of each channel, in the memory of one process."""
 
     def __init__(self) -> None:
@@ -81,10 +82,10 @@ class Readings:
         self.known[index] = reading
 
     def snapshot(self, time_s: float) -> Snapshot:
-        return Snapshot(time_s, tuple(self.known))
+        return Snapshot(time_s, Readings.of(self.known))
 
 
-class SharedReadings(Readings):
+class SharedReadings(LatestReadings):
     """The same in memory that processes share. A reader waits for no writer."""
 
     def __init__(self) -> None:
@@ -242,7 +243,7 @@ def run_together(client: socket.socket, rate_hz: float, seconds: float, go: Any)
     served: Figures = {}
     service = threading.Thread(target=lambda: served.update(serve(setpoints.get, client, "ordinary")), daemon=True)
     service.start()
-    latest = Readings()
+    latest = LatestReadings()
     figures = acquire(latest, lambda: run_loop(latest, setpoints.put, rate_hz, seconds, go))
     service.join()
     return figures | served

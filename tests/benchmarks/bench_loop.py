@@ -93,7 +93,7 @@ BUSY = "while True: pass"
 class BusyDrivers:
     """In the place of the lines: six threads that ask, read, parse and store as fast as the other end answers."""
 
-    def __init__(self, lines: object, stale_after_s: object, latest: Latest, clock: object, trust: object) -> None:
+    def __init__(self, lines: object, stale_after_s: object, latest: Latest, clock: object, **others: object) -> None:
         self.lines: dict[str, object] = {}
         self._latest = latest
         self._polls = [0] * DRIVERS

@@ -33,6 +33,7 @@ from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
 from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 from compd.live.pipeline import build_pipeline
 from compd.simulation.truth.world import World
 from tests.benchmarks.figures import show
@@ -177,7 +178,7 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
         for slot in set(range(len(readings))) - set(slots.values()):
             readings[slot] = at_once[slot] = good(20.0, now_s)
         setpoints = [
-            cycle.run(number, Snapshot(now_s, tuple(used)), zero)
+            cycle.run(number, Snapshot(now_s, Readings.of(used)), zero)
             for cycle, used in zip(cycles, (readings, readings, at_once), strict=True)
         ]
         if all(setpoint.valid for setpoint in setpoints):

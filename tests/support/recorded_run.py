@@ -29,7 +29,7 @@ class Run:
     def __init__(self, machine: Machine, seed: int = 1):
         self.machine = machine
         self.random = np.random.default_rng(seed)
-        self.packer = CyclePacker(machine.latest, Directions(machine.wires.scale.wires))
+        self.packer = CyclePacker(Directions(machine.wires.scale.wires))
         self.unpacker = CycleUnpacker()
         self.transcript = ReadingsMessage(machine.wires, machine.latest.channels)
         self.version = {

@@ -10,6 +10,7 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
+from compd.compensation_values import CorrectionShares
 from compd.configuration.operation import SocketSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
@@ -33,9 +34,8 @@ NO_ZERO = StateError(Problem(where="zero", what="none"))
 
 def setpoint(seq: int, time_s: float | None = None) -> Setpoint:
     three = np.array([1.0, 2.0, 3.0])
-    numbers = SetpointValues(
-        three, three, None, three, three, three, three, three, three, {"joints": three, "frame": three}
-    )
+    sources_mm = CorrectionShares(("joints", "frame"), np.array([three, three]))
+    numbers = SetpointValues(three, three, None, three, three, three, three, three, three, sources_mm)
     time_s = seq * PERIOD_S if time_s is None else time_s
     return Setpoint(seq, time_s, time_s + 0.1, 0.01, State.OK, "", Mode.CMM, numbers)
 

@@ -13,7 +13,8 @@ from compd.gauge import Gauge, Quality, Reading, bad
 from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.round_trigger import RoundBuffer, stamped
-from compd.live.memory.latest import LONGEST_DETAIL, Latest
+from compd.live.memory.latest import Latest
+from compd.live.memory.readings import LONGEST_DETAIL
 from compd.pushed_gauge import Heard
 
 log = structlog.get_logger()

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
+from compd.compensation import compensate_cmm
+from compd.compensation_values import Compensation, GaugeValues, WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
@@ -278,7 +279,7 @@ def _age_uncertainty_mm(
     A held set is not carried on: since its oldest reading each of its lengths may have moved on.
     """
     wires, extrapolate = settings.wires, settings.loop.extrapolate
-    age_mm = wires.length_age_uncertainty_mm(snapshot, extrapolate)
+    age_mm = wires.lengths.age_uncertainty_mm(snapshot, extrapolate)
     if comparators.time_s < snapshot.time_s and comparators.drift_mm_per_s:
         held_s = snapshot.time_s - comparators.oldest_s
         age_mm[len(wires.scale.wires) :] = np.array(comparators.drift_mm_per_s) * held_s

@@ -63,8 +63,11 @@ def slewed(wanted_mm: FloatArray, previous_mm: FloatArray, period_s: float, limi
     """The correction (n) that a tip may have one period after one of `previous_mm`; `wanted_mm` itself where it is
     reached."""
     step = limits.slew_mm_per_s * period_s
-    allowed_mm = np.clip(wanted_mm, previous_mm - step, previous_mm + step)
-    return wanted_mm if np.abs(allowed_mm - wanted_mm).max() <= _ROUNDING_MM else allowed_mm
+    pairs = list(zip(wanted_mm.tolist(), previous_mm.tolist(), strict=True))
+    allowed = [min(max(wanted, previous - step), previous + step) for wanted, previous in pairs]
+    if all(abs(value - wanted) <= _ROUNDING_MM for value, (wanted, _) in zip(allowed, pairs, strict=True)):
+        return wanted_mm
+    return np.array(allowed)
 
 
 def stroke_problem(length_mm: FloatArray, stroke_mm: tuple[float, float] | None) -> str:

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation_values import GaugeValues, WarmStart
 from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.file_trust import own_users, trust_problem

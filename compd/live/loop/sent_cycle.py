@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import WarmStart
+from compd.compensation_values import WarmStart
 from compd.errors import StateError
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.directions import Directions
@@ -21,7 +21,8 @@ from compd.live.loop.model_loader import ModelNames, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.states import Mode, State
-from compd.live.memory.latest import Latest, Snapshot, unpack_readings
+from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 from compd.model.effect_memory import EffectMemory
 
 _PICKLE_PROTOCOL = 5
@@ -93,9 +94,8 @@ class SentCycle(NamedTuple):
 class CyclePacker:
     """Packs cycles as entries of the ring, in the loop's process."""
 
-    def __init__(self, latest: Latest, directions: Directions) -> None:
-        """`latest`: of which the cycle took its snapshot; `directions`: follows the links in every cycle."""
-        self._latest = latest
+    def __init__(self, directions: Directions) -> None:
+        """`directions`: follows the links in every cycle."""
         self._directions = directions
         self._zero: MachineZero | StateError | None = None
         self._models: Models | None = None
@@ -116,7 +116,7 @@ class CyclePacker:
             self._names = NO_MODELS if inputs.models is None else inputs.models.names
         return pickle.dumps(
             (
-                (inputs.tick, inputs.snapshot.time_s, self._latest.image, self._zero_bytes),
+                (inputs.tick, inputs.snapshot.time_s, inputs.snapshot.readings.image, self._zero_bytes),
                 (inputs.target, inputs.ending),
                 (_state_fields(state), state.zero is inputs.zero),
                 line,
@@ -142,7 +142,7 @@ class CycleUnpacker:
             self._zero = pickle.loads(zero_bytes)
             self._zero_bytes = zero_bytes
         target, ending = commands
-        inputs = CycleInputs(tick, Snapshot(time_s, unpack_readings(image)), self._zero, target, None, ending)
+        inputs = CycleInputs(tick, Snapshot(time_s, Readings.checked(image)), self._zero, target, None, ending)
         zero = self._zero if has_zero and isinstance(self._zero, MachineZero) else None
         return SentCycle(inputs, _state(fields, zero), line, ModelNames(*names), approach)
 
@@ -154,13 +154,13 @@ def _state_fields(state: CycleState) -> tuple[Any, ...]:
     tip_by_gauge = state.tip_by_gauge
     return (
         (supports_M_mm.tobytes(), origin_M_mm.tobytes(), rotation_M_P.tobytes()),
-        None if effects == _NO_MEMORY else effects,
+        None if effects.is_empty else effects,
         state.correction_mm.tobytes(),
         None
         if last_good is None
         else (last_good.change_mm.tobytes(), *last_good[1:3], dict(last_good.quantities), *last_good[4:]),
         state.scales_seen,
-        None if state.shadow_memory == _NO_MEMORY else state.shadow_memory,
+        None if state.shadow_memory.is_empty else state.shadow_memory,
         state.adopting,
         None if u_tip_um is None else u_tip_um.tobytes(),
         None if tip_correction_mm is None else tip_correction_mm.tobytes(),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import orjson
 
 from compd.arrays import FloatArray
-from compd.json_text import encode_compact
+from compd.compensation_values import CorrectionShares
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.packet_layout import (
     BODY,
@@ -79,7 +80,7 @@ class SetpointValues(NamedTuple):
     link_length_mm: FloatArray
     scale_setpoint_mm: FloatArray
     correction_mm: FloatArray
-    sources_mm: Mapping[str, FloatArray]
+    sources_mm: CorrectionShares
     u_tip_um: FloatArray | None = None
     shadow: ShadowResult | None = None
 
@@ -141,7 +142,7 @@ class Setpoint(NamedTuple):
             message["skew_s"] = round(self.skew_s, _DECIMALS_S)
         if self.values is not None:
             message |= _json_values(self.values)
-        return encode_compact(message).encode() + b"\n"
+        return setpoint_line(message)
 
     def to_packet(self, config_hash: bytes) -> bytes:
         """`PACKET_SIZE` bytes, little-endian; the links a machine does not have are nan.
@@ -185,49 +186,58 @@ class Setpoint(NamedTuple):
         return body + zlib.crc32(body).to_bytes(4, "little")
 
 
+def setpoint_line(message: Mapping[str, Any]) -> bytes:
+    """A SETPOINT message as it is sent; orjson takes a tenth of the time of the standard library."""
+    return orjson.dumps(message) + b"\n"
+
+
 def _json_values(values: SetpointValues) -> dict[str, Any]:
     """The values as rounded lists, under their keys in the message."""
-    lengths = {
-        "tip_M_mm": values.tip_M_mm,
-        "tip_B0_mm": values.tip_B0_mm,
-        "link_length_mm": values.link_length_mm,
-        "scale_setpoint_mm": values.scale_setpoint_mm,
-        "correction_mm": values.correction_mm,
+    vectors = [
+        values.tip_M_mm,
+        values.tip_B0_mm,
+        values.frame_origin_M_mm,
+        values.frame_displacement_M_mm,
+        values.link_length_mm,
+        values.scale_setpoint_mm,
+        values.correction_mm,
+    ]
+    if values.tip_P_mm is not None:
+        vectors.append(values.tip_P_mm)
+    # rounding one long array costs as much as rounding one of three elements
+    lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM)
+    n = len(values.correction_mm)
+    message = {
+        "tip_M_mm": lengths[:3],
+        "tip_B0_mm": lengths[3:6],
+        "link_length_mm": lengths[12 : 12 + n],
+        "scale_setpoint_mm": lengths[12 + n : 12 + 2 * n],
+        "correction_mm": lengths[12 + 2 * n : 12 + 3 * n],
+        "frame": {
+            "origin_M_mm": lengths[6:9],
+            "displacement_M_mm": lengths[9:12],
+            "rotation_M_rad": _rounded(values.frame_rotation_M_rad, _DECIMALS_RAD),
+        },
+        "sources_mm": dict(
+            zip(values.sources_mm.causes, _rounded(values.sources_mm.shares_mm, _DECIMALS_MM), strict=True)
+        ),
     }
     if values.tip_P_mm is not None:
-        lengths["tip_P_mm"] = values.tip_P_mm
-    frame = {"origin_M_mm": values.frame_origin_M_mm, "displacement_M_mm": values.frame_displacement_M_mm}
-    # rounding one long array costs as much as rounding one of three elements
-    rounded = _rounded([*lengths.values(), *frame.values(), *values.sources_mm.values()])
-    return _json_optional_values(values) | {
-        **dict(zip(lengths, rounded, strict=False)),
-        "frame": {
-            **dict(zip(frame, rounded, strict=False)),
-            "rotation_M_rad": values.frame_rotation_M_rad.round(_DECIMALS_RAD).tolist(),
-        },
-        "sources_mm": dict(zip(values.sources_mm, rounded, strict=True)),
-    }
-
-
-def _json_optional_values(values: SetpointValues) -> dict[str, Any]:
-    """The uncertainty where it is known, and the shadow's result where there is a shadow."""
-    message: dict[str, Any] = {}
+        message["tip_P_mm"] = lengths[12 + 3 * n :]
     if values.u_tip_um is not None and math.isfinite(values.u_tip_um.sum()):
-        message["u_tip_um"] = values.u_tip_um.round(_DECIMALS_UM).tolist()
+        message["u_tip_um"] = _rounded(values.u_tip_um, _DECIMALS_UM)
     if values.shadow is not None:
         message["shadow"] = {
-            name: field if isinstance(field, str) else field.round(_DECIMALS_MM).tolist()
+            name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM)
             for name, field in values.shadow._asdict().items()
             if field is not None
         }
     return message
 
 
-def _rounded(vectors: list[FloatArray]) -> Iterator[list[float]]:
-    """Each vector as a list, rounded to `_DECIMALS_MM`."""
-    elements = np.concatenate(vectors).round(_DECIMALS_MM).tolist()
-    start = 0
-    for vector in vectors:
-        end = start + len(vector)
-        yield elements[start:end]
-        start = end
+def _rounded(values: FloatArray, decimals: int) -> list[Any]:
+    """The values (k,) or (l, k) as rounded lists. Raises ValueError where one is not finite, which JSON lacks."""
+    lists: list[Any] = values.round(decimals).tolist()
+    if not math.isfinite(sum(lists) if values.ndim == 1 else sum(map(sum, lists))):
+        raise ValueError("a value of the setpoint is not finite")
+    return lists

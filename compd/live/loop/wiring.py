@@ -13,9 +13,9 @@ from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.gauge import Quality, Reading
-from compd.live.loop.extrapolation import age_uncertainty_mm, drift_mm_per_s, extrapolated
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost
+from compd.live.loop.wired_readings import age_uncertainties_mm, drifts_mm_per_s, read_values
 from compd.live.memory.latest import Latest, Snapshot
 
 ALL_GOOD = Lost()
@@ -55,7 +55,8 @@ class Wires:
 
     def __init__(self, wires: Sequence[Wire]) -> None:
         self.wires = tuple(wires)
-        self._slots = tuple((wire.slot, wire.stale_after_s) for wire in wires)
+        self._wired = np.array([wire.slot for wire in wires], dtype=np.int64)
+        self._stale_after_s = np.array([wire.stale_after_s for wire in wires], dtype=float)
         self._sign = np.array([wire.sign for wire in wires], dtype=float)
 
     def zero_vector(self, zero: MachineZero) -> FloatArray:
@@ -68,31 +69,34 @@ class Wires:
         extrapolate : carry each reading on to the snapshot's time.
         """
         now_s, readings = snapshot
-        used = [readings[slot] for slot, _ in self._slots]
-        raw = [extrapolated(reading, now_s) if extrapolate else reading[0] for reading in used]
-        values = (np.array(raw) - zero) * self._sign
-        times_s = [reading[1] for reading in used]
-        oldest_s, newest_s = min(times_s, default=math.inf), max(times_s, default=-math.inf)
-        lost = self.lost(snapshot)
-        if lost:
-            bad = [i for i, wire in enumerate(self.wires) if _fault(wire, readings[wire.slot], now_s) is not None]
-            values[bad] = math.nan
-        return WiredValues(values, oldest_s, newest_s, lost)
+        values = np.empty(len(self.wires))
+        oldest_s, newest_s, usable = read_values(
+            readings.slots, self._wired, self._stale_after_s, self._sign, zero, now_s, extrapolate, values
+        )
+        if usable:
+            return WiredValues(values, oldest_s, newest_s, ALL_GOOD)
+        faults = [_fault(wire, readings[wire.slot], now_s) for wire in self.wires]
+        values[[fault is not None for fault in faults]] = math.nan
+        return WiredValues(values, oldest_s, newest_s, lost(fault for fault in faults if fault is not None))
 
     def drift_mm_per_s(self, snapshot: Snapshot) -> tuple[float, ...]:
         """(k) how fast each length may move while it is held, mm/s."""
-        return tuple(drift_mm_per_s(snapshot.readings[slot]) for slot, _ in self._slots)
+        drifts = np.empty(len(self.wires))
+        drifts_mm_per_s(snapshot.readings.slots, self._wired, drifts)
+        return tuple(drifts.tolist())
+
+    def age_uncertainty_mm(self, snapshot: Snapshot, extrapolate: bool) -> FloatArray:
+        """(k) standard uncertainty of each length by its age, mm.
+
+        0 for one that is not good; nan where it is not known how it moves.
+        """
+        uncertainties_mm = np.empty(len(self.wires))
+        age_uncertainties_mm(snapshot.readings.slots, self._wired, snapshot.time_s, extrapolate, uncertainties_mm)
+        return uncertainties_mm
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which readings are not good or too old, and why."""
-        now_s, readings = snapshot
-        ok = Quality.OK  # in a local variable: the lookup in an Enum costs more than the rest of this loop
-        for slot, stale_after_s in self._slots:
-            _, time_s, quality, _, _ = readings[slot]
-            if quality is not ok or now_s - time_s > stale_after_s:
-                faults = (_fault(wire, readings[wire.slot], now_s) for wire in self.wires)
-                return lost(fault for fault in faults if fault is not None)
-        return ALL_GOOD
+        return self.read(snapshot, np.zeros(len(self.wires))).lost
 
     def part(self, start: int, end: int) -> Wires:
         """The wires from index `start` to `end`."""
@@ -117,6 +121,7 @@ class MachineWires:
     ----------
     scale : in the order of the links.
     joint, frame : the two parts of the comparators.
+    lengths : scales, joint and frame comparators.
     comparators : first the k = `joints` joint comparators, then t1..t3 and u1..u6 of the frame.
     tool_on_plate : whether the tool stands on the plate and the moving platform carries the work.
     """
@@ -145,7 +150,7 @@ class MachineWires:
         self.frame = self.comparators.part(self.joints, len(self.comparators.wires))
         self.tool_on_plate = configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
-        self._length_slots = [wire.slot for wire in self.length_wires]
+        self.lengths = Wires([*self.scale.wires, *self.comparators.wires])
 
     @property
     def length_channels(self) -> tuple[str, ...]:
@@ -155,20 +160,12 @@ class MachineWires:
     @property
     def length_wires(self) -> tuple[Wire, ...]:
         """Scales, joint and frame comparators."""
-        return (*self.scale.wires, *self.comparators.wires)
+        return self.lengths.wires
 
     @property
     def all_wires(self) -> tuple[Wire, ...]:
         """Length gauges, then quantities."""
         return (*self.length_wires, *self._quantities.values())
-
-    def length_age_uncertainty_mm(self, snapshot: Snapshot, extrapolate: bool) -> FloatArray:
-        """(n + k + 9) standard uncertainty of each length by its age, mm: scales, joints, frame.
-
-        0 for one that is not good; nan where it is not known how it moves.
-        """
-        now_s, readings = snapshot
-        return np.array([age_uncertainty_mm(readings[slot], now_s, extrapolate) for slot in self._length_slots])
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which length gauges cannot be used, and why."""

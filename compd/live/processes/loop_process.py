@@ -126,7 +126,7 @@ class LoopProcess:
         return Models(model or self.loader.without_effects, before.shadow)
 
     def _loop(self) -> Loop:
-        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
+        packer = CyclePacker(Directions(self.settings.wires.scale.wires))
 
         def send(setpoint: Setpoint) -> None:
             time_s, state = setpoint.time_s, setpoint.state.code
@@ -150,7 +150,7 @@ class LoopProcess:
 
     def _try_cycles(self, state: CycleState) -> None:
         """Compute cycles that nobody sees. Raises ValueError for models whose state does not fit into the ring."""
-        packer = CyclePacker(self.latest, Directions(self.settings.wires.scale.wires))
+        packer = CyclePacker(Directions(self.settings.wires.scale.wires))
         for tick in range(1, _TRIAL_CYCLES + 1):
             setpoint, state = step(state, self._inputs(tick), self.settings)
             sent = SentSetpoint.of(setpoint, self.packet_hash)

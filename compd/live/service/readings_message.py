@@ -18,8 +18,10 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.sent_cycle import SentCycle
+from compd.live.loop.setpoint import setpoint_line
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
@@ -99,7 +101,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
 
     Raises KeyError, TypeError or ValueError for anything that is not such a message.
     """
-    readings = tuple(_parsed_reading(message["readings"][channel]) for channel in channels)
+    readings = Readings.of(_parsed_reading(message["readings"][channel]) for channel in channels)
     zero = MachineZero(**message["zero"]) if "zero" in message else StateError(Problem(**message["no_zero"]))
     target = message.get("target")
     inputs = CycleInputs(
@@ -109,7 +111,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         None if target is None else _parsed_target(target),
         ending=message.get("ending", ""),
     )
-    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, line(message["setpoint"]))
+    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, setpoint_line(message["setpoint"]))
 
 
 def _reading(reading: Reading) -> dict[str, Any]:

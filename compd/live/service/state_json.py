@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from compd.compensation import WarmStart
+from compd.compensation_values import WarmStart
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.model.effect_memory import EffectMemory
@@ -42,6 +42,7 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
     "tip_correction_mm": "tip_correction_mm",
     "tip_by_gauge": "tip_by_gauge",
 }
+_MEMORY_FIELDS = ("motion", "memories", "commanded")
 
 # Of a set of comparators: not written where they are empty.
 _MAY_BE_EMPTY = ("group_times_s", "length_times_s", "drift_mm_per_s")
@@ -69,6 +70,8 @@ def to_plain(value: Any) -> Any:
                 names = {name: name for name in names if name not in _MAY_BE_EMPTY or getattr(value, name)}
             fields = {name: to_plain(getattr(value, field)) for name, field in names.items()}
             return {"kind": _TAGS[type(value)], **fields}
+        case EffectMemory():
+            return {"kind": _TAGS[EffectMemory], **{name: to_plain(getattr(value, name)) for name in _MEMORY_FIELDS}}
         case tuple():
             return [to_plain(part) for part in value]
         case Mapping():
@@ -89,7 +92,8 @@ def from_plain(data: Any) -> Any:
             return np.frombuffer(base64.b64decode(text), dtype=dtype).reshape(shape)
         case {"kind": tag, **fields}:
             kind = _KINDS[tag]
-            names = _CYCLE_STATE_FIELDS if kind is CycleState else {name: name for name in kind._fields}
+            fields_of = _MEMORY_FIELDS if kind is EffectMemory else kind._fields
+            names = _CYCLE_STATE_FIELDS if kind is CycleState else {name: name for name in fields_of}
             return kind(**{names[str(name)]: from_plain(part) for name, part in fields.items()})
         case {"mapping": items}:
             return {name: from_plain(part) for name, part in items.items()}

@@ -119,7 +119,7 @@ def _finish(model: Any, result: Any, shares_mm: FloatArray) -> None:
 def _advance(motion: FloatArray, other_mode: bool, time_s: float, scale_mm: FloatArray, joint_mm: FloatArray) -> None:
     """The motion after this snapshot. other_mode : the snapshot before it was of the other mode."""
     n, k = scale_mm.shape[0], joint_mm.shape[0]
-    if other_mode:
+    if other_mode and not math.isnan(motion[0]):
         # a scale does not stand where it is commanded: changing from one mode to the other is no motion
         motion[1 : 1 + n] = scale_mm
         motion[1 + n + k : 1 + 2 * n + k] = scale_mm

@@ -12,7 +12,8 @@ import pytest
 
 import compd
 from compd.comparison.aligned_recording import AlignedRecording
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation_values import GaugeValues, WarmStart
 from compd.configuration import load
 from compd.model.effect import FittedEffect
 from compd.model.machine import MachineModel, machine_constants, machine_model

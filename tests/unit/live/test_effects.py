@@ -245,7 +245,7 @@ def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):
     one = live.loader.read(file_with(tmp_path / "one.yaml", "link_expansion_lag", "backlash", backlash=[20, 30, 40]))
     two = live.loader.read(file_with(tmp_path / "two.yaml", "friction_hysteresis", FORMULA_OF_TIP))
     transcript = ReadingsMessage(live.wires, live.latest.channels)
-    packer = CyclePacker(live.latest, Directions(live.wires.scale.wires))
+    packer = CyclePacker(Directions(live.wires.scale.wires))
     commands = {
         0: None,
         20: Models(one),

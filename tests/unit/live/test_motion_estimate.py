@@ -10,7 +10,9 @@ import pytest
 from compd.gauge import Quality, Reading, ReadingMotion, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import Sample
-from compd.live.loop.extrapolation import age_uncertainty_mm, extrapolated
+from compd.live.loop.wiring import Wire, Wires
+from compd.live.memory.latest import Snapshot
+from compd.live.memory.readings import Readings
 
 ROUND_S = 0.04
 TOLERANCE_MM = 0.001
@@ -20,6 +22,17 @@ def motion(values, times_s=None):
     times_s = [ROUND_S * k for k in range(len(values))] if times_s is None else times_s
     samples = [Sample(value, time_s, 1e-3) for value, time_s in zip(values, times_s, strict=True)]
     return estimated_motion(samples, TOLERANCE_MM)
+
+
+SCALE = Wires([Wire("scale_1.position", "scale 1", 0, 1, math.inf)])
+
+
+def extrapolated(reading, now_s):
+    return SCALE.read(Snapshot(now_s, Readings.of([reading])), np.zeros(1), extrapolate=True).values[0]
+
+
+def age_uncertainty_mm(reading, now_s, extrapolate):
+    return SCALE.age_uncertainty_mm(Snapshot(now_s, Readings.of([reading])), extrapolate)[0]
 
 
 def carried(values, age_s):
@@ -105,7 +118,7 @@ def test_too_few_readings_have_no_known_motion():
     assert math.isnan(motion([1.0]).u_mm_per_s)
     reading = good(1.0, 0.0)._replace(motion=motion([1.0]))
     assert extrapolated(reading, 0.1) == 1.0
-    assert math.isnan(age_uncertainty_mm(reading, 0.1, carried_on=True))
+    assert math.isnan(age_uncertainty_mm(reading, 0.1, extrapolate=True))
 
 
 def test_readings_at_the_same_time_have_no_speed():
@@ -114,8 +127,8 @@ def test_readings_at_the_same_time_have_no_speed():
 
 def test_the_uncertainty_grows_with_age_and_is_larger_where_nothing_is_carried_on():
     reading = Reading(1.0, 10.0, Quality.OK, "", ReadingMotion(50.0, 0.0, 2.0, 0.08))
-    assert age_uncertainty_mm(reading, 10.05, carried_on=True) == pytest.approx(0.05 * 2.0 + 0.05)
-    assert age_uncertainty_mm(reading, 10.05, carried_on=False) == pytest.approx(0.05 * 52.0 + 0.05)
-    beyond = age_uncertainty_mm(reading, 10.18, carried_on=True)
+    assert age_uncertainty_mm(reading, 10.05, extrapolate=True) == pytest.approx(0.05 * 2.0 + 0.05)
+    assert age_uncertainty_mm(reading, 10.05, extrapolate=False) == pytest.approx(0.05 * 52.0 + 0.05)
+    beyond = age_uncertainty_mm(reading, 10.18, extrapolate=True)
     assert beyond == pytest.approx(0.18 * 2.0 + 0.1 * 50.0 + 0.05), "silent: the motion goes on unseen"
-    assert age_uncertainty_mm(bad(10.0, Quality.TIMEOUT), 10.05, carried_on=True) == 0.0
+    assert age_uncertainty_mm(bad(10.0, Quality.TIMEOUT), 10.05, extrapolate=True) == 0.0

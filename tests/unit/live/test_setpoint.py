@@ -10,6 +10,7 @@ import zlib
 import numpy as np
 import pytest
 
+from compd.compensation_values import CorrectionShares
 from compd.live.loop.packet_layout import PACKET_SIZE
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
@@ -29,7 +30,7 @@ def numbers(links: int = 3, tip_P_mm=None) -> SetpointValues:
         link_length_mm=400 + each,
         scale_setpoint_mm=10 + each,
         correction_mm=each / 100,
-        sources_mm={"joints": each / 300, "frame": each / 150},
+        sources_mm=CorrectionShares(("joints", "frame"), np.array([each / 300, each / 150])),
     )
 
 
@@ -80,7 +81,7 @@ def test_json_with_the_tool_on_the_plate_tells_the_touched_place():
 
 def test_json_never_holds_nan():
     broken = numbers()._replace(tip_M_mm=np.array([math.nan, 0, 0]))
-    with pytest.raises(ValueError, match="JSON compliant"):
+    with pytest.raises(ValueError, match="not finite"):
         setpoint(broken).to_json()
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation_values import Compensation, GaugeValues, WarmStart
 from compd.errors import KinematicsError
 from compd.model.kernels.rotation import rotation_matrix, rotation_vector, to_inner
 from compd.model.machine import MachineModel, machine_model

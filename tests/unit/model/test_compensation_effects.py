@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation_values import GaugeValues, WarmStart
 from compd.model.deltas import deltas_by_effect, sum_deltas
 from compd.model.effect import Effect, FittedEffect
 from compd.model.machine import MachineModel, machine_constants

@@ -9,7 +9,8 @@ import os
 import pytest
 
 from compd.gauge import Quality, Reading, bad, good
-from compd.live.memory.latest import Latest, packed, unpack_readings, unpacked
+from compd.live.memory.latest import Latest
+from compd.live.memory.readings import Readings, pack
 from compd.live.memory.shared_record import SharedRecord
 from compd.live.memory.shared_ring import ENTRIES, RingReader, SharedRing
 from tests.support.other_process import beside
@@ -100,14 +101,14 @@ def test_readings_are_never_mixed_from_two():
         for number in itertools.count():
             if number > READS and newest > 100:
                 break
-            first, second = latest.snapshot(1.0).readings
+            readings = latest.snapshot(1.0).readings
+            first, second = Readings.checked(readings.image)
             if first.quality is Quality.TIMEOUT:
                 assert first.detail == str(int(first.value)) * 8
                 assert first.value == first.time_s >= newest, "and none is older than the one before"
                 newest = first.value
             if second.ok:
                 assert second.value == -second.time_s
-            assert unpack_readings(latest.image) == (first, second) or math.isnan(first.value) or not second.ok
 
 
 def test_a_slot_that_stays_half_written_keeps_the_reading_before():
@@ -130,8 +131,8 @@ def test_a_slot_that_stays_half_written_keeps_the_reading_before():
     ],
 )
 def test_a_reading_comes_back_bit_for_bit_and_a_long_detail_is_cut(reading):
-    content = packed(reading)
-    back = unpacked(content)
+    content = pack(reading)
+    (back,) = Readings.checked(content)
     assert back.time_s == reading.time_s
     assert back.quality is reading.quality
     assert back.value == reading.value or math.isnan(back.value)
@@ -139,7 +140,8 @@ def test_a_reading_comes_back_bit_for_bit_and_a_long_detail_is_cut(reading):
     for place in (0, 9, 16, 20):
         damaged = bytearray(content)
         damaged[place] ^= 1
-        assert unpacked(bytes(damaged)) is None
+        with pytest.raises(ValueError, match="damaged"):
+            Readings.checked(bytes(damaged))
 
 
 def test_a_reader_of_the_ring_gets_whole_entries_in_their_order():

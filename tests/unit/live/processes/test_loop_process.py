@@ -27,7 +27,7 @@ class Predecessor:
     def __init__(self, **changes):
         self.machine = machine(**changes)
         self.cycles, self.setpoints, self.control = SharedRing(), SharedRing(), Control()
-        self.packer = CyclePacker(self.machine.latest, Directions(self.machine.wires.scale.wires))
+        self.packer = CyclePacker(Directions(self.machine.wires.scale.wires))
         self.machine.commands.models = Models(self.machine.loader.without_effects)
         self.adopted = AdoptedModels(self.machine.commands.models)
         self.process = LoopProcess(

@@ -1,0 +1,112 @@
+"""What a compensation is computed from, and what it gives: one snapshot, or N rows of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from compd.arrays import FloatArray, IntArray
+from compd.model.effect_memory import EffectMemory
+from compd.model.frame import Frame
+from compd.model.machine import MachineModel
+
+
+class GaugeValues(NamedTuple):
+    """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
+
+    scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6.
+    quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
+    time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
+    """
+
+    scale_mm: FloatArray
+    joint_mm: FloatArray
+    frame_mm: FloatArray
+    quantities: Mapping[str, FloatArray]
+    time_s: FloatArray | float = math.nan
+
+
+class WarmStart(NamedTuple):
+    """Where the last cycle ended and the next one's Newton starts; rows that failed keep what they came with.
+
+    supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
+    effects : what the model's effects remember; of N rows, after the last one.
+    """
+
+    supports_M_mm: FloatArray
+    origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    effects: EffectMemory = EffectMemory()
+
+    @classmethod
+    def at_zero(cls, model: MachineModel) -> WarmStart:
+        """Machine zero: the first start, and the one that depends on no history."""
+        zero = model.zero
+        return cls(model.frame.zero_supports_M_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
+
+
+class CorrectionShares(Mapping[str, FloatArray]):
+    """The share (..., n) of each cause, by its name; their sum is the correction but for rounding.
+
+    Attributes
+    ----------
+    causes : "joints", "frame", and the id of each effect.
+    shares_mm : (K, ..., n), in the order of `causes`.
+    """
+
+    def __init__(self, causes: Sequence[str], shares_mm: FloatArray) -> None:
+        self.causes = causes
+        self.shares_mm = shares_mm
+
+    def __getitem__(self, cause: str) -> FloatArray:
+        if cause not in self.causes:
+            raise KeyError(cause)
+        share_mm: FloatArray = self.shares_mm[self.causes.index(cause)]
+        return share_mm
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.causes)
+
+    def __len__(self) -> int:
+        return len(self.causes)
+
+
+class Compensation(NamedTuple):
+    """What one cycle computes; where reason is not OK every number is nan (frame has a reason of its own).
+
+    tip_M_mm, tip_B0_mm : (..., 3), the tip in {M}, and in {B0} by equation (9). In CMM mode where it is now, in
+        machine-tool mode where it will be when the setpoint is reached.
+    tip_P_mm : (..., 3), the same place in {P}: with the tool on the plate, the place on the work that it touches.
+    rotation_M_P : (..., 3, 3), attitude of the moving platform.
+    frame : the machine frame now, with its displacement since machine zero.
+    link_length_mm : (..., n): in CMM mode those measured, equation (1); in machine-tool mode those needed.
+    target_B_mm : (..., 3), the target in today's {B}, equation (8).
+    nominal_scale_mm : (..., n), the command without compensation.
+    scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
+    correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
+    sources : the correction by cause, (..., n) each.
+    reason : (...), a Reason, of the step that failed first.
+    """
+
+    tip_M_mm: FloatArray
+    tip_B0_mm: FloatArray
+    tip_P_mm: FloatArray
+    rotation_M_P: FloatArray
+    frame: Frame
+    link_length_mm: FloatArray
+    target_B_mm: FloatArray
+    nominal_scale_mm: FloatArray
+    scale_setpoint_mm: FloatArray
+    correction_mm: FloatArray
+    sources: CorrectionShares
+    reason: IntArray
+
+
+class Wanted(NamedTuple):
+    """What machine-tool mode is to reach: the contact, tip_M_mm (..., 3) and tip_P_mm (..., 3), and the attitude
+    (..., 3, 3) of {P} in {M}: a hexapod's; for a tripod the guess to start from."""
+
+    tip_M_mm: FloatArray
+    tip_P_mm: FloatArray
+    attitude_M_P: FloatArray

@@ -1,0 +1,76 @@
+"""What the README says that compd costs, measured in one run: `python -m tests.benchmarks.costs [--quick]`.
+
+It takes a quarter of an hour; `--quick` measures little of everything and writes nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from datetime import UTC, datetime
+
+from compd.live import daemon as daemon_module
+from tests.benchmarks import bench_kilohertz
+from tests.benchmarks.bench_cycle import EFFECTS, whole_cycles
+from tests.benchmarks.bench_latency import AllAtOnce
+from tests.benchmarks.cost_table import Cost, save
+from tests.benchmarks.figures import median_and_p99, quiet, show
+
+MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")
+MODES = ("cmm", "machine_tool")
+
+
+def cycle_costs() -> list[Cost]:
+    """The dearest of both machines in both modes."""
+    bare_s, whole_s, p99_s = max(
+        (median_and_p99(whole_cycles(name, mode, 0))[0], *median_and_p99(whole_cycles(name, mode, len(EFFECTS))))
+        for name in MACHINES
+        for mode in MODES
+    )
+    return [
+        Cost(
+            f"a cycle with {len(EFFECTS)} effects, from the gauges' snapshot to the bytes for clients",
+            f"{whole_s * 1e6:.0f} us, 99 %: {p99_s * 1e6:.0f} us",
+            f"without effects: {bare_s * 1e6:.0f} us",
+            f"{whole_s / bare_s:.2f}",
+        )
+    ]
+
+
+def kilohertz_costs(seconds: int, rounds: int) -> list[Cost]:
+    runs = bench_kilohertz.measure(seconds, rounds, lambda text: print(text, file=sys.stderr))
+    missed, late = sum(run.missed for run, _ in runs), sum(late for _, late in runs)
+    oldest_s = max(run.p99_s for run, _ in runs)
+    cycles = f"{seconds * rounds * bench_kilohertz.RATE_HZ:,}"
+    return [
+        Cost(
+            f"cycles missed at 1 kHz with {len(EFFECTS)} effects, of {cycles}",
+            f"{missed}",
+            f"wake-ups of `cyclictest` a period late: {late}",
+            f"{missed / late:.2f}" if late else "-",
+        ),
+        Cost(
+            "from a gauge's reading to a client at 1 kHz, 99 %",
+            f"{oldest_s * 1e3:.2f} ms",
+            "a period: 1 ms",
+            f"{oldest_s * 1e3:.2f}",
+        ),
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="measure little of everything, write nothing")
+    options = parser.parse_args()
+    quiet()
+    daemon_module.Acquisition = AllAtOnce  # type: ignore[misc, assignment]
+    seconds, rounds = (5, 1) if options.quick else (60, 5)
+    costs = [*cycle_costs(), *kilohertz_costs(seconds, rounds)]
+    show("What it costs", ["", "figure", "beside it", "ratio"], costs)
+    if not options.quick:
+        save(costs, f"{datetime.now(UTC):%Y-%m-%d}", os.cpu_count() or 0)
+
+
+if __name__ == "__main__":
+    main()
