@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from compd.api.diagnosis import compare as compare
     from compd.api.diagnosis import diagnose as diagnose
+    from compd.api.long_recordings import compare_stream as compare_stream
+    from compd.api.long_recordings import open_sample as open_sample
     from compd.api.measurements import plan_measurement as plan_measurement
     from compd.api.models import add_effect as add_effect
     from compd.api.models import open_model as open_model
@@ -35,6 +37,8 @@ _MODULES = {
     "open_recording": "compd.comparison.open",
     "compare": "compd.api.diagnosis",
     "diagnose": "compd.api.diagnosis",
+    "compare_stream": "compd.api.long_recordings",
+    "open_sample": "compd.api.long_recordings",
     "load_effects": "compd.model.library.effects_file",
     "add_effect": "compd.api.models",
     "open_model": "compd.api.models",

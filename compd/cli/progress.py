@@ -26,6 +26,18 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         yield lambda said: bar.update(task, description=said)
 
 
+@contextmanager
+def rows_shown(what: str, rows: int, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """A function that is told how many rows more are done, of so many; the bar is as that of `steps_shown`."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(bar_width=20), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as bar:
+        task = bar.add_task(what, total=rows)
+        yield lambda more: bar.update(task, advance=more)
+
+
 class ElapsedShown:
     """How far a measurement is that takes a given time, or goes on until Ctrl-C; a context manager."""
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from compd.comparison.aligned_recording import AlignedRecording
 
 
 def diagnose(
@@ -33,7 +36,6 @@ def diagnose(
 
     from compd.api.diagnosis import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
-    from compd.comparison.open import open_recording
     from compd.diagnosis.holdout import evaluate_holdout
     from compd.report.diagnosis_text import print_diagnosis
 
@@ -41,8 +43,8 @@ def diagnose(
         from compd.report.page import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [open_recording(path, machine) for path in recordings[1:]]
-    aligned = open_recording(recordings[0], machine)
+    sealed = [_open(path, machine, quiet=as_json)[0] for path in recordings[1:]]
+    aligned, all_rows = _open(recordings[0], machine, quiet=as_json)
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
@@ -52,8 +54,28 @@ def diagnose(
         write_diagnosis_page(html, diagnosis, holdouts)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
+        if all_rows:
+            data["sample"] = {"rows": aligned.recording.rows, "of": all_rows}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return
     print_diagnosis(Console(highlight=False), diagnosis, holdouts)
+    if all_rows:
+        typer.echo(f"From a sample of {aligned.recording.rows} rows of {all_rows}, spread evenly.")
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
+
+
+def _open(path: Path, machine: Path | None, quiet: bool) -> tuple[AlignedRecording, int]:
+    """The recording and 0; of one that is too long for the memory a sample, and the number of its rows."""
+    from compd.comparison.open import open_recording
+    from compd.comparison.stream.recording_stream import is_long
+
+    if not is_long(path):
+        return open_recording(path, machine), 0
+    from compd.api.long_recordings import open_sample
+    from compd.cli.progress import rows_shown
+    from compd.recording.blocks import row_count
+
+    rows = row_count(path)
+    with rows_shown(f"drawing a sample of {path.name}", rows, quiet) as advance:
+        return open_sample(path, machine, advance=advance), rows
