@@ -67,7 +67,10 @@ def perturb_machine(
         geometry = model.frame._replace(
             plate_points_M_mm=_add_to_points(model.frame.plate_points_M_mm, "plate", deltas)
         )
-        frame = solve_frame(geometry, model.zero.distances_mm + _add(frame_mm, "frame", deltas))
+        since_zero_mm = _add(frame_mm, "frame", deltas)
+        if "plate" not in deltas and since_zero_mm.ndim == 2 and (since_zero_mm == since_zero_mm[:1]).all():
+            since_zero_mm = since_zero_mm[:1]  # a frame that does not move is solved once
+        frame = solve_frame(geometry, model.zero.distances_mm + since_zero_mm)
         base_joints_M_mm, frame_reason = frame.base_joints_M_mm, frame.reason
     shortening_mm, reason = joint_shortening(model.joint_weights, _add(joint_mm, "joint", deltas))
     mechanism = Mechanism(

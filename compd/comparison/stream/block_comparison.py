@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
-from compd.comparison.comparison import NO_QUANTITY, Comparison
+from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.nuisance import nuisance_parameters
-from compd.comparison.outliers import OutlierLimits, outlier_limits
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
+from compd.comparison.stream.carried_effects import NOTHING_CARRIED, CarriedState, advance_effects
+from compd.comparison.stream.fixed_terms import NOTHING, BlockNuisance, FixedTerms, fixed_terms
 from compd.comparison.stream.recording_stream import Block, RecordingStream, align_block
 from compd.comparison.stream.residual_totals import BlockResiduals, ResidualTotals, SourceSquares
 from compd.comparison.stream.sample import Sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.comparison.stream.time_envelope import TimeEnvelope
-from compd.model.deltas import Deltas, Memories, deltas_by_effect, sum_deltas
+from compd.model.deltas import Deltas, sum_deltas
 from compd.model.effect import FittedEffect
 from compd.units import UM_PER_MM
-
-# What is known of the model as a whole, among the names of sources.
-EVERYTHING = ""
 
 
 def compare_blocks(
@@ -43,70 +39,44 @@ def compare_blocks(
     Raises CompdError and RecordingError as `compare` does.
     """
     comparison = compare(sample.aligned, fitted, covariance, criteria)
-    terms = _fixed_terms(comparison)
+    fixed = fixed_terms(comparison, sample.starts_s)
     coordinates = len(sample.aligned.labels)
     totals = ResidualTotals(coordinates, TimeEnvelope(sample.begin_s, sample.end_s, coordinates))
 
-    def compute(block: Block, hand_over: HandOver[Memories]) -> BlockResiduals:
+    def compute(block: Block, hand_over: HandOver[CarriedState]) -> BlockResiduals:
         aligned = align_block(block, sample.aligned)
-        by_effect, memories = deltas_by_effect(fitted, aligned.rows, hand_over.take())
-        hand_over.give(memories)
-        return _block_residuals(aligned, by_effect, terms)
+        effects, carried = advance_effects(fitted, aligned.rows, fixed.keys, hand_over.take())
+        hand_over.give(carried)
+        nuisance = fixed.block_nuisance(aligned, fitted, effects)
+        return _block_residuals(aligned, effects.deltas(fitted, aligned.rows), nuisance, fixed)
 
-    no_memories: Memories = {}
-    for residuals in computed_blocks(stream.blocks(), compute, no_memories):
+    for residuals in computed_blocks(stream.blocks(), compute, NOTHING_CARRIED):
         totals.add(residuals)
         advance(residuals.rows)
     return StreamedComparison.of_sample(comparison, totals)
 
 
-@dataclass(frozen=True)
-class _FixedTerms:
-    """What the sample fixes for all rows.
-
-    limits : of outliers.  registration : (Q,) nuisance terms of the whole model, under EVERYTHING, and without each
-    source.
-    """
-
-    limits: OutlierLimits
-    registration: Mapping[str, FloatArray]
-
-
-def _fixed_terms(comparison: Comparison) -> _FixedTerms:
-    """From the comparison of the sample."""
-    aligned, used = comparison.aligned, comparison.used
-    known = np.isfinite(comparison.residual_um).all(axis=1)
-    limits = outlier_limits(comparison.residual_um, known, aligned.recording.visit, comparison.criteria)
-    by_effect, total = effect_deltas(comparison.fitted, aligned.rows)
-    registration: dict[str, FloatArray] = {}
-    for name, added in {EVERYTHING: total, **deltas_without(aligned, by_effect)}.items():
-        residual_um = (aligned.measured_mm - aligned.predicted_mm(added)) * UM_PER_MM
-        others = [effect for effect in comparison.fitted if effect.effect.id != name]
-        rows = used & np.isfinite(residual_um).all(axis=1)
-        theta = nuisance_parameters(aligned, others, residual_um, rows)
-        registration[name] = theta[: aligned.registration_columns.shape[2]]
-    return _FixedTerms(limits, registration)
-
-
-def _block_residuals(aligned: AlignedRecording, by_effect: Mapping[str, Deltas], terms: _FixedTerms) -> BlockResiduals:
+def _block_residuals(
+    aligned: AlignedRecording, by_effect: Mapping[str, Deltas], nuisance: BlockNuisance, fixed: FixedTerms
+) -> BlockResiduals:
     """What the block adds to the totals."""
     recording = aligned.recording
-    G_um = aligned.registration_columns * UM_PER_MM
     predicted_mm = aligned.predicted_mm(sum_deltas(list(by_effect.values())))
     usable = aligned.usable
     known: BoolArray = usable.mask & np.isfinite(predicted_mm).all(axis=1)
     left_out = dict(usable.left_out)
     if without_value := int((usable.mask & ~known).sum()):
         left_out[NO_QUANTITY] = without_value
-    registration_um = G_um @ terms.registration[EVERYTHING]
-    residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM - registration_um
-    outlier = terms.limits.outliers(residual_um, known, recording.visit)
+    terms = fixed.terms[NOTHING]
+    registration_um = nuisance.registration_um @ terms.registration
+    residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM - terms.explained_um(nuisance)
+    outlier = fixed.limits.outliers(residual_um, known, recording.visit)
     used = known & ~outlier
     sources: dict[str, SourceSquares] = {}
     for name, added in deltas_without(aligned, by_effect).items():
         without_mm = aligned.predicted_mm(added)
         rows = used & np.isfinite(without_mm).all(axis=1)
-        without_um = (aligned.measured_mm - without_mm) * UM_PER_MM - G_um @ terms.registration[name]
+        without_um = (aligned.measured_mm - without_mm) * UM_PER_MM - fixed.terms[name].explained_um(nuisance)
         moved_um = (predicted_mm - without_mm)[rows][:, aligned.lengths] * UM_PER_MM
         without_um = without_um[rows][:, aligned.lengths]
         sources[name] = SourceSquares(float((moved_um**2).sum()), float((without_um**2).sum()), moved_um.size)

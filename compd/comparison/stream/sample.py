@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.arrays import IntArray
+from compd.arrays import FloatArray, IntArray
 from compd.comparison.align_recording import align_observations, recorded_observations, session_starts
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
@@ -32,13 +32,14 @@ class Sample:
     aligned : the rows that were drawn, with their machine.
     rows : of the whole recording, with a time.  rows_of_session : number of a session -> its rows, in their order.
     left_out : reason -> rows of the file that are no row of the recording.
-    begin_s, end_s : time of the first and of the last row.
+    starts_s : (S,) when its sessions start.  begin_s, end_s : time of the first and of the last row.
     """
 
     aligned: AlignedRecording
     rows: int
     rows_of_session: dict[int, int]
     left_out: dict[str, int]
+    starts_s: FloatArray
     begin_s: float
     end_s: float
 
@@ -60,6 +61,7 @@ def draw_sample(
     drawn: IntArray | None = None
     recordings: list[Recording] = []
     observations: list[Observations] = []
+    starts_s: list[float] = []
     left_out: Counter[str] = Counter()
     sessions: Counter[int] = Counter()
     count, begin_s, end_s = 0, 0.0, 0.0
@@ -76,6 +78,8 @@ def draw_sample(
             observations.append(_observe(block, here, model))
         left_out.update(part.left_out)
         sessions.update(_rows_of_session(part))
+        started = session_starts(block.recording)[block.own]
+        starts_s += part.time_s[started].tolist()
         count += part.rows
         end_s = float(part.time_s[-1])
         advance(part.rows)
@@ -86,7 +90,7 @@ def draw_sample(
     rows = replace(rows, session_start=session_starts(recording))
     geometry_hash = "" if stream.configuration is None else stream.configuration.geometry_hash
     aligned = align_observations(recording, model, rows, geometry_hash, criteria)
-    return Sample(aligned, count, dict(sessions), dict(left_out), begin_s, end_s)
+    return Sample(aligned, count, dict(sessions), dict(left_out), np.array(starts_s), begin_s, end_s)
 
 
 def _drawn_with_one(part: Recording) -> float:

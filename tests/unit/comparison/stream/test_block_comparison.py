@@ -48,7 +48,7 @@ REFERENCES: list[dict[str, Any] | None] = [
 
 
 @pytest.mark.parametrize("reference", REFERENCES, ids=["own frame", "instrument's frame"])
-@pytest.mark.parametrize("effects", [[], EFFECTS[:1], EFFECTS[2:]], ids=["no effects", "expansion", "backlash"])
+@pytest.mark.parametrize("effects", [[], EFFECTS[:2], EFFECTS[1:]], ids=["no effects", "two", "others"])
 def test_the_same_numbers_as_in_memory(
     tmp_path: Path, effects: list[FittedEffect], reference: dict[str, Any] | None
 ) -> None:
