@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.comparison import Comparison
 from compd.comparison.contributions import deltas_without
@@ -88,7 +88,7 @@ def session_places(starts_s: FloatArray, time_s: FloatArray) -> IntArray:
 def fixed_terms(comparison: Comparison, starts_s: FloatArray) -> FixedTerms:
     """From the comparison of the sample.  starts_s : (S,) when the sessions of the whole recording start."""
     aligned, used = comparison.aligned, comparison.used
-    known = np.isfinite(comparison.residual_um).all(axis=1)
+    known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
     limits = outlier_limits(comparison.residual_um, known, aligned.recording.visit, comparison.criteria)
     states = {
         effect.effect.id: initial_states(aligned.rows, effect.effect, effect.constants) for effect in comparison.fitted

@@ -64,8 +64,8 @@ class RecordingStream:
             assert part is not None
             first = [] if before is None else [before.select(slice(-1, None))]
             last = [] if after is None else [after.select(slice(0, 1))]
-            joined, *others = [*first, part, *last]
-            whole = joined.extended_by(*others) if others else joined
+            parts_around = [*first, part, *last]
+            whole = parts_around[0].extended_by(*parts_around[1:])
             yield Block(
                 replace(whole, left_out=part.left_out, warnings=part.warnings),
                 slice(len(first), len(first) + part.rows),

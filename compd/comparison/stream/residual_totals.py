@@ -25,6 +25,10 @@ class SourceSquares(NamedTuple):
     without: float
     values: int
 
+    def plus(self, other: SourceSquares) -> SourceSquares:
+        """Of these values and of others."""
+        return SourceSquares(self.moved + other.moved, self.without + other.without, self.values + other.values)
+
 
 class BlockResiduals(NamedTuple):
     """A block of N rows, of which U are used.
@@ -77,7 +81,7 @@ class ResidualTotals:
         self.outlier_rows += block.outlier_row[: MOST_OUTLIERS_LISTED - len(self.outlier_rows)].tolist()
         for name, squares in block.sources.items():
             before = self._sources.get(name, SourceSquares(0.0, 0.0, 0))
-            self._sources[name] = SourceSquares(*(a + b for a, b in zip(before, squares, strict=True)))
+            self._sources[name] = before.plus(squares)
         if not len(block.row):
             return
         self.used += len(block.row)
