@@ -57,6 +57,7 @@ def merge(
     from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
+    from compd.recording.table_file import written_path
 
     if len(recordings) < 2:
         raise CompdError(
@@ -71,12 +72,33 @@ def merge(
             problems += error.problems
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
-    path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
+    path = written_path(out)
     merged = merge_recordings(parts, path, overwrite)
     if not merged.gap_known:
         typer.echo(f"when each began is not recorded: {ASSUMED_GAP_S / 3600:g} h is put between them")
     counts = ", ".join(f"{part.path} {rows}" for part, rows in zip(parts, merged.rows, strict=True))
     typer.echo(f"written: {path}, {sum(merged.rows)} rows ({counts})")
+
+
+@recording.command()
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it; or NAME.arrow, left by a "
+            "`compd record` that was killed."
+        ),
+    ],
+    destination: Annotated[Path, typer.Argument(help="What to write: NAME.parquet or NAME.csv.")],
+    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+) -> None:
+    """Write a recording of any length as Parquet or as CSV: the same numbers in the same rows, the same sidecar."""
+    from compd.cli.progress import rows_shown
+    from compd.recording.convert import convert_recording, rows_to_convert
+
+    with rows_shown(rows_to_convert(source), "rows") as progress:
+        rows = convert_recording(source, destination, overwrite, progress)
+    typer.echo(f"written: {destination}, {rows} rows")
 
 
 RowsOption = Annotated[
