@@ -15,8 +15,8 @@ from compd.units import unit_of
 
 # Small enough for the memory of whoever reads it in blocks, and large enough to be compressed well.
 ROW_GROUP_ROWS = 100_000
-# name -> (N,) numbers, nan where nothing was measured, or texts, None where there is none.
-Block = Mapping[str, ArrayLike | Sequence[str | None]]
+# name -> (N,) numbers, nan or None where nothing was measured, or texts, None where there is none.
+Block = Mapping[str, ArrayLike | Sequence[float | str | None]]
 
 
 def arrow_schema(path: Path, names: Iterable[str], text_columns: Iterable[str] = ()) -> Any:
