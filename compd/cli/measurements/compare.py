@@ -20,7 +20,9 @@ MOST_SENTENCES = 6
 def compare(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar="RECORDING...", help="The recordings: NAME.csv, each with NAME.yaml beside it."),
+        typer.Argument(
+            metavar="RECORDING...", help="The recordings: NAME.csv or NAME.parquet, each with NAME.yaml beside it."
+        ),
     ],
     machine: MachineOption = None,
     model: Annotated[

@@ -16,7 +16,8 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORDING [SEALED...]",
-            help="NAME.csv to learn from; any others stay sealed until the end, when the result is tried on them once.",
+            help="NAME.csv or NAME.parquet to learn from; any others stay sealed until the end, when the result is "
+            "tried on them once.",
         ),
     ],
     machine: MachineOption = None,

@@ -25,7 +25,7 @@ def _recording() -> None:
 
 @recording.command()
 def check(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     machine: Annotated[
         Path | None,
         typer.Option("--machine", help="The machine's configuration; one that comes with compd is found by its name."),
@@ -46,10 +46,13 @@ def merge(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RECORDING RECORDING...", help="The recordings, NAME.csv with NAME.yaml, in the order of time."
+            metavar="RECORDING RECORDING...",
+            help="The recordings, NAME.csv or NAME.parquet with NAME.yaml, in the order of time.",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    out: Annotated[
+        Path, typer.Option(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
+    ],
     machine: MachineOption = None,
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
@@ -108,7 +111,7 @@ RowsOption = Annotated[
 
 @recording.command()
 def exclude(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
     reason: Annotated[str, typer.Option(help="Why they are left out; it is kept in NAME.yaml.")],
 ) -> None:
@@ -122,7 +125,7 @@ def exclude(
 
 @recording.command()
 def include(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
 ) -> None:
     """Let rows count again that were left out."""
