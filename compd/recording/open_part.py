@@ -49,7 +49,8 @@ class OpenPart:
             while True:
                 try:
                     batch = reader.read_next_batch()
-                except (StopIteration, OSError, self._arrow.ArrowException):
+                    batch.validate(full=True)
+                except (StopIteration, OSError, MemoryError, self._arrow.ArrowException):
                     return
                 yield batch
 
@@ -69,7 +70,7 @@ class OpenPart:
     def _reader(self, file: Any) -> Any:
         try:
             return self._arrow.ipc.open_stream(file)
-        except (OSError, self._arrow.ArrowException) as error:
+        except (OSError, MemoryError, self._arrow.ArrowException) as error:
             raise RecordingError(
                 Problem(
                     where=str(self._path),

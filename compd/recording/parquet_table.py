@@ -57,12 +57,12 @@ class ParquetTable:
         self._types = arrow.types
         try:
             self._file = parquet.ParquetFile(path, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True)
+            self._names: list[str] = self._file.schema_arrow.names
         except OSError as error:
             raise RecordingError(_unreadable(path, error)) from error
-        except arrow.ArrowException as error:
+        except (ValueError, arrow.ArrowException) as error:  # of a name that is no text, too
             raise RecordingError(_damaged(path)) from error
-        self._faults = (OSError, arrow.ArrowException)
-        self._names: list[str] = self._file.schema_arrow.names
+        self._faults = (OSError, MemoryError, arrow.ArrowException)
         if problems := self._wrong_columns(id_columns):
             raise RecordingError(problems)
 
