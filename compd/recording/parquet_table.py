@@ -62,7 +62,7 @@ class ParquetTable:
             raise RecordingError(_unreadable(path, error)) from error
         except (ValueError, arrow.ArrowException) as error:  # of a name that is no text, too
             raise RecordingError(_damaged(path)) from error
-        self._faults = (OSError, MemoryError, arrow.ArrowException)
+        self._faults = (OSError, arrow.ArrowException)
         if problems := self._wrong_columns(id_columns):
             raise RecordingError(problems)
 
@@ -96,6 +96,8 @@ class ParquetTable:
     def _batches(self, rows: int, names: Sequence[str] | None = None) -> Iterator[Any]:
         try:
             yield from self._file.iter_batches(rows, columns=names, use_threads=False)
+        except MemoryError as error:
+            raise RecordingError(_too_large(self._path)) from error
         except self._faults as error:
             raise RecordingError(_damaged(self._path)) from error
 
@@ -188,6 +190,14 @@ def _cells(column: Any) -> list[str]:
 def _unreadable(path: Path, error: OSError) -> Problem:
     what = f"cannot be read: {os.strerror(error.errno) if error.errno else error}"
     return Problem(where=str(path), what=what, next_step="give the path of a Parquet file")
+
+
+def _too_large(path: Path) -> Problem:
+    return Problem(
+        where=str(path),
+        what="needs more memory than there is, or is damaged",
+        next_step="divide it into several recordings, or copy it again",
+    )
 
 
 def _damaged(path: Path) -> Problem:
